@@ -1,0 +1,132 @@
+"""Motions as columns: what the control does, one row per motion, in the order in which it does it.
+
+Positions are *commands*: what the control is told in its own coordinate system of axes, with work offsets, G92 and
+tool offsets added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y
+Z of the command are the coordinates of the tool tip in the workpiece, turned with it; the machine floor knows how to
+make axis positions of that, this floor does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Message
+
+
+class Kind(IntEnum):
+    """What sort of motion."""
+
+    RAPID = 0
+    FEED = 1
+    ARC = 2
+    CYCLE = 3
+    """A canned cycle's motion to one hole: `end` is the position over the hole at the depth it reaches."""
+    DWELL = 4
+    """No motion, kept for time."""
+
+
+class Rule(IntEnum):
+    """What may be done to the block of a motion."""
+
+    CORRECT = 0
+    """May be corrected."""
+    PASS = 1
+    """Passed as it is, by rule: machine coordinates, reference points, probing, parking. `reason` says which."""
+    REFUSE = 2
+    """Must not be changed, and is not right: `reason` says why."""
+
+
+class FeedMode(IntEnum):
+    """How F is meant."""
+
+    PER_MINUTE = 94
+    INVERSE_TIME = 93
+    PER_REVOLUTION = 95
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """How the numbers in the program become a command: `command = offset + rotation @ (unit * program)`.
+
+    offset    (n_axes,) mm, rad: work offset, G52/G92, tool offset, rotated where the control rotates them
+    rotation  (3, 3) acts on X Y Z (G68, G10 R)
+    unit      mm per program unit of linear words: 1.0 or 25.4
+    diameter  X is programmed as a diameter (G7)
+    """
+
+    offset: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    unit: float
+    diameter: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """The motions of a program, struct of arrays; n rows, one per motion, in order of execution.
+
+    axes         names of the columns of positions, e.g. ("X", "Y", "Z", "B", "C")
+    rotary       (n_axes,) which of them are rotary
+    start, end   (n, n_axes) commands in mm and rad; NaN where not known
+    programmed   (n, n_axes) True where the block has a word for the axis
+    kind         (n,) `Kind`
+    rule         (n,) `Rule`
+    reason       (n,) index into `reasons`; 0 is the empty reason
+    block        (n,) index of the block in the program
+    frame        (n,) index into `frames`
+    incremental  (n,) the block's words are increments (G91)
+    arc_absolute (n,) the centre of an arc is given absolutely (G90.1)
+    tcp          (n,) X Y Z are tool-tip coordinates in the workpiece
+    compensated  (n,) cutter radius compensation is active (G41/G42): the control offsets the contour
+    tool_length  (n,) mm, spindle reference to tip; NaN where not known
+    feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`; NaN where none is set, in mm
+    feed_mode    (n,) `FeedMode`
+    centre       (n, 3) of arcs: centre in command coordinates (mm), NaN elsewhere
+    normal       (n, 3) of arcs: unit normal of the plane; the sweep is right-handed about it
+    sweep        (n,) of arcs: signed angle, full turns included, rad
+    modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
+    frames       the frames that occur
+    reasons      the reasons that occur
+    """
+
+    axes: tuple[str, ...]
+    rotary: NDArray[np.bool_]
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    programmed: NDArray[np.bool_]
+    kind: NDArray[np.int8]
+    rule: NDArray[np.int8]
+    reason: NDArray[np.int16]
+    block: NDArray[np.int32]
+    frame: NDArray[np.int32]
+    incremental: NDArray[np.bool_]
+    arc_absolute: NDArray[np.bool_]
+    tcp: NDArray[np.bool_]
+    compensated: NDArray[np.bool_]
+    tool_length: NDArray[np.float64]
+    feed: NDArray[np.float64]
+    feed_mode: NDArray[np.int8]
+    centre: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    sweep: NDArray[np.float64]
+    modal: NDArray[np.int16]
+    frames: tuple[Frame, ...]
+    reasons: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A program followed as the control would: its motions and what there is to say about them."""
+
+    moves: Moves
+    messages: tuple[Message, ...] = ()
+    assumed: tuple[str, ...] = ()
+    """What was not given and was taken as zero (`assume_zero`), in words, e.g. "work offset G54"."""
+    stamp: str = ""
+    """The text of the stamp comment if the program carries one."""

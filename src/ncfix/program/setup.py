@@ -1,0 +1,40 @@
+"""What a program cannot know: work offsets, tool lengths, start position. Read from the setup file or from options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Tool:
+    """A tool as the control's table has it, mm."""
+
+    length: float | None = None
+    radius: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What is on the machine when the program starts. Angles here are in degrees, as on the control.
+
+    work_offsets      "G54" -> values for the axes in the order X Y Z A B C, or by axis letter
+    tools             tool number -> `Tool`; tool 0 is the spindle without a tool, or the tool that is in it at the start
+    initial           axis letter -> start position, machine axes, mm or degree
+    references        "G28" | "G30" -> axis letter -> machine position
+    variables         "#100" or "#<name>" -> value
+    workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
+    tcp               X Y Z are tool-tip coordinates from the start of the program
+    assume_zero       what is not given is zero (named in warnings and in the stamp), else it is an error
+    block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
+    """
+
+    work_offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    tools: Mapping[int, Tool] = field(default_factory=dict)
+    initial: Mapping[str, float] = field(default_factory=dict)
+    references: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    variables: Mapping[str, float] = field(default_factory=dict)
+    workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tcp: bool = False
+    assume_zero: bool = False
+    block_skip: bool = False

@@ -1,0 +1,244 @@
+"""The lossless tree of an NC program: blocks as spans of the source, their words as shared templates.
+
+A program has many blocks and few *shapes*: a shape is the text of a block with its numbers replaced. One `Template`
+is kept per shape, made from the Lark tree of the first block that had it; a block is a reference to its template plus
+the places and values of its own numbers, held in arrays. The source bytes are kept as they came, so whatever is not
+edited goes out as it came in.
+
+Places inside a block are given by `Anchor`: so many bytes after the end of the block's number `slot`
+(slot -1: after the start of the block). They hold for every block of the shape, however long its numbers are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Place
+
+if TYPE_CHECKING:
+    from ncfix.program.dialect import Dialect
+
+
+class Anchor(NamedTuple):
+    """A place in every block of a shape: `offset` bytes after the end of number `slot` (-1: the block's start)."""
+
+    slot: int
+    offset: int
+
+
+class Span(NamedTuple):
+    """A stretch of a block, from `start` up to `stop`."""
+
+    start: Anchor
+    stop: Anchor
+
+
+# -- expressions ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A number written in the block: the value of number `slot` of the block."""
+
+    slot: int
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A numbered parameter, `#5`, `##5`, `#[1+2]`."""
+
+    index: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class NamedParameter:
+    """A named parameter, `#<depth>`, `#<_global>`; the name is lower case without blanks."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """`-x`, `+x`, or a function of one argument: `sin`, `cos`, `fix`, ... (lower case)."""
+
+    operator: str
+    operand: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """`left operator right`; the operator in lower case: `+ - * / ** mod and or xor eq ne gt ge lt le atan`."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Exists:
+    """`EXISTS[#<name>]`."""
+
+    name: str
+
+
+Expression = Literal | Parameter | NamedParameter | Unary | Binary | Exists
+
+
+# -- the items of a block ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only."""
+
+    address: str
+    value: Expression
+    span: Span
+    value_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """`#1=...`, `#<name>=...`: takes effect after the whole block."""
+
+    target: Parameter | NamedParameter
+    value: Expression
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """`( ... )`, `; ...` or another form of the dialect; delimiters included in the span."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Skip:
+    """Block skip `/` with its level (1 if none is written)."""
+
+    level: int
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """A flow-control line of RS274NGC: `o100 while [...]`, `o<name> call [..]`.
+
+    `label` is a number (slot or constant text), a name, or an expression; `keyword` is lower case.
+    """
+
+    label: str | Expression
+    keyword: str
+    arguments: tuple[Expression, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """The `%` that starts and ends a tape."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """Text that is understood to mean no motion and is passed through: program names, text after the end, ..."""
+
+    kind: str
+    span: Span
+
+
+Item = Word | Assignment | Comment | Skip | Flow | Tape | Opaque
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """What every block of one shape has in common."""
+
+    items: tuple[Item, ...]
+    n_numbers: int
+
+    @property
+    def words(self) -> tuple[Word, ...]:
+        """The words of the block in the order written."""
+        return tuple(item for item in self.items if isinstance(item, Word))
+
+
+# -- the program ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """An NC program, lossless. One row per block (a line of the source, or several where the dialect continues lines).
+
+    source        the bytes as read; `program.source` is the program
+    path          as the user wrote it, for messages
+    dialect       the dialect it was read with
+    templates     the shapes that occur
+    template      (n,) index into `templates`
+    blocks        (n, 2) start and stop byte of each block, line end not included
+    first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
+    number_spans  (m, 2) start and stop byte of each number in the source, sign included
+    numbers       (m,) their values as written (in the program's units)
+    """
+
+    source: bytes
+    path: str
+    dialect: Dialect
+    templates: tuple[Template, ...]
+    template: NDArray[np.int32]
+    blocks: NDArray[np.int64]
+    first_number: NDArray[np.int64]
+    number_spans: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.template)
+
+    def text_of(self, block: int) -> str:
+        """The text of a block, as Latin-1 (one character per byte)."""
+        start, stop = self.blocks[block]
+        return self.source[start:stop].decode("latin-1")
+
+    def items_of(self, block: int) -> tuple[Item, ...]:
+        """The items of a block."""
+        return self.templates[self.template[block]].items
+
+    def values_of(self, block: int) -> NDArray[np.float64]:
+        """The values of the block's numbers, by slot."""
+        return self.numbers[self.first_number[block] : self.first_number[block + 1]]
+
+    def position(self, block: int, anchor: Anchor) -> int:
+        """The byte of the source that an anchor of this block stands for."""
+        if anchor.slot < 0:
+            return int(self.blocks[block, 0]) + anchor.offset
+        return int(self.number_spans[self.first_number[block] + anchor.slot, 1]) + anchor.offset
+
+    def span(self, block: int, span: Span) -> tuple[int, int]:
+        """Start and stop byte of a span of this block."""
+        return self.position(block, span.start), self.position(block, span.stop)
+
+    def slice(self, block: int, span: Span) -> str:
+        """The text of a span of this block, as Latin-1."""
+        start, stop = self.span(block, span)
+        return self.source[start:stop].decode("latin-1")
+
+    def line(self, block: int) -> int:
+        """The line number (from 1) on which the block starts."""
+        return self.source.count(b"\n", 0, int(self.blocks[block, 0])) + 1
+
+    def place(self, block: int, span: Span | None = None) -> Place:
+        """Where a block, or a span of it, stands in the file: for messages."""
+        column = 0
+        if span is not None:
+            column = self.position(block, span.start) - int(self.blocks[block, 0]) + 1
+        return Place(self.path, self.line(block), column, self.text_of(block))
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(len(self)))
