@@ -11,6 +11,18 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 
+@dataclass(frozen=True, slots=True)
+class Code:
+    """What `ncfix explain` says about a message code: a title, what it means, and what to do about it.
+
+    Every floor lists its own in `codes.py` as `CODES: dict[str, Code]`.
+    """
+
+    title: str
+    text: str
+    hint: str = ""
+
+
 class ExitCode(IntEnum):
     """Exit codes of the command line; over many files the worst one counts."""
 
@@ -75,7 +87,7 @@ class Message:
 
 @dataclass(eq=False)
 class NcfixError(Exception):
-    """A failure with a remedy. `messages` holds one or more coded remarks; config errors are collected, not first-only."""
+    """A failure with a remedy. `messages` holds coded remarks: one, or all that were found in a config file."""
 
     messages: tuple[Message, ...]
     exit_code: ExitCode = field(default=ExitCode.USAGE, init=False)

@@ -1,0 +1,15 @@
+"""LinuxCNC (RS274NGC): the dialect `linuxcnc`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.hookspecs import Register, hookimpl
+
+if TYPE_CHECKING:
+    from ncfix.program.dialect import Dialect
+
+
+@hookimpl
+def register_dialects(register: Register[Dialect]) -> None:
+    """Bring the dialect `linuxcnc`."""

@@ -1,0 +1,77 @@
+"""The whole extension contract: what a plugin may add to ncfix.
+
+A plugin is a module (or object) that an entry point of the group `ncfix` names, with functions of these names marked
+`@ncfix.hookspecs.hookimpl`. Every hook gets a `register` function and calls it once for each thing that it brings:
+`register(thing)` files it under `thing.name`, `register(thing, name="...")` under that name. A name may be taken once.
+Hooks are called once, when ncfix first needs any plugin: they should be cheap, and import what is slow inside the
+things that they register. docs/plugins.md shows a plugin in 15 lines.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import pluggy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from concurrent.futures import Executor
+
+    import click
+
+    from ncfix.program.dialect import Dialect
+
+GROUP = "ncfix"
+"""The entry-point group, and the name of the pluggy project."""
+
+hookspec = pluggy.HookspecMarker(GROUP)
+hookimpl = pluggy.HookimplMarker(GROUP)
+
+Thing = TypeVar("Thing", contravariant=True)
+
+
+class Register(Protocol[Thing]):
+    """Files a thing under its name; raises `PluginError`: NCF503 if the name is taken, NCF505 without a name."""
+
+    def __call__(self, thing: Thing, name: str | None = None) -> None:
+        """File `thing` under `name`, or under `thing.name`."""
+
+
+@hookspec
+def register_dialects(register: Register[Dialect]) -> None:
+    """Controls' languages for `--dialect`: a `Dialect` names its grammar, its file suffixes and its limits."""
+
+
+@hookspec
+def register_bases(register: Register[Any]) -> None:
+    """Basis functions for `basis = "..."` of an effect in a machine file."""
+
+
+@hookspec
+def register_effects(register: Register[Any]) -> None:
+    """Named error effects beyond ISO 230-1 for `name = "..."` of an effect in a machine file, and for diagnosis."""
+
+
+@hookspec
+def register_readers(register: Register[Any]) -> None:
+    """Readers of measurement files: from an instrument's own format to rows of observations."""
+
+
+@hookspec
+def register_controls(register: Register[Any]) -> None:
+    """Controls with compensation tables of their own: writer, reader and emulation of the native files."""
+
+
+@hookspec
+def register_reporters(register: Register[Any]) -> None:
+    """Forms of a report, by file suffix."""
+
+
+@hookspec
+def register_commands(register: Register[click.Command]) -> None:
+    """Verbs of the command line; a built-in verb cannot be replaced."""
+
+
+@hookspec
+def register_executors(register: Register[Callable[[int], Executor]]) -> None:
+    """Where batches run: `factory(workers) -> concurrent.futures.Executor`; register it with a name."""

@@ -1,0 +1,234 @@
+"""Loading of plugins: one by one, whole or not at all.
+
+A plugin that cannot be imported, has a hook that ncfix does not know, raises while it registers, or takes a name that
+is taken, is left out with everything it had registered so far; a `PluginWarning` names it. With
+`NCFIX_STRICT_PLUGINS=1` it is an error instead. `NCFIX_DISABLE_PLUGINS=name,name` leaves plugins out unloaded, by
+entry point or distribution.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import lru_cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+import pluggy
+
+from ncfix import hookspecs
+from ncfix.diagnostics import Message, PluginError
+from ncfix.hookspecs import GROUP
+
+KINDS = tuple(sorted(name.removeprefix("register_") for name in vars(hookspecs) if name.startswith("register_")))
+"""What can be registered, one kind a hook: "dialects", "bases", ..."""
+
+Things = Mapping[str, Mapping[str, Any]]
+"""Kind -> name -> thing."""
+
+
+class PluginWarning(UserWarning):
+    """A plugin was left out, or something of it; `message` says which and why."""
+
+    def __init__(self, message: Message) -> None:
+        super().__init__(str(message))
+        self.message = message
+
+
+@dataclass(frozen=True, slots=True)
+class Plugin:
+    """A plugin that is in: its entry point's name, where it comes from, and what it registered."""
+
+    name: str
+    module: str
+    distribution: str = ""
+    version: str = ""
+    things: Things = field(default_factory=dict)
+
+    @property
+    def hooks(self) -> tuple[str, ...]:
+        """The hooks that it uses."""
+        return tuple(f"register_{kind}" for kind in self.things)
+
+
+@dataclass(frozen=True, slots=True)
+class Plugins:
+    """All plugins that are in, and why others are not."""
+
+    loaded: tuple[Plugin, ...]
+    problems: tuple[Message, ...]
+
+    def owner(self, kind: str, name: str) -> Plugin | None:
+        """The plugin that registered this name."""
+        return next((plugin for plugin in self.loaded if name in plugin.things.get(kind, ())), None)
+
+
+def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Name -> thing of one kind: the built-in ones first, then what the plugins registered.
+
+    A plugin's thing that bears the name of a built-in one is left out with a warning (an error in strict mode).
+    """
+    assert kind in KINDS, f"{kind!r} is none of {KINDS}"
+    things = dict(builtin or {})
+    for plugin in load_plugins().loaded:
+        for name, thing in plugin.things.get(kind, {}).items():
+            if name in things:
+                report(taken(plugin.name, kind, name, "ncfix itself"))
+            else:
+                things[name] = thing
+    return things
+
+
+@lru_cache(maxsize=1)
+def load_plugins() -> Plugins:
+    """Every plugin of the entry-point group, loaded once per process; `load_plugins.cache_clear()` forgets them."""
+    return collect(installed())
+
+
+def installed() -> list[EntryPoint]:
+    """The entry points of the group that are not disabled; those of ncfix first, then by distribution and name."""
+    disabled = {name.strip() for name in os.environ.get("NCFIX_DISABLE_PLUGINS", "").split(",")}
+    points = {(distribution(point), point.name): point for point in entry_points(group=GROUP)}
+    order = sorted(points, key=lambda key: (key[0] != "ncfix", key))
+    return [points[key] for key in order if disabled.isdisjoint(key)]
+
+
+def collect(points: Iterable[EntryPoint]) -> Plugins:
+    """Load these entry points in order, each whole or not at all."""
+    manager = pluggy.PluginManager(GROUP)
+    manager.add_hookspecs(hookspecs)
+    loaded: list[Plugin] = []
+    problems: list[Message] = []
+    for point in points:
+        try:
+            loaded.append(load_one(manager, point, loaded))
+        except PluginError as error:
+            problems.extend(error.messages)
+            for message in error.messages:
+                report(message)
+    return Plugins(tuple(loaded), tuple(problems))
+
+
+def load_one(manager: pluggy.PluginManager, point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
+    """Import one plugin and let it register everything; on any failure it leaves no trace in `manager`."""
+    module = import_plugin(point)
+    if manager.is_registered(module):
+        raise left_out("NCF503", point, "is the same module as an earlier plugin", "one entry point is enough")
+    try:
+        add_hooks(manager, point, module)
+        things = registrations(manager, point, module)
+        check_names(point, things, earlier)
+    except BaseException:
+        manager.unregister(module)
+        raise
+    version = point.dist.version if point.dist else ""
+    return Plugin(point.name, point.value, distribution(point), version, things)
+
+
+def import_plugin(point: EntryPoint) -> object:
+    """The module or object that the entry point names."""
+    try:
+        return point.load()
+    except (Exception, SystemExit) as error:
+        raise left_out(
+            "NCF501", point, f"cannot be imported: {describe(error)}", "reinstall or uninstall it"
+        ) from error
+
+
+def add_hooks(manager: pluggy.PluginManager, point: EntryPoint, module: object) -> None:
+    """Hand the plugin to pluggy; refuse hooks that ncfix does not have, and none at all."""
+    try:
+        manager.register(module, name=f"{distribution(point)}:{point.name}")
+        manager.check_pending()
+    except pluggy.PluginValidationError as error:
+        raise left_out("NCF502", point, describe(error), hook_hint(manager, module)) from error
+    used = {caller.name for caller in manager.get_hookcallers(module) or ()}
+    unmarked = sorted(name for name in map("register_{}".format, KINDS) if hasattr(module, name) and name not in used)
+    if unmarked or not used:
+        why = f"has {unmarked[0]} without @hookimpl" if unmarked else "has no hooks"
+        raise left_out("NCF506", point, why, "mark its functions with @ncfix.hookspecs.hookimpl")
+
+
+def hook_hint(manager: pluggy.PluginManager, module: object) -> str:
+    """What the author may have meant."""
+    unknown = [caller.name for caller in manager.get_hookcallers(module) or () if not caller.has_spec()]
+    close = [match for name in unknown for match in get_close_matches(name, map("register_{}".format, KINDS), 1)]
+    return f"did you mean {close[0]}?" if close else "docs/plugins.md lists the hooks and their arguments"
+
+
+def registrations(manager: pluggy.PluginManager, point: EntryPoint, module: object) -> Things:
+    """Call the hooks of this plugin only; what it registers, by kind."""
+    others = [plugin for plugin in manager.get_plugins() if plugin is not module]
+    things: dict[str, dict[str, Any]] = {}
+    for caller in manager.get_hookcallers(module) or []:
+        kind = caller.name.removeprefix("register_")
+        things[kind] = {}
+        hook = manager.subset_hook_caller(caller.name, others)
+        try:
+            hook(register=Registrar(point.name, kind, things[kind]))
+        except PluginError:
+            raise
+        except Exception as error:
+            raise left_out("NCF504", point, f"{caller.name} failed: {describe(error)}", "see its author") from error
+    return things
+
+
+def check_names(point: EntryPoint, things: Things, earlier: Iterable[Plugin]) -> None:
+    """Refuse a plugin that takes a name that an earlier one has."""
+    for plugin in earlier:
+        for kind, named in things.items():
+            for name in named:
+                if name in plugin.things.get(kind, ()):
+                    raise PluginError((taken(point.name, kind, name, f"plugin {plugin.name!r}"),))
+
+
+@dataclass(frozen=True, slots=True)
+class Registrar:
+    """The `register` function of one hook of one plugin."""
+
+    plugin: str
+    kind: str
+    things: dict[str, Any]
+
+    def __call__(self, thing: Any, name: str | None = None) -> None:
+        """File `thing` under `name` or its own name."""
+        key = name if name is not None else getattr(thing, "name", None)
+        if not isinstance(key, str) or not key:
+            text = f"plugin {self.plugin!r} left out: it registers {thing!r} of {self.kind} without a name"
+            raise PluginError((Message("NCF505", text, hint="register(thing, name=...)"),))
+        if key in self.things:
+            raise PluginError((taken(self.plugin, self.kind, key, "itself"),))
+        self.things[key] = thing
+
+
+def report(message: Message) -> None:
+    """Warn of a plugin that is left out; raise in strict mode."""
+    if os.environ.get("NCFIX_STRICT_PLUGINS", "") not in ("", "0"):
+        raise PluginError((message,))
+    warnings.warn(PluginWarning(message), stacklevel=2)
+
+
+def left_out(code: str, point: EntryPoint, why: str, hint: str) -> PluginError:
+    """The error that says that this plugin is not in, and why."""
+    source = f" of {distribution(point)}" if distribution(point) else ""
+    return PluginError((Message(code, f"plugin {point.name!r}{source} left out: it {why}", hint=hint),))
+
+
+def taken(plugin: str, kind: str, name: str, owner: str) -> Message:
+    """Remark on a name that is taken."""
+    text = f"plugin {plugin!r} left out: it registers {name!r} of {kind}, which {owner} has registered"
+    return Message("NCF503", text, hint="NCFIX_DISABLE_PLUGINS leaves one of them out")
+
+
+def distribution(point: EntryPoint) -> str:
+    """The name of the distribution that an entry point belongs to, empty for none."""
+    return point.dist.name if point.dist else ""
+
+
+def describe(error: BaseException) -> str:
+    """An exception in one line."""
+    lines = str(error).splitlines()
+    return f"{type(error).__name__}: {lines[0]}" if lines else type(error).__name__

@@ -1,0 +1,41 @@
+"""Fixtures for all floors: the shared data beside the project, and whether what is missing may be skipped."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The project's root: where pyproject.toml is."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def shared() -> Callable[[str], Path]:
+    """`shared("corpus")`: that folder of the shared data, beside the project root or where `NCFIX_SHARED` says.
+
+    Where it is missing the test is skipped, or fails if `NCFIX_REQUIRE_SHARED=1`.
+    """
+    base = Path(os.environ.get("NCFIX_SHARED") or ROOT.parent / "shared")
+
+    def find(subdir: str) -> Path:
+        folder = base / subdir
+        if not folder.exists():
+            missing(f"shared data {folder} is not here (NCFIX_SHARED says where)", "NCFIX_REQUIRE_SHARED")
+        return folder
+
+    return find
+
+
+def missing(reason: str, variable: str) -> None:
+    """Skip the test for want of something, or fail if the environment variable says that it must be here."""
+    if os.environ.get(variable, "") not in ("", "0"):
+        pytest.fail(reason)
+    pytest.skip(reason)
