@@ -81,6 +81,7 @@ class Moves:
     arc_absolute (n,) the centre of an arc is given absolutely (G90.1)
     tcp          (n,) X Y Z are tool-tip coordinates in the workpiece
     compensated  (n,) cutter radius compensation is active (G41/G42): the control offsets the contour
+    tool         (n,) number of the tool whose length that is: of the active length offset, else in the spindle
     tool_length  (n,) mm, spindle reference to tip; NaN where not known
     feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`; NaN where none is set, in mm
     feed_mode    (n,) `FeedMode`
@@ -106,6 +107,7 @@ class Moves:
     arc_absolute: NDArray[np.bool_]
     tcp: NDArray[np.bool_]
     compensated: NDArray[np.bool_]
+    tool: NDArray[np.int32]
     tool_length: NDArray[np.float64]
     feed: NDArray[np.float64]
     feed_mode: NDArray[np.int8]

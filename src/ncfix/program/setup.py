@@ -19,7 +19,7 @@ class Setup:
     """What is on the machine when the program starts. Angles here are in degrees, as on the control.
 
     work_offsets      "G54" -> values for the axes in the order X Y Z A B C, or by axis letter
-    tools             tool number -> `Tool`; tool 0 is the spindle without a tool, or the tool that is in it at the start
+    tools             tool number -> `Tool`; tool 0 is what is in the spindle when the program starts
     initial           axis letter -> start position, machine axes, mm or degree
     references        "G28" | "G30" -> axis letter -> machine position
     variables         "#100" or "#<name>" -> value

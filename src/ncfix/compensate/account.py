@@ -1,0 +1,107 @@
+"""The account of a correction: every motion block ends in exactly one of compensated, passed, refused."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Message
+from ncfix.program.moves import Kind, Moves, Rule
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A motion block that was left as it was although it is not right, and why."""
+
+    line: int
+    code: str
+    reason: str
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data, for `--json`."""
+        return {"line": self.line, "code": self.code, "reason": self.reason}
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Motion blocks by what became of them: block -> reason (empty for compensated ones)."""
+
+    compensated: frozenset[int]
+    passed: Mapping[int, str]
+    refused: Mapping[int, str]
+
+    @classmethod
+    def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, str]) -> Account:
+        """Account for the motions; `reasons` (block -> reason) explains blocks kept beyond the tracer's own rules.
+
+        A block of several motions counts as refused if any of them is, else as compensated if any of them is.
+        """
+        motion = moves.kind != Kind.DWELL
+        refused: dict[int, str] = {}
+        passed: dict[int, str] = {}
+        for row in np.flatnonzero(motion & kept):
+            block = int(moves.block[row])
+            reason = moves.reasons[moves.reason[row]]
+            if moves.rule[row] == Rule.PASS:
+                passed.setdefault(block, reason)
+            else:
+                refused.setdefault(block, reasons.get(block, reason))
+        compensated = frozenset(moves.block[motion & ~kept].tolist()) - refused.keys()
+        passed = {block: reason for block, reason in passed.items() if block not in refused}
+        return cls(compensated - passed.keys(), passed, refused)
+
+    @property
+    def total(self) -> int:
+        """Motion blocks in all."""
+        return len(self.compensated) + len(self.passed) + len(self.refused)
+
+    def reasons(self) -> Counter[str]:
+        """How often each reason of refusal occurs, in blocks."""
+        return Counter(self.refused.values())
+
+
+@dataclass(frozen=True, slots=True)
+class FixReport:
+    """What was done to one program, as figures.
+
+    error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
+    """
+
+    path: str
+    blocks: int
+    moves: int
+    compensated: int
+    passed: int
+    changed: bool
+    inserted_blocks: int = 0
+    max_correction_um: float = 0.0
+    error_before_um: Mapping[str, float | int | None] = field(default_factory=dict)
+    error_after_um: Mapping[str, float | int | None] = field(default_factory=dict)
+    refused: tuple[Refusal, ...] = ()
+    warnings: tuple[Message, ...] = ()
+    strategy: str = ""
+    leaves: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """The per-file object of `fix --json`."""
+        return {
+            "path": self.path,
+            "output": None,
+            "changed": self.changed,
+            "blocks": self.blocks,
+            "moves": self.moves,
+            "compensated": self.compensated,
+            "passed": self.passed,
+            "inserted_blocks": self.inserted_blocks,
+            "max_correction_um": self.max_correction_um,
+            "error_before_um": dict(self.error_before_um),
+            "error_after_um": dict(self.error_after_um),
+            "strategy": self.strategy,
+            "leaves": self.leaves,
+            "refused": [refusal.as_dict() for refusal in self.refused],
+            "warnings": [warning.as_dict() for warning in self.warnings],
+        }

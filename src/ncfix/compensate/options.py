@@ -1,0 +1,30 @@
+"""What the user may choose about a correction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class FixOptions:
+    """Options of `fix`.
+
+    strategy       name of the strategy (`ncfix.compensate.strategies`)
+    tolerance_um   how far the tool tip may leave the intended path, along the whole path
+    allow_refused  write the program even if motions had to be left uncorrected
+    force          correct a program that carries a stamp
+    split_rapids   hold the tolerance along rapids too, not only at their ends
+    verify         simulate the written program along the whole path (before and after figures)
+    """
+
+    strategy: str = "rotary-then-linear"
+    tolerance_um: float = 1.0
+    allow_refused: bool = False
+    force: bool = False
+    split_rapids: bool = False
+    verify: bool = True
+
+    @property
+    def tolerance_mm(self) -> float:
+        """The tolerance in the internal unit."""
+        return self.tolerance_um * 1e-3

@@ -1,0 +1,266 @@
+"""Corrected motions back into the text of the program: which bytes change, and what the control will understand.
+
+The emitter walks the motions in the order of execution and keeps the book that the control keeps: where it stands
+(as emitted, digits and all) and which motion code is in force. A block that is executed several times must come out
+the same each time; where it does not, the block is reported as a conflict, and the caller keeps it as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.frames import FrameMap
+from ncfix.program.layout import Layout, has_free_text, layout_of
+from ncfix.program.moves import FeedMode, Kind, Moves, Rule
+from ncfix.program.number_style import decimals_for
+from ncfix.program.pieces import Pieces
+from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.tree import Program
+from ncfix.program.writer import Edit
+
+FloatArray = NDArray[np.float64]
+
+SEVERAL_STATES = "the block is executed from several states that need different corrections"
+PINNED = "a refused block that follows starts from its end"
+FLOW = "the block is more than words"
+MODE_LOST = "a kept block that follows relies on its motion code"
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What was written.
+
+    edits      replacements and insertions in the source, sorted
+    end        (m, n_axes) the command at the end of each piece as the control will understand it
+    centre     (m, 3) the centre of arc pieces likewise
+    start      (n, n_axes) the command at the start of each motion likewise
+    conflicts  block -> why it cannot be written; the text is not to be used while there are any
+    added_blocks  lines added
+    """
+
+    edits: tuple[Edit, ...]
+    end: FloatArray
+    centre: FloatArray
+    start: FloatArray
+    conflicts: dict[int, str]
+    added_blocks: int
+
+
+def emit(program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray) -> Emission:
+    """Write `pieces` into the program. `least_increment` (n_axes,) mm and rad: what the control can resolve."""
+    return _Emitter(program, moves, pieces, least_increment).run()
+
+
+class _Emitter:
+    """The walk over the motions; `run()` is called once."""
+
+    def __init__(self, program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray) -> None:
+        self.program = program
+        self.moves = moves
+        self.pieces = pieces
+        self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
+        self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
+        self.first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
+        self.jumps = _jumps(moves)
+        x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
+        self.spatial = (x, y, z)
+        self.eol = _line_end(program.source)
+        self.layouts: dict[int, Layout | None] = {}
+        self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
+        self.modal = -1
+        self.modal_block = -1
+        self.written: dict[int, Rendered] = {}
+        self.conflicts: dict[int, str] = {}
+        self.end = pieces.end.copy()
+        self.centre = pieces.centre.copy()
+        self.start = moves.start.copy()
+
+    def run(self) -> Emission:
+        """Walk all motions."""
+        for row in range(len(self.moves)):
+            self._resync(row)
+            self.start[row] = self.position
+            if self.pieces.kept[self.first_piece[row]]:
+                self._keep(row)
+            else:
+                self._write(row)
+            if self.moves.kind[row] == Kind.CYCLE:
+                self._retract(row)
+        edits, added = self._edits()
+        return Emission(edits, self.end, self.centre, self.start, self.conflicts, added)
+
+    # -- the control's book -------------------------------------------------------------------------------------------
+
+    def _resync(self, row: int) -> None:
+        """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
+        jump = self.jumps[row]
+        if jump.any():
+            self.position[jump] = self.moves.start[row][jump]
+
+    def _retract(self, row: int) -> None:
+        """After a canned cycle the control stands where it started along the axes along which it went back."""
+        if row + 1 == len(self.moves):
+            return
+        moves = self.moves
+        back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
+        self.position = np.where(back, self.start[row], self.position)
+        self.jumps[row + 1] &= ~back
+
+    def _keep(self, row: int) -> None:
+        moves = self.moves
+        moved = moves.programmed[row] | (moves.end[row] != moves.start[row])
+        increment = moves.end[row] - moves.start[row]
+        target = self.position + increment if moves.incremental[row] else moves.end[row]
+        self.position = np.where(moved, target, self.position)
+        self.end[self.first_piece[row]] = self.position
+        if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
+            return
+        self._check_code(row)
+        self._set_modal(row, int(moves.modal[row]))
+
+    def _check_code(self, row: int) -> None:
+        block = int(self.moves.block[row])
+        layout = self._layout(block)
+        lost = self.modal not in (-1, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
+        if lost and self.modal_block not in self.conflicts:
+            self.conflicts[self.modal_block] = MODE_LOST
+
+    def _set_modal(self, row: int, code: int) -> None:
+        if code != self.modal:
+            self.modal_block = int(self.moves.block[row])
+        self.modal = code
+
+    # -- writing a motion ---------------------------------------------------------------------------------------------
+
+    def _write(self, row: int) -> None:
+        block = int(self.moves.block[row])
+        layout = self._layout(block)
+        if layout is None:
+            self.conflicts.setdefault(block, FLOW)
+            self._keep(row)
+            return
+        rows = slice(self.first_piece[row], self.first_piece[row + 1])
+        target = self._target(row, rows)
+        rendered = BlockRenderer(self.program, block, layout, target).render()
+        frame = self.frames[self.moves.frame[row]]
+        self.end[rows] = frame.command(np.array(rendered.ends))
+        if rendered.centre is not None:
+            self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
+        self.position = self._stay_where_unmoved(self.end[rows.stop - 1], np.array(rendered.ends)[-1], target)
+        self.end[rows.stop - 1] = self.position
+        self._set_modal(row, target.code)
+        earlier = self.written.setdefault(block, rendered)
+        if earlier is not rendered and earlier.text != rendered.text:
+            self.conflicts.setdefault(block, SEVERAL_STATES)
+
+    def _stay_where_unmoved(self, command: FloatArray, program: FloatArray, target: Target) -> FloatArray:
+        """An axis that was not told to move stands exactly where it stood, free of the rounding of the frame maps."""
+        return np.where(program == target.start, self.position, command)
+
+    def _target(self, row: int, rows: slice) -> Target:
+        moves, pieces = self.moves, self.pieces
+        frame = self.frames[moves.frame[row]]
+        start = frame.program(self.position.copy())
+        nominal_start = frame.program(moves.start[row].copy())
+        nominal = frame.program(moves.end[row].copy())
+        arc = bool(pieces.arc[rows.start])
+        is_cycle = moves.kind[row] == Kind.CYCLE
+        modal = int(moves.modal[row])
+        straight = modal if modal in (0, 10) or is_cycle else 10
+        fractions = pieces.fraction[rows]
+        return Target(
+            letters=moves.axes,
+            decimals=self.decimals[moves.frame[row]],
+            start=start,
+            nominal=nominal,
+            original=nominal - nominal_start if moves.incremental[row] else nominal,
+            ends=frame.program(pieces.end[rows].copy()),
+            arc=arc,
+            centre=frame.program_point(pieces.centre[rows.start], moves.axes),
+            original_centre=frame.program_point(moves.centre[row], moves.axes),
+            origin=_spatial(frame.program(moves.start[row].copy()), moves.axes, frame),
+            plane=_plane(frame.frame.rotation.T @ moves.normal[row]) if moves.kind[row] == Kind.ARC else (0, 1, 2),
+            spatial=self.spatial,
+            diameter=frame.frame.diameter,
+            incremental=bool(moves.incremental[row]),
+            centre_absolute=bool(moves.arc_absolute[row]),
+            shares=np.diff(fractions, prepend=0.0),
+            inverse_time=moves.feed_mode[row] == FeedMode.INVERSE_TIME and modal != 0,
+            code=modal if arc else straight,
+            active_code=modal if self.modal == -1 else self.modal,
+        )
+
+    def _layout(self, block: int) -> Layout | None:
+        if block not in self.layouts:
+            writable = not has_free_text(self.program, block)
+            self.layouts[block] = layout_of(self.program, block) if writable else None
+        return self.layouts[block]
+
+    # -- the result ---------------------------------------------------------------------------------------------------
+
+    def _edits(self) -> tuple[tuple[Edit, ...], int]:
+        edits: list[Edit] = []
+        added = 0
+        for block, rendered in sorted(self.written.items()):
+            edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
+            if rendered.lines:
+                at = int(self.program.blocks[block, 1])
+                text = "".join(self.eol + line for line in rendered.lines)
+                edits.append(Edit(at, at, text.encode("latin-1")))
+                added += len(rendered.lines)
+        return tuple(edits), added
+
+
+def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> FloatArray:
+    """X Y Z of a start position in the numbers in which centres are given (no diameters)."""
+    values = np.array([program[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
+    if frame.frame.diameter:
+        values[0] /= 2
+    return values
+
+
+def _plane(normal: FloatArray) -> tuple[int, int, int]:
+    """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
+    across = int(np.argmax(np.abs(normal)))
+    return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
+
+
+def _decimals(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
+    return np.array([decimals_for(step) for step in least_increment / frame.scale], dtype=np.int64)
+
+
+def _jumps(moves: Moves) -> NDArray[np.bool_]:
+    """(n, n_axes) where a motion does not start where the one before ended."""
+    jumps = np.zeros(moves.start.shape, dtype=bool)
+    jumps[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
+    return jumps
+
+
+def _line_end(source: bytes) -> str:
+    """The line end that the file uses first."""
+    at = source.find(b"\n")
+    return "\r\n" if at > 0 and source[at - 1 : at] == b"\r" else "\n"
+
+
+def closure_of_refusals(moves: Moves, kept: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Sequence[int]]:
+    """Extend `kept` (n,) so that motions that are left as they were also begin where they began.
+
+    A refused arc, increment or cycle means another path when it starts elsewhere: the motion before it is kept too,
+    and so on back to a motion that names all its targets. Returns the extended mask and the rows added.
+    """
+    kept = kept.copy()
+    added: list[int] = []
+    starts_matter = moves.incremental | (moves.kind == Kind.ARC) | (moves.kind == Kind.CYCLE)
+    pinned = False
+    for row in range(len(moves) - 1, -1, -1):
+        passed = moves.rule[row] == Rule.PASS
+        if pinned and not passed and not kept[row]:
+            kept[row] = True
+            added.append(row)
+        if not passed:
+            pinned = bool(kept[row] and (starts_matter[row] or (pinned and not moves.programmed[row].all())))
+    return kept, added

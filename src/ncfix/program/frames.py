@@ -1,0 +1,49 @@
+"""Between commands (mm, rad, offsets included) and the numbers a program writes (its units, its frame, degrees)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.moves import Frame
+
+FloatArray = NDArray[np.float64]
+
+
+class FrameMap:
+    """One frame of a program for a given set of axes, with the maps both ways. Positions have shape (..., n_axes)."""
+
+    def __init__(self, frame: Frame, axes: tuple[str, ...], rotary: NDArray[np.bool_]) -> None:
+        self.frame = frame
+        self.scale = np.where(rotary, np.pi / 180, frame.unit)
+        if frame.diameter and "X" in axes:
+            self.scale[axes.index("X")] /= 2
+        self.spatial = [axes.index(letter) for letter in "XYZ" if letter in axes]
+        keep = ["XYZ".index(letter) for letter in "XYZ" if letter in axes]
+        self.rotation = frame.rotation[np.ix_(keep, keep)]
+        self.rotated = not np.array_equal(frame.rotation, np.eye(3))
+        self.unit = frame.unit
+
+    def program(self, command: FloatArray) -> FloatArray:
+        """Program numbers of a command."""
+        values = command - self.frame.offset
+        if self.rotated:
+            values[..., self.spatial] = values[..., self.spatial] @ self.rotation
+        return values / self.scale
+
+    def command(self, program: FloatArray) -> FloatArray:
+        """Command of program numbers."""
+        values = program * self.scale
+        if self.rotated:
+            values[..., self.spatial] = values[..., self.spatial] @ self.rotation.T
+        return values + self.frame.offset
+
+    def program_point(self, point: FloatArray, axes: tuple[str, ...]) -> FloatArray:
+        """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
+        offset = np.array([self.frame.offset[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
+        return np.asarray((point - offset) @ self.frame.rotation / self.unit)
+
+    def command_point(self, point: FloatArray, axes: tuple[str, ...]) -> FloatArray:
+        """The inverse of `program_point`."""
+        offset = np.array([self.frame.offset[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
+        return np.asarray((point * self.unit) @ self.frame.rotation.T + offset)

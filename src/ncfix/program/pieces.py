@@ -1,0 +1,33 @@
+"""Corrected motions as columns: what shall be commanded instead, one row per block piece to be written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The corrected path, struct of arrays; m rows in order, at least one per motion.
+
+    A motion that need not be split has one row; a motion that is kept as it was has one row with its original end.
+
+    move      (m,) index of the motion in `Moves`
+    fraction  (m,) where on the original motion the piece ends, in (0, 1]; the last piece of a motion has 1
+    end       (m, n_axes) the command at the end of the piece, mm and rad, before rounding to the control's digits
+    arc       (m,) the piece is an arc (its motion is an arc and stays one), else straight
+    centre    (m, 3) centre of an arc piece in command coordinates, mm, NaN elsewhere
+    kept      (m,) the motion is left as it was
+    """
+
+    move: NDArray[np.int64]
+    fraction: NDArray[np.float64]
+    end: NDArray[np.float64]
+    arc: NDArray[np.bool_]
+    centre: NDArray[np.float64]
+    kept: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.move)

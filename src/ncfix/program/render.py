@@ -1,0 +1,285 @@
+"""The text of one corrected motion: edits of its own block, and the lines of the pieces that follow it.
+
+Everything here is in the numbers of the program: its units, its frame, degrees, diameters. A word is rewritten only
+when its value moves by half an output step; a missing word is added only when its axis must stand elsewhere by as
+much. What is returned as emitted is what the control will understand, digits and all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.layout import CENTRE_LETTERS, Layout
+from ncfix.program.number_style import NumberStyle
+from ncfix.program.tree import Literal, Program, Word
+
+FloatArray = NDArray[np.float64]
+#: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
+FEED_DECIMALS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What one motion shall become, in program numbers.
+
+    letters      axis letters of the columns
+    decimals     (n_axes,) digits after the point that the least increment needs
+    start        (n_axes,) where the control stands, as emitted so far (NaN unknown)
+    nominal      (n_axes,) where the motion ended as programmed
+    original     (n_axes,) value of each programmed word: target or increment
+    ends         (k, n_axes) where its pieces shall end
+    arc          the motion stays an arc (then k = 1)
+    centre       (3,) of that arc, and
+    original_centre (3,) the centre as programmed, absolute
+    origin       (3,) the start of the motion as programmed: what incremental centres were meant from
+    plane        the arc's two axes in its plane and the one across it, as indices of X Y Z
+    spatial      columns of X Y Z (-1: not an axis of the machine)
+    diameter     X is a diameter; centres and radii are not
+    incremental, centre_absolute   how words are meant
+    shares       (k,) fraction of the block's time in each piece, for G93
+    inverse_time the block's F is the time of the block
+    code         motion code the pieces need, tenths
+    active_code  motion code in force before the block, as emitted
+    """
+
+    letters: tuple[str, ...]
+    decimals: NDArray[np.int64]
+    start: FloatArray
+    nominal: FloatArray
+    original: FloatArray
+    ends: FloatArray
+    arc: bool
+    centre: FloatArray
+    original_centre: FloatArray
+    origin: FloatArray
+    plane: tuple[int, int, int]
+    spatial: tuple[int, int, int]
+    diameter: bool
+    incremental: bool
+    centre_absolute: bool
+    shares: FloatArray
+    inverse_time: bool
+    code: int
+    active_code: int
+
+
+@dataclass(slots=True)
+class Rendered:
+    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to."""
+
+    edits: list[tuple[int, int, str]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    ends: list[FloatArray] = field(default_factory=list)
+    centre: FloatArray | None = None
+
+    @property
+    def text(self) -> tuple[object, ...]:
+        """What the control reads; two executions of a block agree when this is equal."""
+        return (tuple(self.edits), tuple(self.lines))
+
+
+class BlockRenderer:
+    """Renders one motion of one block. A short-lived worker: `render()` is called once."""
+
+    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
+        self.program = program
+        self.block = block
+        self.layout = layout
+        self.target = target
+        self.out = Rendered()
+        self.added: list[str] = []
+        self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
+
+    def render(self) -> Rendered:
+        """Write the motion."""
+        target = self.target
+        position = self._first_piece(target.start.copy(), target.ends[0])
+        self.out.ends.append(position)
+        for piece in range(1, len(target.ends)):
+            position = self._further_piece(position, piece)
+            self.out.ends.append(position)
+        self._move_late_words()
+        if self.added:
+            at = self.program.position(self.block, self.layout.words_at)
+            self.out.edits.append((at, at, "".join(self.added)))
+        self.out.edits.sort(key=lambda edit: edit[:2])
+        return self.out
+
+    # -- the block itself ---------------------------------------------------------------------------------------------
+
+    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+        self._motion_code()
+        base = position.copy()
+        for column, letter in enumerate(self.target.letters):
+            word = self.layout.axes.get(letter)
+            if word is None:
+                self._absent_axis(position, column, end[column])
+            else:
+                self._present_axis(position, column, end[column], word)
+        self._arc_words(base, position)
+        if self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
+            self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
+        return position
+
+    def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
+        base = position[column] if self.target.incremental else 0.0
+        original = self._value(word, self.target.original[column])
+        value = end - base
+        whole = len(self.target.ends) == 1
+        if np.isfinite(value) and (not whole or abs(value - original) >= self.half[column]):
+            original = self._rewrite(word, value, int(self.target.decimals[column]))
+        position[column] = base + original
+
+    def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
+        if not np.isfinite(end) or abs(end - position[column]) < self.half[column]:
+            return
+        base = position[column] if self.target.incremental else 0.0
+        text = f"{end - base:.{self.target.decimals[column]}f}"
+        self._add(self.target.letters[column], text)
+        position[column] = base + float(text)
+
+    def _motion_code(self) -> None:
+        wanted, word = self.target.code, self.layout.motion
+        if word is not None:
+            written = self.program.values_of(self.block)[self._slot(word)]
+            if round(written * 10) != wanted:
+                self._rewrite(word, wanted / 10, 0)
+        elif wanted != self.target.active_code:
+            at = self.program.position(self.block, self.layout.code_at)
+            self.out.edits.append((at, at, self._cased("G") + f"{wanted // 10}" + self.layout.blank))
+
+    # -- arcs ---------------------------------------------------------------------------------------------------------
+
+    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+        if self.target.arc:
+            self._kept_arc(start, end)
+            return
+        if np.isfinite(self.target.original_centre).any():
+            for word in (*self.layout.centre.values(), self.layout.radius, self.layout.turns):
+                if word is not None:
+                    self._remove(word)
+
+    def _kept_arc(self, start: FloatArray, end: FloatArray) -> None:
+        """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""
+        target = self.target
+        centre = target.centre.copy()
+        word = self.layout.radius
+        if word is not None:
+            if self._keep_radius(word, start, end):
+                self.out.centre = centre
+                return
+            self._remove(word)
+        base = np.zeros(3) if target.centre_absolute else self._xyz(start)
+        for index in target.plane[:2]:
+            centre[index] = self._centre_word(index, float(base[index]), word is None)
+        self.out.centre = centre
+
+    def _centre_word(self, index: int, base: float, had_centre: bool) -> float:
+        target = self.target
+        column = target.spatial[index]
+        original_base = 0.0 if target.centre_absolute else target.origin[index]
+        value = target.centre[index] - base
+        original = target.original_centre[index] - original_base
+        word = self.layout.centre.get(CENTRE_LETTERS[index])
+        if word is not None:
+            original = self._value(word, original)
+            if abs(value - original) >= self.half[column]:
+                original = self._rewrite(word, value, int(target.decimals[column]))
+        elif abs(value - (original if had_centre else 0.0)) >= self.half[column]:
+            text = f"{value:.{target.decimals[column]}f}"
+            self._add(CENTRE_LETTERS[index], text)
+            original = float(text)
+        elif not had_centre:
+            original = 0.0
+        return float(base + original)
+
+    def _keep_radius(self, word: Word, start: FloatArray, end: FloatArray) -> bool:
+        """Whether the radius as written still puts the centre within an output step of where it belongs."""
+        plane = list(self.target.plane[:2])
+        radius = abs(self._value(word, np.nan))
+        begin, finish, wanted = self._xyz(start)[plane], self._xyz(end)[plane], self.target.centre[plane]
+        chord = finish - begin
+        half_chord = float(np.hypot(*chord)) / 2
+        if not radius > half_chord > 0:
+            return False
+        rise = np.sqrt(radius**2 - half_chord**2) * np.array([-chord[1], chord[0]]) / (2 * half_chord)
+        middle = (begin + finish) / 2
+        distance = min(float(np.hypot(*(middle + side * rise - wanted))) for side in (1, -1))
+        return bool(distance <= 2 * self.half[self.target.spatial[plane[0]]])
+
+    def _xyz(self, position: FloatArray) -> FloatArray:
+        """X Y Z of a position in the numbers in which centres are meant."""
+        values = np.array([position[column] if column >= 0 else 0.0 for column in self.target.spatial])
+        if self.target.diameter:
+            values[0] /= 2
+        return values
+
+    # -- further pieces -----------------------------------------------------------------------------------------------
+
+    def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
+        target = self.target
+        end = target.ends[piece]
+        position = position.copy()
+        words = []
+        for column, letter in enumerate(target.letters):
+            if not abs(end[column] - position[column]) >= self.half[column]:
+                continue
+            base = position[column] if target.incremental else 0.0
+            text = f"{end[column] - base:.{target.decimals[column]}f}"
+            words.append(self._cased(letter) + text)
+            position[column] = base + float(text)
+        if target.inverse_time:
+            words.append(self._cased("F") + f"{self._feed_share(piece):.{FEED_DECIMALS}f}")
+        prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
+        self.out.lines.append(prefix + (self.layout.blank).join(words))
+        return position
+
+    def _feed_share(self, piece: int) -> float:
+        assert self.layout.feed is not None
+        return self._value(self.layout.feed, np.nan) / float(self.target.shares[piece])
+
+    def _move_late_words(self) -> None:
+        """M0, M1, M2, M30 and their like act after the motion: with several pieces they go to the last."""
+        if not self.out.lines:
+            return
+        for word in self.layout.after:
+            text = self.program.slice(self.block, word.span)
+            self._remove(word)
+            self.out.lines[-1] += self.layout.blank + text
+
+    # -- words --------------------------------------------------------------------------------------------------------
+
+    def _slot(self, word: Word) -> int:
+        assert isinstance(word.value, Literal)
+        return word.value.slot
+
+    def _value(self, word: Word, otherwise: float) -> float:
+        if isinstance(word.value, Literal):
+            return float(self.program.values_of(self.block)[word.value.slot])
+        return otherwise
+
+    def _rewrite(self, word: Word, value: float, decimals: int) -> float:
+        """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
+        start, stop = self.program.span(self.block, word.value_span)
+        literal = isinstance(word.value, Literal)
+        style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
+        text = style.write(value, decimals)
+        self.out.edits.append((start, stop, text))
+        return float(text)
+
+    def _remove(self, word: Word) -> None:
+        start, stop = self.program.span(self.block, word.span)
+        if self.program.source[start - 1 : start] in (b" ", b"\t") and start > self.program.blocks[self.block, 0]:
+            start -= 1
+        self.out.edits.append((start, stop, ""))
+
+    def _add(self, letter: str, text: str) -> None:
+        self.added.append(self.layout.blank + self._cased(letter) + text)
+
+    def _cased(self, letter: str) -> str:
+        """The letter in the case in which the block writes its addresses."""
+        at = self.program.position(self.block, self.layout.code_at)
+        return letter.lower() if self.program.source[at : at + 1].islower() else letter

@@ -1,0 +1,55 @@
+"""The mark that a corrected program carries, so that it is not corrected twice."""
+
+from __future__ import annotations
+
+import re
+
+from ncfix.program.tree import Comment, Flow, Opaque, Program, Tape, Word
+from ncfix.program.writer import Edit
+
+#: How every stamp begins; what follows it is for people.
+SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
+
+
+def find(program: Program) -> int | None:
+    """The block that carries a stamp, or None."""
+    if b"ncfix" not in program.source.lower():
+        return None
+    for block in program:
+        for item in program.items_of(block):
+            if isinstance(item, (Comment, Opaque)) and SIGN.search(program.slice(block, item.span)):
+                return block
+    return None
+
+
+def insertion(program: Program, text: str) -> Edit:
+    """The edit that puts the stamp where the dialect allows: after `%` and the program's number, before all else."""
+    comment = program.dialect.comment.format(text.replace("(", "[").replace(")", "]"))
+    before = 0
+    for block in program:
+        if not _is_head(program, block):
+            break
+        before = block + 1
+    eol = b"\r\n" if b"\r\n" in program.source else b"\n"
+    line = comment.encode("latin-1", "replace")
+    if before == 0:
+        start = int(program.blocks[0, 0])
+        return Edit(start, start, line + eol)
+    at = int(program.blocks[before - 1, 1])
+    return Edit(at, at, eol + line)
+
+
+def _is_head(program: Program, block: int) -> bool:
+    """A tape mark, program number or program name: what must stay in front."""
+    items = program.items_of(block)
+    if not items or any(isinstance(item, Flow) for item in items):
+        return False
+    head = all(
+        isinstance(item, (Tape, Comment)) or (isinstance(item, Opaque) and "program" in item.kind) or _is_number(item)
+        for item in items
+    )
+    return head and not all(isinstance(item, Comment) for item in items)
+
+
+def _is_number(item: object) -> bool:
+    return isinstance(item, Word) and item.address == "O"
