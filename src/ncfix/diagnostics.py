@@ -7,8 +7,9 @@ stays an ordinary exception, and the command line reports it as a fault of ncfix
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar, Self
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,10 @@ class Code:
     title: str
     text: str
     hint: str = ""
+
+
+EXCERPT = 100
+"""Characters of a source line that a message shows."""
 
 
 class ExitCode(IntEnum):
@@ -65,9 +70,7 @@ class Message:
         head = f"{self.place}: " if self.place else ""
         lines = [f"{head}{self.code}: {self.text}"]
         if self.place and self.place.text:
-            lines.append(f"    {self.place.text}")
-            if self.place.column:
-                lines.append("    " + " " * (self.place.column - 1) + "^")
+            lines += [f"    {line}" for line in _excerpt(self.place.text, self.place.column)]
         if self.hint:
             lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
@@ -85,12 +88,21 @@ class Message:
         }
 
 
+def _excerpt(text: str, column: int) -> list[str]:
+    """The part of a source line round a column (from 1, 0 for none), safe for a terminal, and a caret below it."""
+    start = max(0, column - EXCERPT // 2) if len(text) > EXCERPT else 0
+    part = text[start : start + EXCERPT]
+    head, tail = "..." * (start > 0), "..." * (start + EXCERPT < len(text))
+    shown = head + "".join(char if char.isprintable() else " " if char == "\t" else "?" for char in part) + tail
+    return [shown, " " * (len(head) + column - 1 - start) + "^"] if column else [shown]
+
+
 @dataclass(eq=False)
 class NcfixError(Exception):
     """A failure with a remedy. `messages` holds coded remarks: one, or all that were found in a config file."""
 
     messages: tuple[Message, ...]
-    exit_code: ExitCode = field(default=ExitCode.USAGE, init=False)
+    exit_code: ClassVar[ExitCode] = ExitCode.USAGE
 
     def __str__(self) -> str:
         return "\n".join(str(message) for message in self.messages)
@@ -101,12 +113,12 @@ class NcfixError(Exception):
         return self.messages[0].code
 
     @classmethod
-    def of(cls, code: str, text: str, place: Place | None = None, hint: str = "") -> NcfixError:
+    def of(cls, code: str, text: str, place: Place | None = None, hint: str = "") -> Self:
         """An error with a single message."""
         return cls((Message(code, text, place, hint),))
 
     @classmethod
-    def collected(cls, messages: Iterable[Message]) -> NcfixError:
+    def collected(cls, messages: Iterable[Message]) -> Self:
         """An error with all the messages found."""
         return cls(tuple(messages))
 
@@ -114,33 +126,28 @@ class NcfixError(Exception):
 class UsageError(NcfixError):
     """The command was asked for something it cannot do as asked (exit 2)."""
 
-    def __post_init__(self) -> None:
-        self.exit_code = ExitCode.USAGE
+    exit_code = ExitCode.USAGE
 
 
 class SourceError(NcfixError):
     """An NC program that cannot be read or followed (exit 3)."""
 
-    def __post_init__(self) -> None:
-        self.exit_code = ExitCode.UNREADABLE
+    exit_code = ExitCode.UNREADABLE
 
 
 class ConfigError(NcfixError):
     """A machine, setup or measurement file that is wrong (exit 3)."""
 
-    def __post_init__(self) -> None:
-        self.exit_code = ExitCode.UNREADABLE
+    exit_code = ExitCode.UNREADABLE
 
 
 class RefusedError(NcfixError):
     """ncfix could go on, but the result might harm the part or the machine (exit 4)."""
 
-    def __post_init__(self) -> None:
-        self.exit_code = ExitCode.REFUSED
+    exit_code = ExitCode.REFUSED
 
 
 class PluginError(NcfixError):
     """A plugin failed (exit 5)."""
 
-    def __post_init__(self) -> None:
-        self.exit_code = ExitCode.FAULT
+    exit_code = ExitCode.FAULT

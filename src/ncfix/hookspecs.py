@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     import click
 
+    from ncfix.machine.basis import Basis
     from ncfix.program.dialect import Dialect
 
 GROUP = "ncfix"
@@ -43,8 +44,8 @@ def register_dialects(register: Register[Dialect]) -> None:
 
 
 @hookspec
-def register_bases(register: Register[Any]) -> None:
-    """Basis functions for `basis = "..."` of an effect in a machine file."""
+def register_bases(register: Register[type[Basis]]) -> None:
+    """Basis functions for `basis = "..."` of an effect in a machine file: subclasses of `Basis`."""
 
 
 @hookspec

@@ -23,7 +23,9 @@ from ncfix import hookspecs
 from ncfix.diagnostics import Message, PluginError
 from ncfix.hookspecs import GROUP
 
-KINDS = tuple(sorted(name.removeprefix("register_") for name in vars(hookspecs) if name.startswith("register_")))
+HOOKS = tuple(sorted(name for name in vars(hookspecs) if name.startswith("register_")))
+
+KINDS = tuple(hook.removeprefix("register_") for hook in HOOKS)
 """What can be registered, one kind a hook: "dialects", "bases", ..."""
 
 Things = Mapping[str, Mapping[str, Any]]
@@ -98,13 +100,11 @@ def installed() -> list[EntryPoint]:
 
 def collect(points: Iterable[EntryPoint]) -> Plugins:
     """Load these entry points in order, each whole or not at all."""
-    manager = pluggy.PluginManager(GROUP)
-    manager.add_hookspecs(hookspecs)
     loaded: list[Plugin] = []
     problems: list[Message] = []
     for point in points:
         try:
-            loaded.append(load_one(manager, point, loaded))
+            loaded.append(load_one(point, loaded))
         except PluginError as error:
             problems.extend(error.messages)
             for message in error.messages:
@@ -112,18 +112,11 @@ def collect(points: Iterable[EntryPoint]) -> Plugins:
     return Plugins(tuple(loaded), tuple(problems))
 
 
-def load_one(manager: pluggy.PluginManager, point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
-    """Import one plugin and let it register everything; on any failure it leaves no trace in `manager`."""
+def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
+    """Import one plugin and let it register everything, which nobody sees unless all goes well."""
     module = import_plugin(point)
-    if manager.is_registered(module):
-        raise left_out("NCF503", point, "is the same module as an earlier plugin", "one entry point is enough")
-    try:
-        add_hooks(manager, point, module)
-        things = registrations(manager, point, module)
-        check_names(point, things, earlier)
-    except BaseException:
-        manager.unregister(module)
-        raise
+    things = registrations(point, hooks_of(point, module))
+    check_names(point, things, earlier)
     version = point.dist.version if point.dist else ""
     return Plugin(point.name, point.value, distribution(point), version, things)
 
@@ -133,46 +126,50 @@ def import_plugin(point: EntryPoint) -> object:
     try:
         return point.load()
     except (Exception, SystemExit) as error:
-        raise left_out(
-            "NCF501", point, f"cannot be imported: {describe(error)}", "reinstall or uninstall it"
-        ) from error
+        why = f"cannot be imported: {describe(error)}"
+        raise left_out("NCF501", point, why, "reinstall or uninstall it") from error
 
 
-def add_hooks(manager: pluggy.PluginManager, point: EntryPoint, module: object) -> None:
-    """Hand the plugin to pluggy; refuse hooks that ncfix does not have, and none at all."""
+def hooks_of(point: EntryPoint, module: object) -> list[pluggy.HookCaller]:
+    """The hooks that the plugin implements; refuses hooks that ncfix does not have, and none at all.
+
+    Every plugin has a manager of its own, so that one that is left out leaves nothing behind.
+    """
+    manager = pluggy.PluginManager(GROUP)
+    manager.add_hookspecs(hookspecs)
     try:
-        manager.register(module, name=f"{distribution(point)}:{point.name}")
+        manager.register(module, name=point.name)
         manager.check_pending()
     except pluggy.PluginValidationError as error:
-        raise left_out("NCF502", point, describe(error), hook_hint(manager, module)) from error
-    used = {caller.name for caller in manager.get_hookcallers(module) or ()}
-    unmarked = sorted(name for name in map("register_{}".format, KINDS) if hasattr(module, name) and name not in used)
-    if unmarked or not used:
+        why = f"has a hook that ncfix does not know: {str(error).splitlines()[-1]}"
+        raise left_out("NCF502", point, why, hook_hint(manager, module)) from error
+    hooks = manager.get_hookcallers(module) or []
+    unmarked = [name for name in HOOKS if hasattr(module, name) and name not in {hook.name for hook in hooks}]
+    if unmarked or not hooks:
         why = f"has {unmarked[0]} without @hookimpl" if unmarked else "has no hooks"
         raise left_out("NCF506", point, why, "mark its functions with @ncfix.hookspecs.hookimpl")
+    return hooks
 
 
 def hook_hint(manager: pluggy.PluginManager, module: object) -> str:
     """What the author may have meant."""
-    unknown = [caller.name for caller in manager.get_hookcallers(module) or () if not caller.has_spec()]
-    close = [match for name in unknown for match in get_close_matches(name, map("register_{}".format, KINDS), 1)]
+    unknown = [hook.name for hook in manager.get_hookcallers(module) or () if not hook.has_spec()]
+    close = [match for name in unknown for match in get_close_matches(name, HOOKS, 1)]
     return f"did you mean {close[0]}?" if close else "docs/plugins.md lists the hooks and their arguments"
 
 
-def registrations(manager: pluggy.PluginManager, point: EntryPoint, module: object) -> Things:
-    """Call the hooks of this plugin only; what it registers, by kind."""
-    others = [plugin for plugin in manager.get_plugins() if plugin is not module]
+def registrations(point: EntryPoint, hooks: Iterable[pluggy.HookCaller]) -> Things:
+    """Call the hooks of a plugin; what it registers, by kind."""
     things: dict[str, dict[str, Any]] = {}
-    for caller in manager.get_hookcallers(module) or []:
-        kind = caller.name.removeprefix("register_")
+    for hook in hooks:
+        kind = hook.name.removeprefix("register_")
         things[kind] = {}
-        hook = manager.subset_hook_caller(caller.name, others)
         try:
             hook(register=Registrar(point.name, kind, things[kind]))
         except PluginError:
             raise
         except Exception as error:
-            raise left_out("NCF504", point, f"{caller.name} failed: {describe(error)}", "see its author") from error
+            raise left_out("NCF504", point, f"failed in {hook.name}: {describe(error)}", "tell its author") from error
     return things
 
 

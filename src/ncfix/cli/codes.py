@@ -1,0 +1,54 @@
+"""What the message codes of the command line mean."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+CODES = {
+    "NCF000": Code(
+        "a fault of ncfix",
+        "Something happened that ncfix did not foresee. It is not your input's fault, whatever that was.",
+        "Run it again with `ncfix --debug ...` (or NCFIX_DEBUG=1) and report the traceback with the input.",
+    ),
+    "NCF001": Code(
+        "wrong use of the command line",
+        "A verb or an option that does not exist, a value that is missing or of the wrong kind.",
+        "`ncfix --help` and `ncfix VERB --help` show what there is.",
+    ),
+    "NCF003": Code(
+        "no output given",
+        "Programs are never changed where they are unless you say so, and a folder needs a name to write under.",
+        "Say `-o FILE`, `-o FOLDER`, `-o -` for standard output, or `--in-place`, which keeps the original as "
+        "FILE.orig.",
+    ),
+    "NCF005": Code(
+        "an output that must not be written",
+        "The output is an input, a symbolic link, or not an ordinary file. Writing it could destroy what it stands "
+        "for.",
+        "Choose another `-o`; `--in-place` keeps the original; `-o -` is standard output.",
+    ),
+    "NCF006": Code(
+        "two outputs of the same name",
+        "Files of the same name from different folders would overwrite each other in one output folder.",
+        "Write them into different folders.",
+    ),
+    "NCF008": Code(
+        "fixed in place before",
+        "FILE.orig exists, so FILE seems to be a result already; going on would lose the original.",
+        "Rename FILE.orig back to FILE to fix the original again, or remove it.",
+    ),
+    "NCF009": Code(
+        "no such message code",
+        "`ncfix explain` was asked for a code that no message has.",
+        "`ncfix explain` without a code lists them all.",
+    ),
+    "NCF010": Code(
+        "two data streams for one output",
+        "The program and the JSON object would both go to standard output.",
+        "Write the program to a file with `-o FILE`.",
+    ),
+    "NCF012": Code(
+        "interrupted",
+        "The command was stopped with Ctrl-C. Outputs that were not complete are not there.",
+    ),
+}

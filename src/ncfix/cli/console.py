@@ -1,0 +1,117 @@
+"""The two streams: data on standard output, messages on standard error, nothing else on either."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from threading import Timer
+from typing import Any
+
+import click
+
+from ncfix.diagnostics import Message
+from ncfix.files import unwritable
+
+SCHEMA = 1
+"""Version of the objects that `--json` prints."""
+
+BUSY_AFTER_S = 2.0
+"""Progress is shown for what takes longer, on a terminal."""
+
+
+def say(text: str) -> None:
+    """A line for people, on standard error."""
+    click.echo(text, err=True, color=colour())
+
+
+def tell(*messages: Message) -> None:
+    """Coded messages, on standard error."""
+    for message in messages:
+        say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
+
+
+def put(data: str | bytes) -> None:
+    """Data on standard output, as it is, at once."""
+    try:
+        click.echo(data, nl=False, color=colour())
+        sys.stdout.flush()
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        abandon_stdout()
+        raise unwritable("<stdout>", error) from error
+
+
+def put_json(**content: object) -> None:
+    """One JSON object with its schema version, on standard output; numbers that are not finite become null."""
+    put(json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    """Values as JSON has them: arrays as lists, no NaN."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table on standard output: plain columns, or a drawn table on a terminal."""
+    if sys.stdout.isatty():
+        _drawn(header, rows)
+        return
+    widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+    for row in (header, *rows):
+        put("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() + "\n")
+
+
+def _drawn(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    drawn = Table(*header, box=SIMPLE_HEAD, pad_edge=False)
+    for row in rows:
+        drawn.add_row(*map(Text, row))
+    Console().print(drawn)
+
+
+@contextmanager
+def busy(what: str) -> Iterator[None]:
+    """Show what is going on while it lasts, on a terminal, if it lasts."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+
+    status = Console(stderr=True).status(what)
+    timer = Timer(BUSY_AFTER_S, status.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        status.stop()
+
+
+def colour() -> bool | None:
+    """No colour where `NO_COLOR` is set; else it depends on the stream (None)."""
+    return False if os.environ.get("NO_COLOR") else None
+
+
+def abandon_stdout() -> None:
+    """Point standard output at nothing, so that Python's exit does not fail on what could not be written."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,59 @@
+"""`ncfix explain CODE`: what a message code means and what to do about it."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib import import_module
+from importlib.util import find_spec
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import json_option
+from ncfix.diagnostics import Code, UsageError
+
+FLOORS = ("cli", "report", "diagnose", "batch", "compensate", "tables", "measure", "program", "machine")
+
+
+def all_codes() -> dict[str, Code]:
+    """The codes of all floors, in order."""
+    modules = ["ncfix.codes", *(f"ncfix.{floor}.codes" for floor in FLOORS)]
+    found: dict[str, Code] = {}
+    for module in modules:
+        if find_spec(module):
+            found |= import_module(module).CODES
+    return dict(sorted(found.items()))
+
+
+@click.command()
+@click.argument("code", required=False)
+@json_option
+def explain(code: str | None, as_json: bool) -> None:
+    """Explain the message code CODE, e.g. NCF002; without CODE list them all."""
+    codes = all_codes()
+    if code is not None:
+        codes = {code.upper(): _known(code.upper(), codes)}
+    if as_json:
+        console.put_json(codes=[{"code": key, **_as_dict(it)} for key, it in codes.items()])
+    elif code is None:
+        console.table(("code", "title"), [(key, it.title) for key, it in codes.items()])
+    else:
+        console.put("".join(_page(key, it) for key, it in codes.items()))
+
+
+def _known(code: str, codes: dict[str, Code]) -> Code:
+    if code not in codes:
+        close = get_close_matches(code, codes, 1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        text = f"there is no message code {code!r}"
+        raise UsageError.of("NCF009", text, hint=f"{hint}`ncfix explain` lists all")
+    return codes[code]
+
+
+def _as_dict(code: Code) -> dict[str, str]:
+    return {"title": code.title, "text": code.text, "hint": code.hint}
+
+
+def _page(key: str, code: Code) -> str:
+    hint = f"\nhint: {code.hint}\n" if code.hint else ""
+    return f"{key}: {code.title}\n\n{code.text}\n{hint}"

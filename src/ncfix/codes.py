@@ -1,0 +1,58 @@
+"""What the message codes of the ground floor mean: files (NCF002 ... NCF007) and plugins (NCF5xx)."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+CODES = {
+    "NCF002": Code(
+        "an input file cannot be read",
+        "The file does not exist, is a folder, or may not be read. The message says what the system says.",
+        "Check the path and the permissions.",
+    ),
+    "NCF004": Code(
+        "the output exists already",
+        "ncfix does not replace a file that it was not told to replace.",
+        "Choose another `-o`, or say `--force`.",
+    ),
+    "NCF007": Code(
+        "the output cannot be written",
+        "The disk is full, the folder may not be written, or the like. A file that was there before is as it was; "
+        "nothing half written is left.",
+        "Make room, or choose another `-o`.",
+    ),
+    "NCF501": Code(
+        "a plugin cannot be imported",
+        "Its entry point is there, but loading it failed. It is left out, everything else works.",
+        "Reinstall the plugin, uninstall it, or name it in NCFIX_DISABLE_PLUGINS. NCFIX_STRICT_PLUGINS=1 makes it an "
+        "error.",
+    ),
+    "NCF502": Code(
+        "a plugin has a hook that ncfix does not know",
+        "A function is marked as a hook, but its name or its arguments are none of ncfix's: misspelled, or made for "
+        "another version. The whole plugin is left out.",
+        "`docs/plugins.md` lists the hooks and their arguments.",
+    ),
+    "NCF503": Code(
+        "two plugins take the same name",
+        "A name of a dialect, a basis and so on can be taken once; the plugin that comes later is left out. The "
+        "built-in ones come first, then by the name of the distribution.",
+        "Uninstall one, or name it in NCFIX_DISABLE_PLUGINS.",
+    ),
+    "NCF504": Code(
+        "a plugin failed while it registered",
+        "A hook of the plugin raised an exception. The whole plugin is left out, with what it had registered before.",
+        "Tell its author; `ncfix plugins` shows what is in.",
+    ),
+    "NCF505": Code(
+        "a plugin registers something without a name",
+        "`register(thing)` files a thing under `thing.name`, which must be a text; others need `register(thing, "
+        'name="...")`.',
+        "Tell its author.",
+    ),
+    "NCF506": Code(
+        "a plugin without hooks",
+        "The module has no function that is marked as a hook, or one with a hook's name that is not marked.",
+        "Mark it with `@ncfix.hookspecs.hookimpl`.",
+    ),
+}

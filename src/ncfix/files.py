@@ -1,0 +1,127 @@
+"""Files read and written with care: what is written is whole or not there.
+
+A new file is written beside its target under another name, forced to the disk, and then given its name in one step.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from ncfix.diagnostics import Place, SourceError, UsageError
+
+
+def read_bytes(path: str) -> bytes:
+    """The content of a file; raises `SourceError` NCF002."""
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: str, error: OSError) -> SourceError:
+    """The error NCF002 for what the system says of an input."""
+    return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), "give an existing file's path")
+
+
+def unwritable(path: str, error: OSError) -> UsageError:
+    """The error NCF007 for what the system says of an output."""
+    return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), "make room, or another -o")
+
+
+def exists_already(path: str) -> UsageError:
+    """The error NCF004."""
+    return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
+
+
+def write_whole(path: str, data: bytes, replace: bool = False) -> None:
+    """Write a new file, or with `replace` in place of an existing one, whose mode is kept; NCF004, NCF007 if not."""
+    with _coded(path):
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        with _written_beside(path, data, like=path if os.path.lexists(path) else None) as temporary:
+            if replace or not _link(temporary, path):
+                os.replace(temporary, path)
+        _sync_folder(path)
+
+
+def replace_keeping(path: str, backup: str, data: bytes) -> None:
+    """Give `path` new content and keep the old file as `backup`; at every moment both names hold whole files."""
+    with _coded(path):
+        with _written_beside(path, data, like=path) as temporary:
+            if not _link(path, backup):
+                write_whole(backup, Path(path).read_bytes())
+            try:
+                os.replace(temporary, path)
+            except OSError:
+                os.unlink(backup)
+                raise
+        _sync_folder(path)
+
+
+@contextmanager
+def _coded(path: str) -> Iterator[None]:
+    try:
+        yield
+    except FileExistsError as error:
+        raise exists_already(str(error.filename2 or path)) from error
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+@contextmanager
+def _written_beside(path: str, data: bytes, like: str | None) -> Iterator[str]:
+    """A file with this content, on the disk, in the same folder; gone afterwards if it still has its own name."""
+    temporary = os.path.join(os.path.dirname(path), f".ncfix-{secrets.token_hex(8)}.tmp")
+    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        try:
+            _fill(handle, data, like)
+        finally:
+            os.close(handle)
+        yield temporary
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(temporary)
+
+
+def _fill(handle: int, data: bytes, like: str | None) -> None:
+    if like is not None:
+        before = os.stat(like)
+        if (before.st_uid, before.st_gid) != (os.fstat(handle).st_uid, os.fstat(handle).st_gid):
+            with suppress(PermissionError):
+                os.chown(handle, before.st_uid, before.st_gid)
+        os.chmod(handle, stat.S_IMODE(before.st_mode))
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(handle, rest) :]
+    os.fsync(handle)
+
+
+def _link(old: str, new: str) -> bool:
+    """Give a file a second name, which must be free; False where the file system has no such thing."""
+    try:
+        os.link(old, new, follow_symlinks=False)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        if error.errno in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+            return False
+        raise
+    return True
+
+
+def _sync_folder(path: str) -> None:
+    """Make the new name last through a power cut, where the file system can."""
+    handle = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno != errno.EINVAL:
+            raise
+    finally:
+        os.close(handle)
