@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ncfix.hookspecs import Register, hookimpl
+from ncfix.program.dialect import Dialect
 
-if TYPE_CHECKING:
-    from ncfix.program.dialect import Dialect
+ISO = Dialect(
+    name="iso",
+    title="ISO 6983 (common G-code)",
+    grammar="iso.lark",
+    suffixes=(".nc", ".gcode", ".tap", ".cnc", ".ncc", ".iso", ".g", ".gc", ".din", ".eia", ".min"),
+)
 
 
 @hookimpl
 def register_dialects(register: Register[Dialect]) -> None:
     """Bring the dialect `iso`."""
+    register(ISO)

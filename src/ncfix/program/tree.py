@@ -6,13 +6,14 @@ the places and values of its own numbers, held in arrays. The source bytes are k
 edited goes out as it came in.
 
 Places inside a block are given by `Anchor`: so many bytes after the end of the block's number `slot`
-(slot -1: after the start of the block). They hold for every block of the shape, however long its numbers are.
+(slot -1: after the start of the block; slot -2: after its end, with an offset that is zero or negative). They hold for
+every block of the shape, however long its numbers are, and however long the comment that ends it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,8 +25,15 @@ if TYPE_CHECKING:
     from ncfix.program.dialect import Dialect
 
 
+START = -1
+"""The slot of anchors that count from the start of the block."""
+
+END = -2
+"""The slot of anchors that count from the end of the block."""
+
+
 class Anchor(NamedTuple):
-    """A place in every block of a shape: `offset` bytes after the end of number `slot` (-1: the block's start)."""
+    """A place in every block of a shape: `offset` bytes after the end of number `slot`, or after `START` or `END`."""
 
     slot: int
     offset: int
@@ -46,6 +54,13 @@ class Literal:
     """A number written in the block: the value of number `slot` of the block."""
 
     slot: int
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number that every block of the shape has: a plain, unsigned number after G or M."""
+
+    value: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +96,12 @@ class Binary:
 
 @dataclass(frozen=True, slots=True)
 class Exists:
-    """`EXISTS[#<name>]`."""
+    """`EXISTS[#<name>]` or `EXISTS[#5]`."""
 
-    name: str
+    parameter: Parameter | NamedParameter
 
 
-Expression = Literal | Parameter | NamedParameter | Unary | Binary | Exists
+Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | Exists
 
 
 # -- the items of a block ---------------------------------------------------------------------------------------------
@@ -130,7 +145,9 @@ class Skip:
 class Flow:
     """A flow-control line of RS274NGC: `o100 while [...]`, `o<name> call [..]`.
 
-    `label` is a number (slot or constant text), a name, or an expression; `keyword` is lower case.
+    `label` is the name, or the number without leading zeros, as text (`o100` and `o<100>` are the same), else an
+    expression whose rounded value is that number. `keyword` is lower case; it is `program` for a bare program number
+    (`O1234`, `:1234`), which starts a program or a subprogram that M98 calls.
     """
 
     label: str | Expression
@@ -159,10 +176,30 @@ Item = Word | Assignment | Comment | Skip | Flow | Tape | Opaque
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """What every block of one shape has in common."""
+    """What every block of one shape has in common.
+
+    items      what the block consists of, in the order written
+    n_numbers  how many numbers it has; `Literal.slot` and `Anchor.slot` count them from 0
+    g_codes    the constant G codes in tenths (G1 is 10, G38.2 is 382), in the order written
+    m_codes    the constant M codes in tenths, in the order written
+    slots      address -> slot, of the words with a plain number; not for G and M, which may stand several times
+    """
 
     items: tuple[Item, ...]
     n_numbers: int
+    g_codes: tuple[int, ...] = field(init=False, compare=False, repr=False)
+    m_codes: tuple[int, ...] = field(init=False, compare=False, repr=False)
+    slots: Mapping[str, int] = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        literals = {word.address: word.value.slot for word in self.words if isinstance(word.value, Literal)}
+        object.__setattr__(self, "g_codes", self._codes("G"))
+        object.__setattr__(self, "m_codes", self._codes("M"))
+        object.__setattr__(self, "slots", {key: slot for key, slot in literals.items() if key not in "GM"})
+
+    def _codes(self, address: str) -> tuple[int, ...]:
+        values = (word.value for word in self.words if word.address == address)
+        return tuple(round(10 * value.value) for value in values if isinstance(value, Constant))
 
     @property
     def words(self) -> tuple[Word, ...]:
@@ -208,16 +245,24 @@ class Program:
 
     def items_of(self, block: int) -> tuple[Item, ...]:
         """The items of a block."""
-        return self.templates[self.template[block]].items
+        return self.templates[int(self.template[block])].items
 
     def values_of(self, block: int) -> NDArray[np.float64]:
         """The values of the block's numbers, by slot."""
         return self.numbers[self.first_number[block] : self.first_number[block + 1]]
 
+    def column(self, address: str) -> NDArray[np.float64]:
+        """The plain numbers after an address, one row per block; NaN where there is none, or not a plain one."""
+        slot = np.array([template.slots.get(address, -1) for template in self.templates], dtype=np.int64)[self.template]
+        values = np.full(len(self), np.nan)
+        rows = np.flatnonzero(slot >= 0)
+        values[rows] = self.numbers[self.first_number[rows] + slot[rows]]
+        return values
+
     def position(self, block: int, anchor: Anchor) -> int:
         """The byte of the source that an anchor of this block stands for."""
         if anchor.slot < 0:
-            return int(self.blocks[block, 0]) + anchor.offset
+            return int(self.blocks[block, 0 if anchor.slot == START else 1]) + anchor.offset
         return int(self.number_spans[self.first_number[block] + anchor.slot, 1]) + anchor.offset
 
     def span(self, block: int, span: Span) -> tuple[int, int]:
@@ -231,7 +276,10 @@ class Program:
 
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
-        return self.source.count(b"\n", 0, int(self.blocks[block, 0])) + 1
+        start = int(self.blocks[block, 0])
+        return (
+            self.source.count(b"\n", 0, start) + 1 if b"\n" in self.source else self.source.count(b"\r", 0, start) + 1
+        )
 
     def place(self, block: int, span: Span | None = None) -> Place:
         """Where a block, or a span of it, stands in the file: for messages."""

@@ -1,0 +1,50 @@
+"""Which dialects there are, and which of them a text is written in."""
+
+from __future__ import annotations
+
+import re
+from difflib import get_close_matches
+from pathlib import PurePath
+
+from ncfix.diagnostics import UsageError
+from ncfix.plugins import registry
+from ncfix.program.dialect import Dialect
+
+DEFAULT = "iso"
+"""What a text is read as if neither its name nor its content says more."""
+
+PROBE_BYTES = 1 << 16
+"""How much of a text is looked at to find its dialect."""
+
+
+def names() -> tuple[str, ...]:
+    """The names of all dialects, sorted."""
+    return tuple(sorted(registry("dialects")))
+
+
+def get(name: str) -> Dialect:
+    """The dialect of that name; raises UsageError NCF104."""
+    known: dict[str, Dialect] = registry("dialects")
+    if name not in known:
+        close = get_close_matches(name, known, 1)
+        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(sorted(known))}"
+        raise UsageError.of("NCF104", f"no dialect {name!r}", hint=hint)
+    return known[name]
+
+
+def detect(source: bytes, path: str) -> Dialect:
+    """The dialect of a text: by its content, else by its file suffix, else plain ISO code."""
+    known: dict[str, Dialect] = registry("dialects")
+    head = source[:PROBE_BYTES]
+    ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
+    if ranks:
+        return known[min(ranks, key=lambda name: (ranks[name], name))]
+    suffix = PurePath(path).suffix.lower()
+    by_suffix = [name for name, dialect in sorted(known.items()) if suffix in dialect.suffixes]
+    return known[by_suffix[0]] if by_suffix else get(DEFAULT)
+
+
+def signature_rank(dialect: Dialect, head: bytes) -> int | None:
+    """Which of the dialect's signatures is found first in the order of their strength; None for none."""
+    found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
+    return next(found, None)

@@ -1,0 +1,116 @@
+"""The shapes of a text's blocks: their bytes with every number, and the comment that ends them, replaced by a mark.
+
+Blocks of one shape mean the same but for their numbers, so one of them is parsed for all. The scan does not know the
+language: it only says where numbers would be. Whether they are is checked once per shape.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.numbers import NUMERIC, find_numbers, table
+
+NUMBER_MARK = 1
+COMMENT_MARK = 2
+
+MARKS = table(bytes([NUMBER_MARK, COMMENT_MARK]))
+
+FIXED = table(b"GgMmOo")
+"""A number after these belongs to the shape: what it selects has a meaning of its own."""
+
+COMMENT = re.compile(rb"(?:\([^()\r\n]*\)|;[^\r\n]*)(?P<last>(?=[ \t]*(?:[\r\n]|\Z)))?")
+"""A comment; group `last` takes part if nothing but blanks follows on the line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What the scan of a text found, columns over its n blocks and m numbers.
+
+    shapes        n keys: blocks with equal keys have equal shapes; None for a block that must be taken as it is
+    comment       (n,) where the comment that ends the block starts, -1 without one
+    first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
+    spans         (m, 2) start and stop byte of each number
+    values        (m,)
+    """
+
+    shapes: list[bytes | None]
+    comment: NDArray[np.int64]
+    first_number: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+
+def split_blocks(source: bytes) -> NDArray[np.int64]:
+    """Start and stop byte of each line, shape (n, 2), line ends not included.
+
+    A line ends with LF or CR LF; with CR alone only in a text that has no LF. Text after the last line end is a line.
+    """
+    text = np.frombuffer(source, dtype=np.uint8)
+    ends = np.flatnonzero(text == ord("\n"))
+    if not len(ends):
+        ends = np.flatnonzero(text == ord("\r"))
+    starts = np.concatenate(([0], ends + 1))
+    stops = np.concatenate((ends, [len(text)]))
+    if starts[-1] == len(text):
+        starts, stops = starts[:-1], stops[:-1]
+    crlf = (stops > starts) & (text[np.maximum(stops - 1, 0)] == ord("\r")) if len(text) else np.zeros(0, dtype=bool)
+    return np.stack((starts, stops - crlf), axis=1)
+
+
+def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """Find the numbers and the shape of every block."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    starts, stops, last = comments_of(source)
+    in_comment = cover(len(text), starts, stops)
+    numbers = find_numbers(text, NUMERIC[text] & ~in_comment, FIXED)
+    block_of_number = np.searchsorted(blocks[:, 0], numbers.spans[:, 0], side="right") - 1
+    exact = np.zeros(len(blocks), dtype=np.bool_)
+    exact[block_of_number[numbers.broken]] = True
+    exact[np.searchsorted(blocks[:, 0], np.flatnonzero(MARKS[text]), side="right") - 1] = True
+    comment = np.full(len(blocks), -1, dtype=np.int64)
+    comment[np.searchsorted(blocks[:, 0], starts[last], side="right") - 1] = starts[last]
+    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1), exact)
+    first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
+    return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+
+
+def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Start and stop of each comment, and whether it ends its block."""
+    found = [(*match.span(), match.start("last") >= 0) for match in COMMENT.finditer(source)]
+    columns = np.array(found, dtype=np.int64).reshape(-1, 3)
+    return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
+
+
+def cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
+    change = np.zeros(size + 1, dtype=np.int8)
+    change[starts] += 1
+    change[stops] -= 1
+    return np.cumsum(change[:-1], dtype=np.int8).astype(np.bool_)
+
+
+def shape_keys(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    comments: NDArray[np.int64],
+    exact: NDArray[np.bool_],
+) -> list[bytes | None]:
+    """The key of each block: its bytes, with one mark for each number and for the comment at its end."""
+    keep = cover(len(text) + 1, blocks[:, 0], blocks[:, 1])
+    for spans in (numbers, comments):
+        keep[:-1] &= ~cover(len(text), spans[:, 0], spans[:, 1])
+    marked = np.append(text, ord("\n")).astype(np.uint8)
+    marked[numbers[:, 0]] = NUMBER_MARK
+    marked[comments[:, 0]] = COMMENT_MARK
+    marked[blocks[:, 1]] = ord("\n")
+    for places in (numbers[:, 0], comments[:, 0], blocks[:, 1]):
+        keep[places] = True
+    keys: list[bytes | None] = list(marked[keep].tobytes().split(b"\n")[: len(blocks)])
+    for block in np.flatnonzero(exact):
+        keys[block] = None
+    return keys
