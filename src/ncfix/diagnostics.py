@@ -147,6 +147,12 @@ class RefusedError(NcfixError):
     exit_code = ExitCode.REFUSED
 
 
+class FaultError(NcfixError):
+    """ncfix itself failed (exit 5): what the command line makes of an exception that nobody foresaw."""
+
+    exit_code = ExitCode.FAULT
+
+
 class PluginError(NcfixError):
     """A plugin failed (exit 5)."""
 

@@ -23,6 +23,10 @@ BUSY_AFTER_S = 2.0
 """Progress is shown for what takes longer, on a terminal."""
 
 
+class ReaderGoneError(Exception):
+    """Whoever read standard output has closed it."""
+
+
 def say(text: str) -> None:
     """A line for people, on standard error."""
     click.echo(text, err=True, color=colour())
@@ -39,8 +43,9 @@ def put(data: str | bytes) -> None:
     try:
         click.echo(data, nl=False, color=colour())
         sys.stdout.flush()
-    except BrokenPipeError:
-        raise
+    except BrokenPipeError as error:
+        abandon_stdout()
+        raise ReaderGoneError from error
     except OSError as error:
         abandon_stdout()
         raise unwritable("<stdout>", error) from error

@@ -7,14 +7,14 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 
 import click
 
 from ncfix import __version__
 from ncfix.cli import console
-from ncfix.diagnostics import ExitCode, Message, NcfixError
+from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError
 from ncfix.plugins import PluginWarning, registry
 
 VERBS = (
@@ -68,28 +68,33 @@ def main() -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line; the exit code. Nothing is raised."""
+    as_json = "--json" in arguments
     try:
         with plugin_warnings_as_messages():
             return int(cli.main(list(arguments), prog_name="ncfix", standalone_mode=False) or 0)
     except click.ClickException as error:
         return wrong_use(error)
     except NcfixError as error:
-        return failed(error, as_json="--json" in arguments)
+        return failed(error, as_json)
     except click.Abort:
         console.tell(Message("NCF012", "interrupted"))
         return INTERRUPTED
-    except BrokenPipeError:
-        console.abandon_stdout()
+    except console.ReaderGoneError:
         return BROKEN_PIPE
     except Exception as error:
-        return fault(error, debug="--debug" in arguments or os.environ.get("NCFIX_DEBUG", "") not in ("", "0"))
+        if "--debug" in arguments or os.environ.get("NCFIX_DEBUG", "") not in ("", "0"):
+            console.say("".join(traceback.format_exception(error)))
+        return failed(fault(error), as_json)
 
 
 def wrong_use(error: click.ClickException) -> int:
     """Say what is wrong with the command line."""
-    context = getattr(error, "ctx", None)
-    command = context.command_path if context else "ncfix"
-    console.tell(Message("NCF001", error.format_message(), hint=f"{command} --help"))
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        console.say(error.format_message())
+    else:
+        context = getattr(error, "ctx", None)
+        command = context.command_path if context else "ncfix"
+        console.tell(Message("NCF001", error.format_message(), hint=f"{command} --help"))
     return ExitCode.USAGE
 
 
@@ -97,20 +102,17 @@ def failed(error: NcfixError, as_json: bool) -> int:
     """Say what failed, also on standard output where that was asked to be JSON."""
     console.tell(*error.messages)
     if as_json:
-        console.put_json(errors=[message.as_dict() for message in error.messages])
+        with suppress(NcfixError, console.ReaderGoneError):
+            console.put_json(errors=[message.as_dict() for message in error.messages])
     return error.exit_code
 
 
-def fault(error: Exception, debug: bool) -> int:
+def fault(error: Exception) -> FaultError:
     """Own up to a bug."""
     where = traceback.extract_tb(error.__traceback__)[-1]
-    text = (
-        f"this is a fault of ncfix: {type(error).__name__}: {error} ({os.path.basename(where.filename)}:{where.lineno})"
-    )
-    if debug:
-        console.say("".join(traceback.format_exception(error)))
-    console.tell(Message("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input"))
-    return ExitCode.FAULT
+    at = f"{os.path.basename(where.filename)}:{where.lineno}"
+    text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"
+    return FaultError.of("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input")
 
 
 @contextmanager

@@ -1,0 +1,26 @@
+# Everything here is also a plain command; see README.md and CONTRIBUTING.md.
+PYTHON ?= .venv/bin/python
+
+.PHONY: demo test lint format ci clean
+
+demo:            ## fix the shipped five-axis example
+	./try
+
+test:            ## set up and run the tests
+	./try test
+
+lint:            ## style, types, floors (needs: pip install -e '.[dev]')
+	$(PYTHON) -m ruff check .
+	$(PYTHON) -m ruff format --check .
+	$(PYTHON) -m mypy
+	$(dir $(PYTHON))lint-imports
+
+format:
+	$(PYTHON) -m ruff format .
+	$(PYTHON) -m ruff check --fix .
+
+ci:              ## what the server runs
+	.ci/run
+
+clean:
+	rm -rf .venv build dist out .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -1,0 +1,98 @@
+"""What the documents say is there, and what is there is in the documents."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from ncfix import plugins
+from ncfix.cli.main import VERBS, cli
+
+DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/plugins.md", "docs/formats.md")
+
+LINK = re.compile(r"\[[^]]*\]\(([^)#\s]+)(#[^)\s]*)?\)")
+
+
+def commands() -> Iterator[tuple[str, click.Command]]:
+    """Every verb, those of groups as "machine check"."""
+    context = click.Context(cli, info_name="ncfix")
+    for verb in VERBS:
+        command = cli.get_command(context, verb)
+        assert command is not None
+        if isinstance(command, click.Group):
+            yield from ((f"{verb} {name}", sub) for name, sub in command.commands.items())
+        else:
+            yield verb, command
+
+
+COMMANDS = dict(commands())
+
+
+def section(text: str, verb: str) -> str:
+    """The part of docs/formats.md on one verb: from its heading to the next."""
+    found = re.search(rf"^### `ncfix {verb}\b.*?(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
+    assert found, f"no section on `ncfix {verb}` in docs/formats.md"
+    return found[0]
+
+
+@pytest.mark.parametrize("verb", COMMANDS)
+def test_every_verb_and_option_is_documented(root: Path, verb: str) -> None:
+    text = section((root / "docs/formats.md").read_text(), verb)
+    common = (root / "docs/formats.md").read_text().split("### ")[0]
+    for parameter in COMMANDS[verb].params:
+        if isinstance(parameter, click.Option):
+            assert any(f"`{option}" in text or f"`{option}" in common for option in parameter.opts), parameter.opts
+
+
+@pytest.mark.parametrize("verb", COMMANDS)
+def test_every_verb_and_option_has_help(verb: str) -> None:
+    command = COMMANDS[verb]
+    assert command.help
+    for parameter in command.params:
+        if isinstance(parameter, click.Option):
+            assert parameter.help, parameter.opts
+
+
+def test_every_hook_is_documented_and_none_that_is_not(root: Path) -> None:
+    named = set(re.findall(r"\bregister_[a-z]+\b", (root / "docs/plugins.md").read_text()))
+    assert named == set(plugins.HOOKS)
+
+
+def test_the_plugin_of_the_document_is_the_one_that_the_tests_run(root: Path) -> None:
+    source = (root / "examples/third_party_plugin/ncfix_grbl.py").read_text()
+    blocks = re.findall(r"```(python|toml)\n(.*?)```", (root / "docs/plugins.md").read_text(), re.DOTALL)
+    shown = dict(blocks)
+    assert shown["python"] == source
+    assert len(source.splitlines()) <= 15
+    project = tomllib.loads((root / "examples/third_party_plugin/pyproject.toml").read_text())["project"]
+    said = tomllib.loads(shown["toml"])["project"]
+    assert said == {key: project[key] for key in said}
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_somewhere(root: Path, document: str) -> None:
+    path = root / document
+    for link, _ in LINK.findall(path.read_text()):
+        if "://" not in link:
+            assert (path.parent / link).exists(), f"{document}: {link}"
+
+
+def test_every_module_says_what_it_is(root: Path) -> None:
+    for path in [*root.glob("src/**/*.py"), *root.glob("plugins/**/*.py")]:
+        source = path.read_text()
+        assert not source.strip() or ast.get_docstring(ast.parse(source)), path
+
+
+def test_no_room_holds_two_ideas(root: Path) -> None:
+    long = {
+        str(path.relative_to(root)): n
+        for path in root.glob("src/**/*.py")
+        if (n := len(path.read_text().splitlines())) > 400
+    }
+    assert not long

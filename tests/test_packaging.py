@@ -1,0 +1,123 @@
+"""Wheel, sdist and editable install work from a foreign folder; the example of a third party's plugin installs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix import __version__
+
+PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
+
+PROGRAM = "G21 G90 G94\nG1 X1 Y2 F100\nM2\n"
+
+
+def build(source: Path, folder: Path) -> Path:
+    """The wheel of a source tree or sdist."""
+    command = [*PIP, "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source)]
+    subprocess.run(command, check=True)
+    (wheel,) = folder.glob("*.whl")
+    return wheel
+
+
+def install(source: Path, folder: Path) -> Path:
+    """A folder with the package in it, without what it depends on."""
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder)]
+    subprocess.run([*PIP, "install", "-q", *options, str(source)], check=True)
+    return folder
+
+
+def run(arguments: list[str], cwd: Path, *path: Path) -> Any:
+    """What `ncfix ... --json` prints in a folder that has nothing to do with the project."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
+    command = [sys.executable, "-m", "ncfix", *arguments, "--json"]
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, check=False, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def origin(cwd: Path, *path: Path) -> list[Path]:
+    """Where ncfix and its built-in plugins come from."""
+    script = "import ncfix, ncfix_gcode, ncfix_linuxcnc as l; print(ncfix.__file__, ncfix_gcode.__file__, l.__file__, sep='\\n')"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
+    done = subprocess.run([sys.executable, "-c", script], cwd=cwd, env=environment, capture_output=True, check=True)
+    return [Path(line) for line in done.stdout.decode().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(root, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return install(wheel, tmp_path_factory.mktemp("installed"))
+
+
+def test_the_wheel_holds_the_packages_and_the_grammars_and_nothing_else(root: Path, wheel: Path) -> None:
+    assert wheel.name == f"ncfix-{__version__}-py3-none-any.whl"
+    names = zipfile.ZipFile(wheel).namelist()
+    tops = {name.split("/")[0] for name in names}
+    assert tops == {"ncfix", "ncfix_gcode", "ncfix_linuxcnc", f"ncfix-{__version__}.dist-info"}
+    grammars = {f"ncfix/grammars/{path.name}" for path in (root / "grammars").glob("*.lark")}
+    assert grammars
+    assert {name for name in names if "/grammars/" in name} == grammars
+    sources = {str(path.relative_to(root / "src")) for path in (root / "src").rglob("*.py")}
+    assert sources <= set(names)
+    assert "ncfix/py.typed" in names
+    assert not [name for name in names if name.endswith(".pyc")]
+
+
+def test_the_sdist_makes_the_same_wheel(root: Path, wheel: Path, tmp_path: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)], cwd=root, check=True
+    )
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    names = {name.split("/", 1)[1] for name in tarfile.open(sdist).getnames()}
+    assert {"README.md", "LICENSE", "pyproject.toml", "docs/plugins.md", "tests/conftest.py"} <= names
+    again = build(sdist, tmp_path / "again")
+    contents = [{entry.filename: entry.CRC for entry in zipfile.ZipFile(path).infolist()} for path in (wheel, again)]
+    assert contents[0] == contents[1]
+
+
+def test_the_wheel_works_from_a_foreign_folder(installed: Path, tmp_path: Path) -> None:
+    assert all(path.is_relative_to(installed) for path in origin(tmp_path, installed))
+    dialects = run(["dialects"], tmp_path, installed)["dialects"]
+    assert {"iso", "linuxcnc"} <= {entry["name"] for entry in dialects}
+    (tmp_path / "part.ngc").write_text(PROGRAM)
+    checked = run(["check", "part.ngc", "--assume-zero"], tmp_path, installed)
+    assert checked["files"][0]["blocks"] == 3
+
+
+def test_this_installation_works_from_a_foreign_folder(root: Path, tmp_path: Path) -> None:
+    dialects = run(["dialects"], tmp_path)["dialects"]
+    assert {"iso", "linuxcnc"} <= {entry["name"] for entry in dialects}
+    (tmp_path / "part.ngc").write_text(PROGRAM)
+    assert run(["check", "part.ngc", "--assume-zero"], tmp_path)["files"][0]["blocks"] == 3
+
+
+def test_the_example_plugin_installs_and_works(root: Path, tmp_path: Path) -> None:
+    folder = install(root / "examples" / "third_party_plugin", tmp_path / "site")
+    plugins = {plugin["name"]: plugin for plugin in run(["plugins"], tmp_path, folder)["plugins"]}
+    assert plugins["grbl"]["distribution"] == "ncfix-grbl"
+    assert plugins["grbl"]["things"] == {"dialects": ["grbl"]}
+    dialects = {entry["name"]: entry for entry in run(["dialects"], tmp_path, folder)["dialects"]}
+    assert dialects["grbl"]["suffixes"] == [".grbl"]
+    (tmp_path / "part.grbl").write_text(PROGRAM)
+    checked = run(["check", "part.grbl", "--assume-zero"], tmp_path, folder)
+    assert checked["files"][0]["dialect"] == "grbl"
+
+
+def test_the_core_depends_on_little(root: Path) -> None:
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    names = {requirement.split(">")[0] for requirement in project["dependencies"]}
+    assert names == {"numpy", "scipy", "pluggy", "lark", "click", "rich"}
