@@ -47,10 +47,12 @@ def run(arguments: list[str], cwd: Path, *path: Path) -> Any:
 
 def origin(cwd: Path, *path: Path) -> list[Path]:
     """Where ncfix and its built-in plugins come from."""
-    script = "import ncfix, ncfix_gcode, ncfix_linuxcnc as l; print(ncfix.__file__, ncfix_gcode.__file__, l.__file__, sep='\\n')"
+    names = ["ncfix", "ncfix_gcode", "ncfix_linuxcnc"]
+    script = "import sys, importlib; print(*(importlib.import_module(name).__file__ for name in sys.argv[1:]))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
-    done = subprocess.run([sys.executable, "-c", script], cwd=cwd, env=environment, capture_output=True, check=True)
-    return [Path(line) for line in done.stdout.decode().splitlines()]
+    command = [sys.executable, "-c", script, *names]
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, check=True, text=True)
+    return [Path(path) for path in done.stdout.split()]
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +84,8 @@ def test_the_sdist_makes_the_same_wheel(root: Path, wheel: Path, tmp_path: Path)
         [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)], cwd=root, check=True
     )
     (sdist,) = tmp_path.glob("*.tar.gz")
-    names = {name.split("/", 1)[1] for name in tarfile.open(sdist).getnames()}
+    with tarfile.open(sdist) as archive:
+        names = {name.split("/", 1)[1] for name in archive.getnames()}
     assert {"README.md", "LICENSE", "pyproject.toml", "docs/plugins.md", "tests/conftest.py"} <= names
     again = build(sdist, tmp_path / "again")
     contents = [{entry.filename: entry.CRC for entry in zipfile.ZipFile(path).infolist()} for path in (wheel, again)]
