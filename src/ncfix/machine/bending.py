@@ -1,0 +1,66 @@
+"""How finely a path must be looked at: where, and over which distances, the errors of a machine may bend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ncfix.machine.axis import Axis
+from ncfix.machine.effect import SPINDLE, Effect
+from ncfix.machine.error_model import signals_of
+from ncfix.machine.se3 import Array
+from ncfix.machine.signals import Signal
+
+UNKNOWN_RANGE = 1000.0
+"""The range of a linear axis that does not say its own, mm."""
+
+
+def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Array:
+    """See `Machine.feature_lengths`."""
+    lengths = np.full(len(axes), np.inf)
+    for effect, index, signal, is_factor in _dependencies(axes, effects):
+        span = _span(axes[index]) / abs(signal.scale)
+        feature = span / 4 if is_factor else effect.basis.feature(span)
+        length = feature * abs(signal.scale) * signal.unit
+        lengths[index] = min(lengths[index], length)
+    return lengths
+
+
+def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...], index: int) -> Array:
+    """See `Machine.breakpoints`."""
+    places: set[float] = set()
+    for effect, axis, signal, is_factor in _dependencies(axes, effects):
+        if axis == index and not is_factor:
+            places.update((signal.center + signal.scale * u) * signal.unit for u in effect.basis.kinks)
+    return np.array(sorted(places), dtype=np.float64)
+
+
+def needs_tool_length(axes: tuple[Axis, ...], effect: Effect) -> bool:
+    """Whether an effect moves the tip by an amount that depends on the tool's length.
+
+    Angles do. Not those of where a straight axis points: its body is shifted, not turned.
+    """
+    if "tool_length" in (effect.input, effect.times):
+        return True
+    if effect.joint == SPINDLE:
+        return effect.rotational
+    axis = next(each for each in axes if each.name == effect.joint)
+    return effect.rotational and (axis.rotary or effect.carried or not effect.location)
+
+
+def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterator[tuple[Effect, int, Signal, bool]]:
+    """Each effect that is not zero, with each axis whose position it depends on; the last says if it is a factor."""
+    for effect in effects:
+        if effect.active:
+            for signal, is_factor in zip(signals_of(axes, effect), (False, True), strict=True):
+                if signal is not None and signal.axis is not None:
+                    yield effect, signal.axis, signal, is_factor
+
+
+def _span(axis: Axis) -> float:
+    """The range in the unit of the machine file."""
+    low, high = axis.range
+    if np.isfinite(low) and np.isfinite(high):
+        return (high - low) / axis.unit
+    return 360.0 if axis.rotary else UNKNOWN_RANGE

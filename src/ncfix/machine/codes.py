@@ -1,0 +1,97 @@
+"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF317) and states (NCF340)."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+FORMATS = "docs/formats.md describes the machine file; examples/machines has some."
+
+CODES = {
+    "NCF300": Code("the machine file cannot be read", "It does not exist, or may not be read.", "Check the path."),
+    "NCF301": Code(
+        "the machine file is not TOML",
+        "The text breaks the rules of TOML at the place shown, or is not UTF-8. Nothing of it could be looked at.",
+        "Repair that line first; the other faults show then.",
+    ),
+    "NCF302": Code(
+        "an unknown key in the machine file",
+        "A key that ncfix does not know would be ignored in silence, and an error of the machine with it. Often it is "
+        "misspelled, or belongs to another basis.",
+        FORMATS,
+    ),
+    "NCF303": Code("a key is missing in the machine file", "The key has no default: its value must be given.", FORMATS),
+    "NCF304": Code(
+        "a value of the wrong type in the machine file",
+        'A number is not a text: 5.0, not "5.0". Lists have the length that is asked for.',
+        FORMATS,
+    ),
+    "NCF305": Code(
+        "a number that cannot be, in the machine file",
+        "Not a number, infinite, or zero or negative where that makes no sense.",
+        "Omit `range` for an axis without ends.",
+    ),
+    "NCF306": Code(
+        "the topology cannot be read",
+        "It names the joints from the workpiece w through the foundation F to the tool t, each axis once; the spindle "
+        "S may stand last, before t.",
+        'For example "w C B F X Y Z t".',
+    ),
+    "NCF307": Code(
+        "topology and axes do not agree",
+        "Each axis of the topology has a table [axis.LETTER], and each such table is in the topology.",
+        FORMATS,
+    ),
+    "NCF308": Code(
+        "an empty range",
+        "The first end of an axis range must be below the second.",
+        "Omit `range` for an endless axis.",
+    ),
+    "NCF309": Code(
+        "an effect that this machine cannot have",
+        "Names follow ISO 230-1: E, component X Y Z A B C, axis (EYX); with 0 for the location of the axis line "
+        "(EC0Y); S for the spindle.",
+        "`ncfix effects` lists them.",
+    ),
+    "NCF310": Code(
+        "an unknown basis", "No built-in basis and none of a plugin has this name.", "`ncfix effects --bases`"
+    ),
+    "NCF311": Code(
+        "a wrong number of coefficients",
+        "Every function of the basis has one coefficient: one per degree, two per order, one per position, one per "
+        "B-spline.",
+        "`ncfix effects --bases` says how many a basis has.",
+    ),
+    "NCF312": Code(
+        "a covariance that is none",
+        "It is a symmetric matrix with one row per coefficient, and no combination has a negative variance.",
+        "Omit it if it is not known.",
+    ),
+    "NCF313": Code(
+        "a direction that is none",
+        "A direction is not zero; `error_axes` are three perpendicular unit vectors, right-handed, as rows.",
+        FORMATS,
+    ),
+    "NCF314": Code(
+        "an unknown signal",
+        "`input` and `times` name an axis of the machine or an input in small letters, like temp_spindle.",
+        FORMATS,
+    ),
+    "NCF315": Code(
+        "a basis or an option that does not fit the effect",
+        "A location error and the spindle have no position to depend on, `fourier` wants an angle, `backlash` a "
+        "direction of motion, `carried` a location error.",
+        FORMATS,
+    ),
+    "NCF316": Code(
+        "a parameter of a basis that cannot be",
+        "Positions and knots ascend, powers and orders are distinct and not negative, a period is positive.",
+        "`ncfix effects --bases` describes them.",
+    ),
+    "NCF317": Code("another schema of machine files", "The file says that it is of another version.", FORMATS),
+    "NCF340": Code(
+        "an input of the error model is not given",
+        "An effect depends on a temperature, a time or the like. Without its value the error is not known, and zero "
+        "would be a guess.",
+        "Give the value; `ncfix machine show` names the inputs of a machine.",
+    ),
+}

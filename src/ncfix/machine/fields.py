@@ -1,0 +1,199 @@
+"""Reading a tree of plain values with all its faults: each wrong key is noted and the reading goes on.
+
+A `Section` is one table. Its readers return the value, or None if it is missing or wrong (then there is a message).
+`close` notes the keys that nobody asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, TypeGuard
+
+from ncfix.diagnostics import Message, Place
+from ncfix.machine.toml_lines import Path, line_of
+
+
+@dataclass(slots=True)
+class Report:
+    """The faults found so far, with their places in the text."""
+
+    path: str
+    text: str
+    lines: Mapping[Path, int]
+    messages: list[Message] = field(default_factory=list)
+
+    def note(self, code: str, where: Path, text: str, hint: str = "") -> None:
+        """Note a fault of the value at `where`."""
+        line = line_of(where, self.lines)
+        rows = self.text.splitlines()
+        source = rows[line - 1] if line <= len(rows) else ""
+        column = len(source) - len(source.lstrip()) + 1 if source.strip() else 0
+        place = Place(self.path, line, column, source)
+        head = f"{dotted(where)}: " if where else ""
+        self.messages.append(Message(code, head + text, place, hint))
+
+
+@dataclass(slots=True)
+class Section:
+    """One table of the file, at `path`."""
+
+    values: Mapping[str, Any]
+    path: Path
+    report: Report
+    asked: set[str] = field(default_factory=set)
+
+    def note(self, code: str, key: str, text: str, hint: str = "") -> None:
+        """Note a fault of one key."""
+        self.report.note(code, (*self.path, key), text, hint)
+
+    def has(self, key: str) -> bool:
+        """Whether the key is there."""
+        self.asked.add(key)
+        return key in self.values
+
+    def get(self, key: str, required: bool = False) -> Any:
+        """The raw value, or None; a required key that is missing is noted."""
+        if not self.has(key):
+            if required:
+                self.report.note("NCF303", self.path, f"key {key!r} is missing", _close(key, self.values, self.asked))
+            return None
+        return self.values[key]
+
+    def text(self, key: str, required: bool = False) -> str | None:
+        """A string."""
+        value = self.get(key, required)
+        if value is None or isinstance(value, str):
+            return value
+        self._wrong(key, "a string", value)
+        return None
+
+    def flag(self, key: str) -> bool:
+        """true or false; false if missing."""
+        value = self.get(key)
+        if value is not None and not isinstance(value, bool):
+            self._wrong(key, "true or false", value)
+        return value is True
+
+    def number(self, key: str, required: bool = False) -> float | None:
+        """A finite number."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        return float(value) if self._finite(key, value, "a number") else None
+
+    def integer(self, key: str, required: bool = False) -> int | None:
+        """A whole number."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if _is_integer(value):
+            return value
+        self._wrong(key, "a whole number", value)
+        return None
+
+    def numbers(self, key: str, required: bool = False, count: int | None = None) -> tuple[float, ...] | None:
+        """A list of finite numbers, `count` of them if given."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        wanted = f"a list of {count} numbers" if count is not None else "a list of numbers"
+        if not isinstance(value, list) or (count is not None and len(value) != count):
+            self._wrong(key, wanted, value)
+            return None
+        good = [self._finite(key, item, wanted) for item in value]
+        return tuple(float(item) for item in value) if all(good) else None
+
+    def integers(self, key: str, required: bool = False) -> tuple[int, ...] | None:
+        """A list of whole numbers."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if isinstance(value, list) and all(_is_integer(item) for item in value):
+            return tuple(value)
+        self._wrong(key, "a list of whole numbers", value)
+        return None
+
+    def rows(self, key: str, shape: tuple[int, int]) -> tuple[tuple[float, ...], ...] | None:
+        """A matrix as a list of rows."""
+        value = self.get(key)
+        if value is None:
+            return None
+        wanted = f"{shape[0]} rows of {shape[1]} numbers"
+        ragged = not isinstance(value, list) or any(not isinstance(row, list) or len(row) != shape[1] for row in value)
+        if ragged or len(value) != shape[0]:
+            self._wrong(key, wanted, value)
+            return None
+        good = [self._finite(key, item, wanted) for row in value for item in row]
+        return tuple(tuple(float(item) for item in row) for row in value) if all(good) else None
+
+    def table(self, key: str, required: bool = False) -> Section | None:
+        """A table in this one."""
+        value = self.get(key, required)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            self._wrong(key, f"a table [{dotted((*self.path, key))}]", value)
+            return None
+        return Section(value, (*self.path, key), self.report)
+
+    def tables(self, key: str) -> Iterator[Section]:
+        """The tables of an array [[key]]."""
+        value = self.get(key)
+        if value is None:
+            return
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self._wrong(key, f"tables [[{dotted((*self.path, key))}]]", value)
+            return
+        for index, item in enumerate(value):
+            yield Section(item, (*self.path, key, index), self.report)
+
+    def close(self) -> None:
+        """Note the keys that nobody asked for."""
+        for key in self.values:
+            if key not in self.asked:
+                missing = self.asked - self.values.keys()
+                self.note("NCF302", key, f"unknown key {key!r}", _close(key, missing or self.asked, set()))
+
+    def _finite(self, key: str, value: object, wanted: str) -> bool:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            self._wrong(key, wanted, value)
+            return False
+        if not math.isfinite(value):
+            self.note("NCF305", key, f"{value} is not a finite number")
+            return False
+        return True
+
+    def _wrong(self, key: str, wanted: str, value: object) -> None:
+        self.note("NCF304", key, f"expected {wanted}, found {shown(value)}")
+
+
+def dotted(path: Path) -> str:
+    """A path as people write it: effect[2].degree, entries counted from 0."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")
+
+
+def shown(value: object) -> str:
+    """A value in a message: what it is, not all of it."""
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if isinstance(value, dict):
+        return "a table"
+    return f"{str(value).lower() if isinstance(value, bool) else repr(value)}"
+
+
+def _is_integer(value: object) -> TypeGuard[int]:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def did_you_mean(word: str, words: Iterable[str]) -> str:
+    """A hint with the nearest of the words; empty if none is near."""
+    close = get_close_matches(word, list(words), 1, 0.6)
+    return f"did you mean {close[0]!r}?" if close else ""
+
+
+def _close(word: str, words: Iterable[str], known: set[str]) -> str:
+    return did_you_mean(word, [each for each in words if each not in known])

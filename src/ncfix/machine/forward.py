@@ -1,0 +1,154 @@
+"""What the machine does with axis positions: the exact chain of nominal motions and error motions, out to the tip.
+
+Each joint moves its body by B = Lc L E M(q + offset) inverse(L), in base coordinates with all axes at zero: M nominal
+motion, E error motion, L location errors of the axis line, Lc location errors that carry the body (`carried`). The
+tool branch is the product of its joints from the foundation outward, then the spindle; so is the workpiece branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.machine.axis import Axis
+from ncfix.machine.error_model import ErrorModel, Slot, Sort
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import Poses
+from ncfix.machine.transport import SmallMotion, Weight, advance, columns, composed, cross
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A joint with the slots of its small motions; the spindle has no axis."""
+
+    axis: Axis | None
+    motion: tuple[Slot, ...] = ()
+    location: tuple[Slot, ...] = ()
+    carried: tuple[Slot, ...] = ()
+    rotating: frozenset[Slot] = frozenset()
+
+    def at(self, position: Array, small: Mapping[Slot, Array]) -> JointPose:
+        """The joint at a position (n,), with the small motions worked out for these poses."""
+        location, offset = self._location(small)
+        error = self._composed(self.motion, small, position)
+        carried = self._composed(self.carried, small, None)
+        return JointPose(self.axis, position if offset is None else position + offset, error, location, carried)
+
+    def _composed(
+        self, slots: tuple[Slot, ...], small: Mapping[Slot, Array], position: Array | None
+    ) -> SmallMotion | None:
+        if not slots:
+            return None
+        terms = [(self._turned(small[slot], position), self._carried_along(slot, position)) for slot in slots]
+        return composed(terms, any(slot in self.rotating for slot in slots))
+
+    def _carried_along(self, slot: Slot, position: Array | None) -> Array:
+        """The reference point, where the joint's nominal motion has carried it."""
+        point = columns(slot.reference)
+        if self.axis is None or position is None or lies_on_axis(self.axis, point):
+            return point
+        return advance(self.axis, position, point)
+
+    def _turned(self, small: Array, position: Array | None) -> Array:
+        """A small motion in base axes, where the error frame turns with the joint."""
+        if self.axis is None or position is None or not (self.axis.moving_frame and self.axis.rotary):
+            return small
+        pair = np.stack([small[:3], small[3:]], axis=1)
+        turned = advance(self.axis, position, pair, weight=0.0)
+        return np.concatenate([turned[:, 0], turned[:, 1]])
+
+    def _location(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
+        """The motion of the axis line, and the zero offset: the component along or about the axis itself."""
+        if not self.location or self.axis is None:
+            return None, None
+        along = slice(3, 6) if self.axis.rotary else slice(0, 3)
+        direction = np.asarray(self.axis.direction)
+        terms, offset = [], np.zeros(1)
+        for slot in self.location:
+            share = direction @ small[slot][along]
+            across = small[slot].copy()
+            across[along] -= direction[:, None] * share
+            offset = offset + share
+            terms.append((across, columns(slot.reference)))
+        return composed(terms, any(slot in self.rotating for slot in self.location)), offset
+
+
+@dataclass(frozen=True, slots=True)
+class JointPose:
+    """A joint at its positions, with its errors."""
+
+    axis: Axis | None
+    position: Array
+    error: SmallMotion | None = None
+    location: SmallMotion | None = None
+    carried: SmallMotion | None = None
+
+    def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Carry outward bodies' points by B: from the joint's zero position to where it really is."""
+        if self.location is not None:
+            moved = self.location.back(moved, weight)
+        if self.axis is not None:
+            moved = advance(self.axis, self.position, moved, weight)
+        for small in (self.error, self.location, self.carried):
+            if small is not None:
+                moved = small.forth(moved, weight)
+        return moved
+
+    def back(self, moved: Array, weight: Weight = 1.0) -> Array:
+        """Carry by the inverse of B."""
+        for small in (self.carried, self.location, self.error):
+            if small is not None:
+                moved = small.back(moved, weight)
+        if self.axis is not None:
+            moved = advance(self.axis, -self.position, moved, weight)
+        return moved if self.location is None else self.location.forth(moved, weight)
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """The joints from the tool back to the foundation, then out to the workpiece; all of them with their errors.
+
+    joints  in machine order (workpiece side from the workpiece to the foundation, then tool side), then the spindle
+    """
+
+    joints: tuple[Joint, ...]
+
+    def at(self, poses: Poses, model: ErrorModel | None) -> tuple[JointPose, ...]:
+        """The joints at these poses; without a model the nominal ones."""
+        if model is None:
+            nominal = [JointPose(joint.axis, poses.positions[i]) for i, joint in enumerate(self.joints[:-1])]
+            return (*nominal, JointPose(None, np.zeros(1)))
+        small = model.small_motions(poses)
+        moving = [joint.at(poses.positions[i], small) for i, joint in enumerate(self.joints[:-1])]
+        return (*moving, self.joints[-1].at(np.zeros(1), small))
+
+
+def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> Array:
+    """From the end of the tool branch to the end of the workpiece branch."""
+    for joint in reversed(joints):
+        if joint.axis is None or not joint.axis.workpiece_side:
+            moved = joint.forth(moved, weight)
+    for joint in reversed(joints):
+        if joint.axis is not None and joint.axis.workpiece_side:
+            moved = joint.back(moved, weight)
+    return moved
+
+
+def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> Chain:
+    """The joints of the machine and the slots that each of them has."""
+    slots = list(dict.fromkeys(slot for group in model.groups for slot in group.slots))
+    rotating = frozenset(slot for slot in slots if model.rotates(slot))
+    joints = []
+    for index, axis in enumerate((*axes, None)):
+        own = {sort: tuple(s for s in slots if s.joint == index and s.sort is sort) for sort in Sort}
+        joints.append(Joint(axis, own[Sort.MOTION], own[Sort.LOCATION], own[Sort.CARRIED], rotating))
+    return Chain(tuple(joints))
+
+
+def lies_on_axis(axis: Axis, point: Array) -> bool:
+    """Whether the axis, as a rotary one, leaves the point where it is."""
+    direction = np.asarray(axis.direction)[:, None, None]
+    arm = cross(direction, point - np.asarray(axis.point)[:, None, None])
+    return axis.rotary and float(np.abs(arm).max()) < 1e-12

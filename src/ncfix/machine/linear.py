@@ -1,0 +1,121 @@
+"""The error model to first order: linear in the coefficients. The one place where a design matrix is made.
+
+A small motion of a joint's body is written as a twist (v, w) about the base origin, in base axes with all joints
+nearer to the foundation at zero; the joint's Jacobian wants it at its reference point in its error axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad
+from ncfix.machine.effect import Effect
+from ncfix.machine.error_model import Slot, Sort, joint_index, signals_of, slot_of, unit_motion
+from ncfix.machine.jacobian import nominal_jacobians
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import Poses
+from ncfix.machine.transport import advance, columns, cross
+
+
+def switched_on(effect: Effect) -> Effect:
+    """The effect with coefficients that are not zero."""
+    return replace(effect, coefficients=(1.0,) * effect.basis.size)
+
+
+def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
+    """See `Machine.joint_errors`; poses last: (n_joints, 6, n)."""
+    errors = np.zeros((len(axes) + 1, 6, poses.positions.shape[1]))
+    for effect in effects:
+        value = np.asarray(effect.coefficients) @ functions(axes, effect, poses)
+        errors[joint_index(axes, effect)] += unit_twist(axes, tool, effect, poses) * value
+    return errors
+
+
+def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
+    """See `Machine.design`; poses last: (6, k, n)."""
+    n = poses.positions.shape[1]
+    _, by_joint = nominal_jacobians(axes, tool, poses)
+    parts = [np.empty((6, 0, n))]
+    for effect in effects:
+        twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
+        response = np.einsum("ijn,jn->in", by_joint[:, joint_index(axes, effect)], twist)
+        parts.append(response[:, None] * functions(axes, effect, poses))
+    return np.concatenate(parts, axis=1)
+
+
+def functions(axes: tuple[Axis, ...], effect: Effect, poses: Poses) -> Array:
+    """The effect's basis at these poses, times its factor: shape (k, n)."""
+    signal, factor = signals_of(axes, effect)
+    n = poses.positions.shape[1]
+    u = np.zeros(n) if signal is None else np.broadcast_to(signal.u(poses, effect.basis.domain), (n,))
+    rows = effect.basis.rows(u, _direction(axes, effect, poses))
+    return rows if factor is None else rows * factor.u(poses, (-np.inf, np.inf))
+
+
+def _direction(axes: tuple[Axis, ...], effect: Effect, poses: Poses) -> Array:
+    n = poses.positions.shape[1]
+    if not effect.basis.needs_direction:
+        return np.zeros(n)
+    names = [axis.name for axis in axes]
+    index = names.index(effect.input if effect.input in names else effect.joint)
+    return np.broadcast_to(poses.direction[index], (n,))
+
+
+def unit_twist(axes: tuple[Axis, ...], tool: Tool, effect: Effect, poses: Poses) -> Array:
+    """What an effect of 1 mm or 1 rad does to its joint, at its reference point in its error axes: (6, n) or (6, 1)."""
+    slot, motion = slot_of(axes, tool, effect), unit_motion(axes, effect)
+    if slot.joint == len(axes):
+        return _seen(_twist(motion, columns(slot.reference)), columns(tool.point), BASE_AXES, None, None)
+    axis, position = axes[slot.joint], poses.positions[slot.joint]
+    reference = advance(axis, position, columns(axis.reference))
+    moving = position if axis.moving_frame else None
+    return _seen(_joint_twist(axis, position, slot, motion), reference, axis.error_axes, axis, moving)
+
+
+def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Array:
+    """The twist about the base origin, (6, 1, n) or (6, 1, 1)."""
+    if slot.sort is Sort.MOTION:
+        turned = motion
+        if axis.moving_frame:
+            pair = columns(tuple(motion[:3]), tuple(motion[3:]))
+            turned = np.concatenate(list(np.moveaxis(advance(axis, position, pair, weight=0.0), 1, 0)))
+        return _twist(turned, advance(axis, position, columns(slot.reference)))
+    fixed = _twist(motion, columns(slot.reference))
+    if slot.sort is Sort.CARRIED:
+        return fixed
+    along = slice(3, 6) if axis.rotary else slice(0, 3)
+    direction = np.asarray(axis.direction)
+    share = float(direction @ motion[along])
+    across = motion.copy()
+    across[along] -= share * direction
+    line = _twist(across, columns(slot.reference))
+    own = share * np.concatenate(axis.screw)[:, None, None]
+    return line - _carried(axis, position, line) + own
+
+
+def _twist(motion: Array, reference: Array) -> Array:
+    """A small motion about a reference point as a twist (v, w) about the base origin: (6,) or (6, n) -> (6, 1, n)."""
+    shifted, turned = motion[:3].reshape(3, 1, -1), motion[3:].reshape(3, 1, -1)
+    velocity = shifted + cross(reference, turned)
+    return np.concatenate([velocity, np.broadcast_to(turned, velocity.shape)])
+
+
+def _carried(axis: Axis, position: Array, twist: Array) -> Array:
+    """A twist carried along by the nominal motion of the axis: the adjoint of M applied to it."""
+    velocity, turned = (advance(axis, position, part, weight=0.0) for part in (twist[:3], twist[3:]))
+    origin = advance(axis, position, columns(ORIGIN))
+    velocity, turned, origin = np.broadcast_arrays(velocity, turned, origin)
+    return np.concatenate([velocity + cross(origin, turned), turned])
+
+
+def _seen(twist: Array, point: Array, triad: Triad, axis: Axis | None, moving: Array | None) -> Array:
+    """The twist at a point, in a triad that may turn with its axis."""
+    velocity = twist[:3] + cross(twist[3:], np.broadcast_to(point, np.broadcast_shapes(twist[3:].shape, point.shape)))
+    turned = np.broadcast_to(twist[3:], velocity.shape)
+    if axis is not None and moving is not None:
+        velocity, turned = (advance(axis, -moving, part, weight=0.0) for part in (velocity, turned))
+    rows = np.asarray(triad)
+    return np.concatenate([rows @ velocity[:, 0], rows @ turned[:, 0]])

@@ -1,0 +1,233 @@
+"""The machine: its axes, its errors, and what both do with axis positions."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ncfix.machine import bending, fingerprint, jacobian, linear, se3
+from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
+from ncfix.machine.effect import Effect
+from ncfix.machine.error_model import ErrorModel, compile_effects
+from ncfix.machine.forward import Chain, build_chain, carry
+from ncfix.machine.jacobian import Jacobians
+from ncfix.machine.se3 import Array
+from ncfix.machine.signals import with_lags
+from ncfix.machine.state import Poses, State, flatten
+from ncfix.machine.transport import columns
+
+POSE_COLUMNS = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+POSE_WEIGHTS = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
+DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
+DEFAULT_CORRECTION = (0.5, 0.05 * np.pi / 180)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A serial machine tool with its errors. Immutable; `replace` makes another.
+
+    name              for people
+    topology          as in the machine file, e.g. "w C B F X Y Z t"
+    axes              from the workpiece to the foundation, then from the foundation to the tool
+    tool              the end of the tool branch
+    effects           the errors
+    control           default control of the machine
+    least_increment   (mm, rad) what the control can resolve
+    max_correction    (mm, rad) corrections above it are refused
+    workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
+    provenance        where the errors come from; free keys
+
+    Positions `q` have shape (..., n_axes) in mm and rad; states and positions broadcast. The workpiece frame rides on
+    the last body of the workpiece branch; the tool frame has its origin at the tip and is parallel to the base axes
+    when all axes are at zero.
+    """
+
+    name: str
+    topology: str
+    axes: tuple[Axis, ...]
+    tool: Tool = Tool()  # noqa: RUF009
+    effects: tuple[Effect, ...] = ()
+    control: str | None = None
+    least_increment: tuple[float, float] = DEFAULT_INCREMENT
+    max_correction: tuple[float, float] = DEFAULT_CORRECTION
+    workpiece_offset: Vector = ORIGIN
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    # -- what it is ---------------------------------------------------------------------------------------------------
+
+    @property
+    def axis_names(self) -> tuple[str, ...]:
+        """The letters of the axes, in the order of the columns of q."""
+        return tuple(axis.name for axis in self.axes)
+
+    @cached_property
+    def rotary(self) -> NDArray[np.bool_]:
+        """Which axes are rotary, shape (n_axes,)."""
+        return np.array([axis.rotary for axis in self.axes], dtype=np.bool_)
+
+    @cached_property
+    def ranges(self) -> Array:
+        """Lowest and highest position of each axis, shape (n_axes, 2), mm and rad; infinite where endless."""
+        return np.array([axis.range for axis in self.axes], dtype=np.float64).reshape(-1, 2)
+
+    @property
+    def is_perfect(self) -> bool:
+        """Whether no effect has a coefficient that is not zero."""
+        return not any(effect.active for effect in self.effects)
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The names that `State.inputs` must have."""
+        return self._model.inputs - {"tool_length"}
+
+    def replace(self, **changes: Any) -> Machine:
+        """The same machine with some fields changed."""
+        return dataclasses.replace(self, **changes)
+
+    @cached_property
+    def _model(self) -> ErrorModel:
+        return compile_effects(self.axes, self.tool, self.effects)
+
+    @cached_property
+    def _chain(self) -> Chain:
+        return build_chain(self.axes, self._model)
+
+    @cached_property
+    def hash(self) -> str:
+        """12 hexadecimal digits of everything that matters to a correction."""
+        return fingerprint.fingerprint(self)
+
+    @cached_property
+    def depends_on_tool_length(self) -> bool:
+        """Whether the error of the tip depends on the length of the tool."""
+        return any(bending.needs_tool_length(self.axes, effect) for effect in self.effects if effect.active)
+
+    def feature_lengths(self) -> Array:
+        """The smallest distance over which the errors may bend as each axis moves, shape (n_axes,), mm or rad.
+
+        Spacing of knots or table entries, an eighth of a period, range / (4 degree) of a polynomial; inf for an axis
+        on which nothing depends.
+        """
+        return bending.feature_lengths(self.axes, self.effects)
+
+    def breakpoints(self, axis: str) -> Array:
+        """Positions of an axis at which an error has a kink or a jump, ascending, shape (k,), mm or rad.
+
+        Those of an endless axis come again with every turn.
+        """
+        return bending.breakpoints(self.axes, self.effects, self.axis_names.index(axis))
+
+    # -- what it does -------------------------------------------------------------------------------------------------
+
+    def tip(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
+        """Where the tip of a perfect machine is in the workpiece frame, shape (..., 3) [mm]."""
+        return self._tip(q, State(tool_length), None)
+
+    def actual_tip(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
+        """Where the tip really is in the workpiece frame, shape (..., 3) [mm]."""
+        return self._tip(q, state, None if self.is_perfect else self._model)
+
+    def nominal(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
+        """`workpiece_from_tool` of a perfect machine, shape (..., 4, 4)."""
+        return self._pose(q, State(tool_length), None)
+
+    def actual(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
+        """`workpiece_from_tool` as it really is: the exact composition of all finite motions, shape (..., 4, 4)."""
+        return self._pose(q, state, None if self.is_perfect else self._model)
+
+    def error(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
+        """Actual minus nominal in the workpiece frame, shape (..., 6): [dx dy dz rx ry rz], mm and rad.
+
+        [rx ry rz] is the rotation vector of R_actual R_nominal^T.
+        """
+        actual, nominal = self.actual(q, state), self.nominal(q, state.tool_length)
+        shift = actual[..., :3, 3] - nominal[..., :3, 3]
+        turn = se3.rotation_vector(actual[..., :3, :3] @ np.swapaxes(nominal[..., :3, :3], -1, -2))
+        return np.concatenate([shift, turn], axis=-1)
+
+    def jacobians(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Jacobians:
+        """Derivatives of the tip pose at the nominal pose; see `Jacobians`."""
+        shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
+        parts = [jacobian.nominal_jacobians(self.axes, self.tool, part) for _, part in poses.chunks()]
+        if not parts:
+            parts = [(np.empty((6, len(self.axes), 0)), np.empty((6, len(self.axes) + 1, 6, 0)))]
+        axes, joints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+        return Jacobians(_poses_first(axes, shape), _poses_first(joints, shape))
+
+    def joint_errors(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
+        """The error twist of each joint to first order, shape (..., n_joints, 6): [ex ey ez ea eb ec], mm and rad.
+
+        In its error axes, at its reference point, location errors included; the last joint is the spindle. Times
+        `jacobians(q).joints` it is `error(q)` up to terms of second order.
+        """
+        shape, poses = self._poses(q, state, self._model)
+        return _poses_first(linear.joint_errors(self.axes, self.tool, self._active, poses), shape)
+
+    def design(
+        self,
+        q: ArrayLike,
+        state: State = State(),  # noqa: B008
+        effects: Sequence[Effect] | None = None,
+    ) -> Array:
+        """The derivative of `error` by the coefficients at zero error, shape (..., 6, k).
+
+        The columns are those of the effects in turn, whatever their present coefficients; `effects` are those of the
+        machine if not given, and may be any others of its joints.
+        """
+        effects = self.effects if effects is None else tuple(effects)
+        model = compile_effects(self.axes, self.tool, [linear.switched_on(effect) for effect in effects])
+        shape, poses = self._poses(q, state, model)
+        return _poses_first(linear.design(self.axes, self.tool, effects, poses), shape)
+
+    @property
+    def _active(self) -> tuple[Effect, ...]:
+        return tuple(effect for effect in self.effects if effect.active)
+
+    def _poses(self, q: ArrayLike, state: State, model: ErrorModel | None) -> tuple[tuple[int, ...], Poses]:
+        """The common leading shape, and the poses with all the signals that the model needs."""
+        if model is None:
+            return flatten(q, state, self.axes, frozenset())
+        shape, poses = flatten(q, state, self.axes, model.inputs)
+        return shape, with_lags(poses, model.signals)
+
+    def _tip(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
+        def tips(part: Poses) -> Array:
+            start = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
+            tip: Array = carry(self._chain.at(part, model), start) - columns(self.workpiece_offset)
+            return tip
+
+        return self._evaluated(tips, q, state, model, 1)[..., 0]
+
+    def _pose(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
+        def poses(part: Poses) -> Array:
+            tip = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
+            axes = np.broadcast_to(POSE_COLUMNS, (3, 3, tip.shape[-1]))
+            start = np.concatenate([axes, tip], axis=1)
+            offset = columns(self.workpiece_offset) * POSE_WEIGHTS
+            return carry(self._chain.at(part, model), start, POSE_WEIGHTS) - offset
+
+        result = self._evaluated(poses, q, state, model, 4)
+        bottom = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*result.shape[:-2], 1, 4))
+        return np.concatenate([result, bottom], axis=-2)
+
+    def _evaluated(
+        self, function: Callable[[Poses], Array], q: ArrayLike, state: State, model: ErrorModel | None, width: int
+    ) -> Array:
+        """A function of poses that gives columns (3, width, n), over all poses: shape (..., 3, width)."""
+        shape, poses = self._poses(q, state, model)
+        out = np.empty((3, width, poses.positions.shape[1]))
+        for part, chunk in poses.chunks():
+            out[:, :, part] = function(chunk)
+        return _poses_first(out, shape)
+
+
+def _poses_first(values: Array, shape: tuple[int, ...]) -> Array:
+    """From (..., n) to (*shape, ...), contiguous."""
+    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape(*shape, *values.shape[:-1])
+    return first

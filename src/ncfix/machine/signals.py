@@ -1,0 +1,120 @@
+"""The signals that errors depend on: axis positions and state inputs in the file's units, and their lag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.machine.axis import Axis
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import Poses
+
+TIME = "time_s"
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One number per pose, made ready for a basis: u = (x - center) / scale, x held at the ends of the axis range.
+
+    name        axis letter or input
+    axis        index of the axis; None for a state input
+    unit        internal units per unit of x
+    low, high   where x is held
+    endless     x is an angle that may turn round and round
+    center, scale   of u
+    constant_s  time constant of a first-order lag; 0 for none
+    """
+
+    name: str
+    axis: int | None = None
+    unit: float = 1.0
+    low: float = -np.inf
+    high: float = np.inf
+    endless: bool = False
+    center: float = 0.0
+    scale: float = 1.0
+    constant_s: float = 0.0
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The state inputs that it is made of."""
+        names = {self.name} if self.axis is None else set()
+        return frozenset(names | {TIME} if self.constant_s else names)
+
+    @property
+    def lagged_name(self) -> str:
+        """Where its values after the lag are kept."""
+        return f"{self.name} after {self.constant_s!r} s"
+
+    def raw(self, poses: Poses) -> Array:
+        """x, not yet held, in the unit of the machine file."""
+        if self.axis is None:
+            return poses.inputs[self.name]
+        position: Array = poses.positions[self.axis] / self.unit
+        return position
+
+    def u(self, poses: Poses, domain: tuple[float, float]) -> Array:
+        """What the basis sees; `domain` is its range of u, into which an endless axis is turned back."""
+        x = poses.inputs[self.lagged_name] if self.constant_s else self.raw(poses)
+        if np.isfinite(self.low) or np.isfinite(self.high):
+            x = np.clip(x, self.low, self.high)
+        u = x if (self.center, self.scale) == (0.0, 1.0) else (x - self.center) / self.scale
+        if self.endless and np.isfinite(domain[0]):
+            return turned_back(u, domain, 360.0 / abs(self.scale))
+        return u
+
+
+def axis_signal(axes: tuple[Axis, ...], index: int) -> Signal:
+    """The position of an axis."""
+    axis = axes[index]
+    low, high = (limit / axis.unit for limit in axis.range)
+    return Signal(axis.name, index, axis.unit, low, high, axis.endless)
+
+
+def turned_back(u: Array, domain: tuple[float, float], turn: float) -> Array:
+    """Angles outside the domain moved by whole turns to start at its lower end."""
+    outside = (u < domain[0]) | (u > domain[1])
+    return np.where(outside, domain[0] + np.mod(u - domain[0], turn), u) if outside.any() else u
+
+
+def with_lags(poses: Poses, signals: Iterable[Signal]) -> Poses:
+    """The poses with the lagged signals worked out, over all of them at once and in order of time."""
+    late = {signal.lagged_name: signal for signal in signals if signal.constant_s}
+    if not late:
+        return poses
+    time_s = poses.inputs[TIME]
+    values = {name: lagged(signal.raw(poses), time_s, signal.constant_s) for name, signal in late.items()}
+    return replace(poses, inputs={**poses.inputs, **values})
+
+
+def lagged(values: Array, time_s: Array, constant_s: float) -> Array:
+    """A signal after a first-order lag, taken as straight between samples and as settled before the first one.
+
+    values, time_s  same shape; the samples may come in any order of time
+    constant_s      time constant, s
+
+    Between two samples a time step h apart, with e = exp(-h / constant), the lagged signal y follows
+    y1 = e y0 + x1 - e x0 - (x1 - x0) (1 - e) constant / h exactly.
+    """
+    order = np.argsort(time_s, axis=None, kind="stable")
+    x, t = values.ravel()[order], time_s.ravel()[order]
+    step = np.diff(t) / constant_s
+    decay = np.exp(-step)
+    mean = np.where(step > 1e-12, -np.expm1(-step) / np.where(step > 1e-12, step, 1.0), 1.0)
+    drive = x[1:] - decay * x[:-1] - np.diff(x) * mean
+    settled = np.empty_like(x)
+    settled[order] = _recursion(np.concatenate([[0.0], decay]), np.concatenate([x[:1], drive]))
+    return settled.reshape(values.shape)
+
+
+def _recursion(factor: Array, term: Array) -> Array:
+    """y[i] = factor[i] y[i-1] + term[i] for all i in log2(n) passes over the arrays."""
+    factor, term = factor.copy(), term.copy()
+    reach = 1
+    while reach < len(term):
+        term[reach:] = term[reach:] + factor[reach:] * term[:-reach]
+        factor[reach:] = factor[reach:] * factor[:-reach]
+        reach *= 2
+    return term

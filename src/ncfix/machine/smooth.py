@@ -1,0 +1,179 @@
+"""Smooth bases: constant, powers, harmonics; and the play of a reversing axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ncfix.machine.basis import Array, Basis, key
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Basis):
+    """One number, whatever the signal."""
+
+    name: ClassVar[str] = "constant"
+    title: ClassVar[str] = "one number, independent of position"
+    needs_signal: ClassVar[bool] = False
+
+    @property
+    def labels(self) -> tuple[str, ...]:  # noqa: D102
+        return ("1",)
+
+    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return np.ones((1, *np.shape(u)))
+
+    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return np.zeros((1, *np.shape(u)))
+
+    def feature(self, span: float) -> float:  # noqa: D102
+        return np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Polynomial(Basis):
+    """Powers of u."""
+
+    degree: tuple[int, ...] = key("integers", "which powers of u, one coefficient each")
+    name: ClassVar[str] = "polynomial"
+    title: ClassVar[str] = "powers of u = (x - center) / scale"
+
+    @property
+    def labels(self) -> tuple[str, ...]:  # noqa: D102
+        return tuple(f"u^{power}" for power in self.degree)
+
+    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return powers(u, self.degree)
+
+    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return _columns(self.degree, u) * powers(u, tuple(max(power - 1, 0) for power in self.degree))
+
+    def feature(self, span: float) -> float:  # noqa: D102
+        return span / (4 * max(self.degree)) if max(self.degree) else np.inf
+
+    @property
+    def family(self) -> tuple[object, ...]:  # noqa: D102
+        return (self.name,)
+
+    def merged(self, other: Self) -> Self:  # noqa: D102
+        return replace(self, degree=tuple(sorted({*self.degree, *other.degree})))
+
+    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+        return distinct("degree", self.degree, lowest=0)
+
+
+@dataclass(frozen=True, slots=True)
+class Backlash(Polynomial):
+    """Half the play that opens when the axis reverses: +1/2 when it comes moving up, -1/2 when it comes moving down."""
+
+    degree: tuple[int, ...] = key("integers", "which powers of u, one coefficient each", (0,))
+    name: ClassVar[str] = "backlash"
+    title: ClassVar[str] = "direction of motion (-1, 0 unknown, 1) times half the powers of u"
+
+    @property
+    def needs_direction(self) -> bool:  # noqa: D102
+        return True
+
+    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return 0.5 * direction * powers(u, self.degree)
+
+    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return 0.5 * direction * _columns(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
+
+
+@dataclass(frozen=True, slots=True)
+class Fourier(Basis):
+    """Harmonics of the turn of a rotary axis."""
+
+    order: tuple[int, ...] = key("integers", "harmonics, cos and sin of each in turn")
+    name: ClassVar[str] = "fourier"
+    title: ClassVar[str] = "cos and sin of k times the angle of a rotary axis, k in `order`"
+    rotary_only: ClassVar[bool] = True
+
+    @property
+    def turn(self) -> float:
+        """The u of one period."""
+        return 360.0
+
+    @property
+    def labels(self) -> tuple[str, ...]:  # noqa: D102
+        return tuple(f"{function} {k}" for k in self.order for function in ("cos", "sin"))
+
+    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        return _waves(u, self.order, self.turn)
+
+    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+        waves = _waves(u, self.order, self.turn)
+        rate = 2 * np.pi / self.turn * _columns(self.order, u)
+        slopes = np.empty_like(waves)
+        slopes[0::2], slopes[1::2] = -rate * waves[1::2], rate * waves[0::2]
+        return slopes
+
+    def feature(self, span: float) -> float:  # noqa: D102
+        return self.turn / (8 * max(self.order))
+
+    @property
+    def family(self) -> tuple[object, ...]:  # noqa: D102
+        return self.name, self.turn
+
+    def merged(self, other: Self) -> Self:  # noqa: D102
+        return replace(self, order=tuple(sorted({*self.order, *other.order})))
+
+    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+        return distinct("order", self.order, lowest=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Periodic(Fourier):
+    """Harmonics of a period: a screw's pitch, a scale's grating, a gear."""
+
+    period: float = key("number", "length of one period, mm or degree")
+    name: ClassVar[str] = "periodic"
+    title: ClassVar[str] = "cos and sin of 2 pi k u / period, k in `order`"
+    rotary_only: ClassVar[bool] = False
+
+    @property
+    def turn(self) -> float:
+        """The u of one period."""
+        return self.period
+
+    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+        wrong = [] if self.period > 0 else [("period", f"{self.period:g} is not a positive length")]
+        return wrong + distinct("order", self.order, lowest=1)
+
+
+def powers(u: Array, degree: tuple[int, ...]) -> Array:
+    """Powers of u by repeated multiplication, shape (...) -> (k, ...)."""
+    u = np.asarray(u, dtype=np.float64)
+    ladder = np.empty((max(degree) + 1, *u.shape))
+    ladder[0] = 1.0
+    for power in range(1, len(ladder)):
+        np.multiply(ladder[power - 1], u, out=ladder[power])
+    return ladder if degree == tuple(range(len(ladder))) else ladder[list(degree)]
+
+
+def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str, str]]:
+    """A complaint unless the values are given, distinct, and none below `lowest`."""
+    if not values:
+        return [(name, "is empty")]
+    if min(values) < lowest:
+        return [(name, f"{min(values)} is below {lowest}")]
+    if len(set(values)) < len(values):
+        return [(name, "names a value twice")]
+    return []
+
+
+def _columns(values: tuple[int, ...], u: Array) -> Array:
+    return np.asarray(values, dtype=np.float64).reshape(-1, *np.ones(np.ndim(u), dtype=int))
+
+
+def _waves(u: Array, order: tuple[int, ...], period: float) -> Array:
+    phase = (2 * np.pi / period) * np.asarray(u, dtype=np.float64) * _columns(order, u)
+    waves = np.empty((2 * len(order), *np.shape(u)))
+    waves[0::2], waves[1::2] = np.cos(phase), np.sin(phase)
+    return waves
+
+
+BASES: tuple[type[Basis], ...] = (Constant, Polynomial, Fourier, Periodic, Backlash)

@@ -1,0 +1,103 @@
+"""What an erroneous machine's error depends on besides its axis positions, and poses laid out for fast arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ncfix.diagnostics import UsageError
+from ncfix.machine.axis import Axis
+from ncfix.machine.se3 import Array
+
+CHUNK = 4096
+"""Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """The rest of the state. Everything broadcasts with the leading dimensions of the axis positions.
+
+    tool_length  mm, gauge line to tip, shape ()
+    direction    -1, 0 (unknown) or 1 per axis: the way in which it came to its position; shape (..., n_axes), or 0
+    inputs       other signals by name: `temp_spindle`, `time_s`, `load_kg`, ...; shape () each
+    """
+
+    tool_length: ArrayLike = 0.0
+    direction: ArrayLike = 0
+    inputs: Mapping[str, ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Poses:
+    """Poses with their leading dimensions flattened and their axes first: columns of n numbers.
+
+    positions    (n_axes, n) mm, rad
+    tool_length  (n,) or (1,) mm
+    direction    (n_axes, n) or (n_axes, 1)
+    inputs       name -> (n,)
+    """
+
+    positions: Array
+    tool_length: Array
+    direction: Array
+    inputs: Mapping[str, Array]
+
+    def chunks(self) -> Iterator[tuple[slice, Poses]]:
+        """The poses in runs of at most `CHUNK`."""
+        for start in range(0, self.positions.shape[1], CHUNK):
+            part = slice(start, start + CHUNK)
+            yield (
+                part,
+                Poses(
+                    self.positions[:, part],
+                    _part(self.tool_length, part),
+                    _part(self.direction, part),
+                    {name: values[part] for name, values in self.inputs.items()},
+                ),
+            )
+
+
+def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset[str]) -> tuple[tuple[int, ...], Poses]:
+    """The common leading shape, and the poses with the inputs called `names`.
+
+    Raises `UsageError` NCF340 if an input is missing and ValueError if the shapes do not fit.
+    """
+    q = np.asarray(q, dtype=np.float64)
+    if q.shape[-1:] != (len(axes),):
+        raise ValueError(f"axis positions have shape {q.shape}, expected (..., {len(axes)})")
+    length = np.asarray(state.tool_length, dtype=np.float64)
+    direction = np.asarray(state.direction, dtype=np.float64)
+    inputs = {name: _input(state, name) for name in sorted(names)}
+    parts = [q.shape[:-1], length.shape, direction.shape[:-1], *(values.shape for values in inputs.values())]
+    shape = np.broadcast_shapes(*parts)
+    columns = np.ascontiguousarray(np.broadcast_to(q, (*shape, len(axes))).reshape(-1, len(axes)).T)
+    flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in inputs.items()}
+    return shape, Poses(columns, _column(length, shape), _directions(direction, shape, len(axes)), flat)
+
+
+def _input(state: State, name: str) -> Array:
+    values = state.tool_length if name == "tool_length" else state.inputs.get(name)
+    if values is None:
+        raise UsageError.of(
+            "NCF340",
+            f"the machine's errors depend on {name!r}, which is not given",
+            hint=f"give a value for {name}: a column of the measurements, or State(inputs={{{name!r}: ...}})",
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+def _column(values: Array, shape: tuple[int, ...]) -> Array:
+    return values.reshape(1) if values.size == 1 else np.broadcast_to(values, shape).reshape(-1)
+
+
+def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
+    if values.ndim <= 1:
+        return np.array(np.broadcast_to(values, (n_axes,))).reshape(n_axes, 1)
+    return np.broadcast_to(values, (*shape, n_axes)).reshape(-1, n_axes).T
+
+
+def _part(values: Array, part: slice) -> Array:
+    return values if values.shape[-1] == 1 else values[..., part]

@@ -1,0 +1,49 @@
+"""How large the effects of a machine are over the travel of its axes: for people, not for correction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ncfix.machine.effect import Effect
+from ncfix.machine.error_model import signals_of
+from ncfix.machine.machine import Machine
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import State
+
+SAMPLES = 361
+"""Positions looked at along an axis."""
+
+
+def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
+    """Lowest and highest value of an effect over the travel, mm or rad.
+
+    None where that has no answer: it depends on a signal that is no axis, or on an axis without a range.
+    """
+    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+    if any(signal.axis is None for signal in signals):
+        return None
+    axes = sorted({signal.axis for signal in signals if signal.axis is not None})
+    q = _grid(machine, axes)
+    if not np.isfinite(q).all():
+        return None
+    alone = machine.replace(effects=(effect,))
+    joint = (*machine.axis_names, "S").index(effect.joint)
+    directions = (-1, 1) if effect.basis.needs_direction else (0,)
+    values = [alone.joint_errors(q, State(direction=way))[..., joint, effect.component] for way in directions]
+    return float(np.min(values)), float(np.max(values))
+
+
+def _grid(machine: Machine, axes: list[int]) -> Array:
+    """Positions over the travel of these axes, the others at zero, shape (n, n_axes)."""
+    columns = [_travel(machine, axis) for axis in axes]
+    places = np.stack([each.ravel() for each in np.meshgrid(*columns)], axis=-1) if columns else np.empty((1, 0))
+    q = np.zeros((len(places), len(machine.axes)))
+    q[:, axes] = places
+    return q
+
+
+def _travel(machine: Machine, axis: int) -> Array:
+    low, high = (0.0, 2 * np.pi) if machine.axes[axis].endless else machine.ranges[axis]
+    kinks = machine.breakpoints(machine.axis_names[axis])
+    inside = kinks[(kinks >= low) & (kinks <= high)]
+    return np.concatenate([np.linspace(low, high, SAMPLES), inside]) if np.isfinite(high - low) else np.array([np.nan])

@@ -1,0 +1,66 @@
+"""On which line of a TOML text a key stands: the standard reader does not say, messages should.
+
+Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys that stand at the start of a line are
+found; for others the line of the table that holds them is good enough.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+Path = tuple[str | int, ...]
+BARE = r"[A-Za-z0-9_-]+"
+KEY = rf"""(?:{BARE}|"[^"\n]*"|'[^'\n]*')"""
+DOTTED = rf"{KEY}(?:\s*\.\s*{KEY})*"
+HEADER = re.compile(rf"\s*(\[\[?)\s*({DOTTED})\s*\]")
+ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
+QUOTES = re.compile(r'"""|\'\'\'')
+
+
+def key_lines(text: str) -> Mapping[Path, int]:
+    """Path -> line, from 1, of every table header and every key that stands at the start of a line."""
+    lines: dict[Path, int] = {(): 1}
+    counts: dict[Path, int] = {}
+    table: Path = ()
+    quote = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if quote:
+            quote = "" if line.count(quote) % 2 else quote
+            continue
+        if header := HEADER.match(line):
+            table = _opened(_keys(header[2]), header[1] == "[[", counts)
+            lines.setdefault(table, number)
+        elif assignment := ASSIGNMENT.match(line):
+            lines.setdefault(table + _keys(assignment[1]), number)
+        quote = _still_open(line)
+    return lines
+
+
+def line_of(path: Path, lines: Mapping[Path, int]) -> int:
+    """The line of this key, or of the nearest table around it."""
+    while path not in lines:
+        path = path[:-1]
+    return lines[path]
+
+
+def _opened(keys: Path, repeated: bool, counts: dict[Path, int]) -> Path:
+    """The path of a table header; tables of an array are counted."""
+    path: Path = ()
+    for depth, name in enumerate(keys):
+        path = (*path, name)
+        if repeated and depth == len(keys) - 1:
+            counts[path] = counts.get(path, -1) + 1
+        if path in counts:
+            path = (*path, counts[path])
+    return path
+
+
+def _keys(dotted: str) -> Path:
+    return tuple(key.strip("\"'") for key in re.findall(KEY, dotted))
+
+
+def _still_open(line: str) -> str:
+    """The quotes of a many-line string that this line opens and does not close."""
+    found = QUOTES.findall(line)
+    return found[0] if len(found) % 2 else ""
