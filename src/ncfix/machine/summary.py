@@ -6,9 +6,10 @@ import numpy as np
 
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of
+from ncfix.machine.linear import functions
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
-from ncfix.machine.state import State
+from ncfix.machine.state import State, flatten
 
 SAMPLES = 361
 """Positions looked at along an axis."""
@@ -26,11 +27,14 @@ def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
     q = _grid(machine, axes)
     if not np.isfinite(q).all():
         return None
-    alone = machine.replace(effects=(effect,))
-    joint = (*machine.axis_names, "S").index(effect.joint)
-    directions = (-1, 1) if effect.basis.needs_direction else (0,)
-    values = [alone.joint_errors(q, State(direction=way))[..., joint, effect.component] for way in directions]
+    values = [_values(machine, effect, q, way) for way in ((-1, 1) if effect.basis.needs_direction else (0,))]
     return float(np.min(values)), float(np.max(values))
+
+
+def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
+    _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
+    found: Array = np.asarray(effect.coefficients) @ functions(machine.axes, effect, poses)
+    return found
 
 
 def _grid(machine: Machine, axes: list[int]) -> Array:

@@ -1,0 +1,150 @@
+"""`ncfix machine check|show FILE`: is a machine file in order, and what does it say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import json_option, load_machine
+
+if TYPE_CHECKING:
+    from ncfix.machine import Axis, Effect, Machine
+
+
+@click.group()
+def machine() -> None:
+    """Check or show a machine file."""
+
+
+@machine.command()
+@click.argument("file")
+@json_option
+def check(file: str, as_json: bool) -> None:
+    """Check that FILE describes a machine; every fault of the file is named."""
+    found = load_machine(file)
+    if as_json:
+        console.put_json(path=file, ok=True, name=found.name, hash=found.hash)
+    else:
+        console.say(f"{file}: {found.name}: in order, {len(found.axes)} axes, {len(found.effects)} effects")
+
+
+@machine.command()
+@click.argument("file")
+@json_option
+def show(file: str, as_json: bool) -> None:
+    """Print the chain from workpiece to tool, and the errors with their size over the travel."""
+    found = load_machine(file)
+    if as_json:
+        console.put_json(path=file, **_as_dict(found))
+    else:
+        console.put("\n".join(_page(found)) + "\n")
+
+
+def _as_dict(machine: Machine) -> dict[str, Any]:
+    return {
+        "name": machine.name,
+        "hash": machine.hash,
+        "topology": machine.topology,
+        "control": machine.control,
+        "axes": [
+            {
+                "name": axis.name,
+                "type": "rotary" if axis.rotary else "linear",
+                "carries": "workpiece" if axis.workpiece_side else "tool",
+                "direction": axis.direction,
+                "point": axis.point,
+                "range": [limit / axis.unit for limit in axis.range],
+            }
+            for axis in machine.axes
+        ],
+        "effects": [_effect_as_dict(machine, effect) for effect in machine.effects],
+        "provenance": machine.provenance,
+    }
+
+
+def _effect_as_dict(machine: Machine, effect: Effect) -> dict[str, Any]:
+    from ncfix.machine.summary import extent
+
+    found = extent(machine, effect)
+    return {
+        "name": effect.name,
+        "title": _title(machine, effect),
+        "axis": effect.joint,
+        "basis": effect.basis.name,
+        "depends_on": _depends_on(effect),
+        "coefficients": effect.coefficients,
+        "unit": "urad" if effect.rotational else "um",
+        "range": [value * 1e3 * (1e3 if effect.rotational else 1.0) for value in found] if found else None,
+    }
+
+
+def _page(machine: Machine) -> list[str]:
+    return [f"{machine.name}  ({machine.hash})", *_facts(machine), "", *_chain(machine), *_errors(machine)]
+
+
+def _facts(machine: Machine) -> list[str]:
+    degree = 180 / 3.141592653589793
+    pairs = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
+    facts = {name: f"{linear:g} mm, {rotary * degree:g} deg" for name, (linear, rotary) in pairs.items()}
+    facts = {"topology": machine.topology, "control": machine.control or "", **facts}
+    facts |= {name: str(value) for name, value in machine.provenance.items()}
+    return [f"{name + ':':<20}{value}" for name, value in facts.items() if value]
+
+
+def _chain(machine: Machine) -> list[str]:
+    """The joints as they follow one another."""
+    workpiece = [_axis(axis) for axis in machine.axes if axis.workpiece_side]
+    tool = [_axis(axis) for axis in machine.axes if not axis.workpiece_side]
+    end = f"tool        tip to spindle {_vector(machine.tool.direction)}, gauge line at {_vector(machine.tool.point)}"
+    return ["workpiece", *workpiece, "foundation", *tool, end]
+
+
+def _axis(axis: Axis) -> str:
+    if axis.rotary:
+        where = f"about {_vector(axis.direction)} through {_vector(axis.point)}"
+    else:
+        where = f"along {_vector(axis.direction)}"
+    low, high = (limit / axis.unit for limit in axis.range)
+    unit = "deg" if axis.rotary else "mm"
+    travel = f"{low:g} ... {high:g} {unit}" if high - low < float("inf") else "no limits"
+    return f"  {axis.name}  {'rotary' if axis.rotary else 'linear'}  {travel:<20}  {where}"
+
+
+def _errors(machine: Machine) -> list[str]:
+    if not machine.effects:
+        return ["", "no errors: a perfect machine"]
+    lines = []
+    for joint in (*machine.axis_names, "S"):
+        found = [effect for effect in machine.effects if effect.joint == joint]
+        if found:
+            lines += ["", f"errors of {joint}" if joint != "S" else "errors of the spindle"]
+            lines += [_effect(machine, effect) for effect in found]
+    return lines
+
+
+def _effect(machine: Machine, effect: Effect) -> str:
+    facts = _effect_as_dict(machine, effect)
+    if facts["range"] is None:
+        size = "size not known from the file"
+    else:
+        low, high = facts["range"]
+        size = f"{low:+.3g} {facts['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {facts['unit']}"
+    depends = f"{effect.basis.name} of {', '.join(facts['depends_on'])}" if facts["depends_on"] else "constant"
+    return f"  {effect.name:<5} {facts['title']:<44} {depends:<28} {size}"
+
+
+def _depends_on(effect: Effect) -> list[str]:
+    return [signal for signal in (effect.signal, effect.times) if signal is not None]
+
+
+def _title(machine: Machine, effect: Effect) -> str:
+    from ncfix.machine import catalogue
+
+    rotary = {axis.name: axis.rotary for axis in machine.axes}
+    return catalogue.title(effect.name, rotary.get(effect.joint))
+
+
+def _vector(vector: tuple[float, float, float]) -> str:
+    return f"({', '.join(f'{value:.6g}' for value in vector)})"

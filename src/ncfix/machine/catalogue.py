@@ -1,0 +1,83 @@
+"""What the names of error components mean: ISO 230-1, in words. docs/conventions.md has the frames and signs."""
+
+from __future__ import annotations
+
+from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
+
+LINEAR = "XYZ"
+TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
+"""Rotation letter -> the direction that it turns about."""
+
+
+def title(name: str, rotary: bool | None = None) -> str:
+    """What an ISO 230-1 component is, e.g. "straightness of X in Y".
+
+    `rotary` says of what kind the axis is; by default it goes by the letter: X Y Z U V W linear, others rotary.
+    """
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
+    component, zero, joint = match.groups()
+    if joint == SPINDLE:
+        return _spindle(component, bool(zero))
+    turns = rotary if rotary is not None else joint not in "XYZUVW"
+    if zero:
+        return _location(component, joint, turns)
+    return _rotary_motion(component, joint) if turns else _linear_motion(component, joint)
+
+
+def names(joints: str = "XYZABC" + SPINDLE) -> tuple[str, ...]:
+    """The components of these joints: error motions first, then location errors."""
+    return tuple(f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS)
+
+
+def squareness(name: str) -> str:
+    """What the location error of a linear axis does to the angle to the axis beside it, e.g. "X-Y is 90 deg + EC0Y".
+
+    Empty where the name is none of EB0X EC0X EA0Y EC0Y EA0Z EB0Z.
+    """
+    match = NAME.fullmatch(name)
+    if match is None or match[1] not in TURNS_ABOUT or not match[2] or match[3] not in LINEAR:
+        return ""
+    about, axis = TURNS_ABOUT[match[1]], match[3]
+    if about == axis:
+        return ""
+    (other,) = set(LINEAR) - {about, axis}
+    turns_towards_other = (LINEAR.index(axis) - LINEAR.index(about)) % 3 == 1
+    sign = "-" if turns_towards_other else "+"
+    return f"+{min(axis, other)} to +{max(axis, other)} is 90 deg {sign} {name}"
+
+
+def _linear_motion(component: str, joint: str) -> str:
+    if component == joint:
+        return f"positioning of {joint}"
+    if component in LINEAR:
+        return f"straightness of {joint} in {component}"
+    if TURNS_ABOUT[component] == joint:
+        return f"roll of {joint}"
+    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
+
+
+def _rotary_motion(component: str, joint: str) -> str:
+    about = TURNS_ABOUT.get(joint)
+    if component == joint:
+        return f"angular positioning of {joint}"
+    if component in LINEAR:
+        return f"{'axial' if component == about else 'radial'} motion of {joint} in {component}"
+    return f"tilt of {joint} about {TURNS_ABOUT[component]}"
+
+
+def _location(component: str, joint: str, rotary: bool) -> str:
+    if component == joint:
+        return f"zero offset of {joint}"
+    if component in LINEAR:
+        return f"offset of the {'axis line' if rotary else 'line'} of {joint} in {component}"
+    what = "tilt of the axis line" if rotary else "direction"
+    return f"{what} of {joint}, turned about {TURNS_ABOUT[component]}"
+
+
+def _spindle(component: str, location: bool) -> str:
+    what = "place" if location else "motion"
+    if component in LINEAR:
+        return f"{what} of the spindle in {component}"
+    return f"{'tilt' if location else 'tilt motion'} of the spindle about {TURNS_ABOUT[component]}"
