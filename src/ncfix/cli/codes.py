@@ -47,6 +47,11 @@ CODES = {
         "The program and the JSON object would both go to standard output.",
         "Write the program to a file with `-o FILE`.",
     ),
+    "NCF011": Code(
+        "two places for one output",
+        "`--in-place` puts the result where the program is, `-o` somewhere else.",
+        "Leave one of them out.",
+    ),
     "NCF012": Code(
         "interrupted",
         "The command was stopped with Ctrl-C. Outputs that were not complete are not there.",

@@ -62,7 +62,9 @@ class Target:
 
 
 def targets(sources: Sequence[str], output: str | None, in_place: bool, force: bool) -> list[Target]:
-    """Where each output goes; raises `UsageError` NCF003 ... NCF009 before anything is computed or written."""
+    """Where each output goes; raises `UsageError` NCF003 ... NCF011 before anything is computed or written."""
+    if in_place and output is not None:
+        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
     if in_place:
         found = [Target(source, source, in_place=True) for source in sources]
     else:
