@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import Dialect
+from ncfix.program.dialect import FOREIGN, Dialect
 
 LINUXCNC = Dialect(
     name="linuxcnc",
@@ -16,6 +16,8 @@ LINUXCNC = Dialect(
     ),
     line_limit=252,
     needs_end=True,
+    foreign=FOREIGN,
+    semantics="linuxcnc",
 )
 
 

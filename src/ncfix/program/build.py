@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -35,8 +36,8 @@ from ncfix.program.tree import (
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""
 
-MAX_DEPTH = 100
-"""How deep expressions may be nested; a control allows far less."""
+MAX_DEPTH = 150
+"""How deep expressions may be nested, or how many operators they may chain; a control allows less."""
 
 Branch = Tree[Token]
 Node = Branch | Token
@@ -113,7 +114,7 @@ class Builder:
 
     def anchor(self, place: int) -> Anchor:
         """A place in the block, counted from the last number before it."""
-        before = sum(stop <= place for stop in self.stops)
+        before = bisect_right(self.stops, place)
         return Anchor(before - 1, place - self.stops[before - 1]) if before else Anchor(START, place)
 
     def span(self, node: Node) -> Span:

@@ -4,6 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+FOREIGN: tuple[tuple[str, bytes], ...] = (
+    ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
+    ("Heidenhain DIN/ISO", rb"(?im)^[ \t]*%[ \t]*[\w.-]+[ \t]+G7[01][ \t]*(?:\*[ \t]*)?\r?$"),
+    ("Siemens SINUMERIK code", rb"(?im)^(?:%_N_|[ \t]*;\$PATH[ \t]*=)"),
+    (
+        "Siemens SINUMERIK code",
+        rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(?:DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|PROC[ \t]+\w"
+        rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
+    ),
+)
+"""Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
@@ -11,15 +23,18 @@ class Dialect:
 
     name                short name, as in `--dialect`
     title               for people
-    grammar             file name under `grammars/`
+    grammar             file name under `grammars/`, or the path of a plugin's own
     suffixes            file extensions that suggest it, lower case with the point
     signature           regular expressions (bytes) in a file that suggest it, strongest first
-    line_limit          characters a line may have; 0 = no limit
+    foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
+    line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
     closure_mm          an arc whose start and end radii differ by more is refused by the control
     closure_relative    the same relative to the radius (both must be exceeded)
     block_skip_executed blocks with `/` run unless the operator asks otherwise
     needs_end           the control wants M2/M30 or `%` at the end
+    semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
+                        refuses is an error) or "iso" (codes that cannot move anything are passed over)
     """
 
     name: str
@@ -27,9 +42,11 @@ class Dialect:
     grammar: str
     suffixes: tuple[str, ...]
     signature: tuple[bytes, ...] = ()
+    foreign: tuple[tuple[str, bytes], ...] = ()
     line_limit: int = 0
     comment: str = "({})"
     closure_mm: float = 0.0283
     closure_relative: float = 0.001
     block_skip_executed: bool = True
     needs_end: bool = False
+    semantics: str = "iso"

@@ -22,7 +22,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = (PACKAGE / "grammars", PACKAGE.parents[1] / "grammars")
 """Where grammars are: inside an installed package, and beside `src` in a source tree."""
 
-PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t\r]", re.DOTALL)
+PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t]", re.DOTALL)
 """What squeezing keeps: comments whole, and single characters that are not blank."""
 
 

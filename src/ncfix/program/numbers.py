@@ -26,8 +26,13 @@ def table(characters: bytes) -> NDArray[np.bool_]:
 
 NUMERIC = table(b"0123456789.")
 SIGN = table(b"+-")
-OPERAND_ENDS = table(b"0123456789.]>")
-"""After these a sign is an operator."""
+BLANK = table(b" \t")
+
+BLANKS = 3
+"""How many blanks the scan looks across, before a number or its sign."""
+
+UNSIGNED_AFTER = table(b"0123456789.]>Nn#")
+"""After these a sign does not belong to the number: it is an operator, or wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,7 @@ class Numbers:
 
     spans   (m, 2) start and stop byte, sign included
     values  (m,) NaN where `broken`
-    broken  (m,) more than one point, or no digit
+    broken  (m,) more than one point, no digit, or too large for a double
     """
 
     spans: NDArray[np.int64]
@@ -51,13 +56,28 @@ def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDA
     fixed    (256,) a run after one of these characters is no number but belongs to the shape
     """
     runs = runs_of(numeric)
-    before = text[np.maximum(runs[:, 0] - 1, 0)]
-    before[runs[:, 0] == 0] = 0
-    free = ~fixed[before]
-    runs, before = runs[free], before[free]
+    at = last_before(text, runs[:, 0])
+    free = ~fixed[at.characters]
+    runs, at = runs[free], Before(at.places[free], at.characters[free])
     values, broken = convert(text, runs)
-    spans, negative = with_sign(text, runs, before)
+    spans, negative = with_sign(text, runs, at)
     return Numbers(spans, np.where(negative, -values, values), broken)
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """The last character before each of some places that is no blank: where it is, and what; 0 at the text's start."""
+
+    places: NDArray[np.int64]
+    characters: NDArray[np.uint8]
+
+
+def last_before(text: NDArray[np.uint8], places: NDArray[np.int64]) -> Before:
+    """What stands before `places`, up to `BLANKS` blanks left out (a blank, if there are more)."""
+    at = places - 1
+    for _ in range(BLANKS):
+        at -= (at > 0) & BLANK[text[np.maximum(at, 0)]]
+    return Before(at, np.where(at >= 0, text[np.maximum(at, 0)], 0).astype(np.uint8))
 
 
 def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -67,14 +87,14 @@ def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def with_sign(
-    text: NDArray[np.uint8], runs: NDArray[np.int64], before: NDArray[np.uint8]
+    text: NDArray[np.uint8], runs: NDArray[np.int64], at: Before
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """The runs with the sign before them, if it is not an operator; and which are negative."""
-    further = np.where(runs[:, 0] > 1, text[np.maximum(runs[:, 0] - 2, 0)], 0)
-    signed = SIGN[before] & ~OPERAND_ENDS[further]
+    """The runs with the sign that stands before them, if it belongs to them; and which are negative."""
+    further = last_before(text, np.maximum(at.places, 0)).characters
+    signed = SIGN[at.characters] & ~UNSIGNED_AFTER[further]
     spans = runs.copy()
-    spans[:, 0] -= signed
-    return spans, signed & (before == ord("-"))
+    spans[:, 0] = np.where(signed, at.places, runs[:, 0])
+    return spans, signed & (at.characters == ord("-"))
 
 
 def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -101,4 +121,4 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     values[broken] = np.nan
     for long in np.flatnonzero(~small & ~broken):
         values[long] = float(text[slice(*runs[long])].tobytes())
-    return values, broken
+    return values, broken | np.isinf(values)

@@ -1,136 +1,252 @@
 """From bytes to a `Program`: two lanes, one grammar.
 
 The grammar decides what a block means. A block's shape is parsed once, and its template is then used for every block
-of that shape, with the numbers that the scan found. Where the scan and the grammar do not see the same numbers the
+of that shape, with the numbers that the scan found. Where the scan and the grammar do not see the same numbers, the
 block's own text is its shape, and its numbers are the grammar's.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
-from lark import UnexpectedInput
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program import dialects
-from ncfix.program.build import Parsed, TooDeepError, build
+from ncfix.program.build import Parsed
+from ncfix.program.content import check_content, header_length
 from ncfix.program.dialect import Dialect
-from ncfix.program.faults import BlockError, explain
-from ncfix.program.grammar import parse, squeeze
-from ncfix.program.shapes import Scan, scan, split_blocks
-from ncfix.program.tree import Program, Template
+from ncfix.program.faults import BlockError
+from ncfix.program.reach import UNREAD, Reach
+from ncfix.program.shapes import COMMENT, Scan, scan, split_blocks
+from ncfix.program.templates import parse_block, shapes_of, texts_of
+from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
+
+PART_BYTES = 1 << 20
+"""How much text is scanned at once: the columns of a scan take about a hundred times as much."""
+
+SHOWN_CHARACTERS = 300
+"""How much of a line a message shows."""
+
+WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
+
+
+def opaque_block(kind: str) -> Parsed:
+    """A block that is passed through whole."""
+    return Parsed(Template((Opaque(kind, WHOLE_BLOCK),), 0), (), (), -1)
+
+
+ONE_UNSCANNED = Scan([None], np.array([-1]), np.array([0, 0]), np.empty((0, 2), np.int64), np.empty(0))
+"""A part of one block that was not looked at."""
+
+AFTER_TAPE = opaque_block("after the end of the tape")
+NOT_READ = opaque_block(UNREAD)
 
 
 def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None = None) -> Program:
     """Read an NC program; `dialect` is found from content and suffix if it is not given.
 
-    Raises SourceError NCF1xx with the first line that cannot be read, UsageError NCF104 for an unknown dialect.
+    Raises SourceError NCF101 to NCF103 if the bytes are no program of that kind, NCF105 to NCF119 with the first line
+    that cannot be read, and UsageError NCF104 for an unknown dialect.
     """
     chosen = dialects.detect(source, path) if dialect is None else dialect
     language = dialects.get(chosen) if isinstance(chosen, str) else chosen
+    check_content(source, path, language)
     blocks = split_blocks(source)
-    reading = Reading(source, path, language, blocks, scan(source, blocks))
-    return reading.program()
+    blocks[0, 0] = header_length(source)
+    return Reading(source, path, language, blocks, tape_end(source, blocks)).program()
 
 
-def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block, by the grammar alone; raises `BlockError`."""
-    squeezed = squeeze(text)
+def unread_error(program: Program, block: int) -> SourceError:
+    """Why an `Opaque` block of the kind `reach.UNREAD` could not be read: for whoever gets to it after all."""
+    text = program.text_of(block)
     try:
-        return build(parse(dialect, squeezed.code), text, squeezed)
-    except UnexpectedInput as error:
-        raise explain(error, text, squeezed) from None
-    except TooDeepError:
-        raise BlockError("NCF118", "the expression is nested too deep", 0) from None
+        check_length(program.dialect, len(text))
+        parse_block(program.dialect, text)
+    except BlockError as fault:
+        return source_error(program.path, block, text, fault)
+    raise AssertionError(f"block {block} of {program.path} can be read")
 
 
-_CACHE: dict[tuple[str, bytes], Parsed] = {}
+def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
+    """A fault of a block as an error with its place."""
+    shown = text[:SHOWN_CHARACTERS] if fault.place < SHOWN_CHARACTERS else ""
+    return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, shown), fault.hint)
+
+
+def check_length(dialect: Dialect, length: int) -> None:
+    """Refuse a line that is longer than the control's buffer."""
+    if dialect.line_limit and length > dialect.line_limit:
+        text = f"the line has {length} characters; {dialect.title} takes {dialect.line_limit}"
+        raise BlockError("NCF105", text, dialect.line_limit, "break the line or shorten its comment")
+
+
+def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
+    """The block with the `%` that ends the tape; the number of blocks if there is none.
+
+    It is the first `%` alone on its line that has something before it. A `%` after nothing but blank lines and
+    comments starts the tape.
+    """
+    text = np.frombuffer(source, dtype=np.uint8)
+    for block in np.unique(np.searchsorted(blocks[:, 0], np.flatnonzero(text == ord("%")), side="right") - 1):
+        start, stop = blocks[block]
+        if source[start:stop].strip() == b"%" and COMMENT.sub(b"", source[blocks[0, 0] : start]).strip():
+            return int(block)
+    return len(blocks)
+
+
+class Columns(NamedTuple):
+    """The columns of a part of a program: how many numbers each block has; spans and values of these."""
+
+    counts: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    values: NDArray[np.float64]
 
 
 @dataclass(slots=True)
 class Reading:
-    """One program while it is being read."""
+    """One program while it is being read, part by part.
+
+    tape_end   the block that ends the tape
+    templates  the templates found so far
+    index      shape -> its template; for a block without a shape, its text and a line feed
+    rows       the template of each block so far
+    reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
+    """
 
     source: bytes
     path: str
     dialect: Dialect
     blocks: NDArray[np.int64]
-    scan: Scan
+    tape_end: int
     templates: list[Template] = field(default_factory=list)
-    index: dict[bytes, int] = field(default_factory=dict)
-    exact: dict[int, Parsed] = field(default_factory=dict)
+    index: dict[bytes | None, int] = field(default_factory=dict)
+    rows: list[int] = field(default_factory=list)
+    reach: Reach = field(default_factory=Reach)
+    followed: int = 0
 
     def program(self) -> Program:
-        """Read all blocks."""
-        template = [self.index.get(key, -1) if key else -1 for key in self.scan.shapes]
-        for block, shape in enumerate(self.scan.shapes):
-            template[block] = self.index.get(shape, -1) if shape is not None else -1
-            if template[block] < 0:
-                template[block] = self.learn(block, shape)
-        first, spans, values = self.columns()
+        """Read all parts, then what follows the end of the tape."""
+        parts = [self.part(first, stop) for first, stop in self.parts()]
+        parts.append(self.tail())
+        counts, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
         return Program(
-            self.source,
-            self.path,
-            self.dialect,
-            tuple(self.templates),
-            np.array(template, dtype=np.int32),
-            self.blocks,
-            first,
-            spans,
-            values,
+            source=self.source,
+            path=self.path,
+            dialect=self.dialect,
+            templates=tuple(self.templates),
+            template=np.array(self.rows, dtype=np.int32),
+            blocks=self.blocks,
+            first_number=np.concatenate(([0], np.cumsum(counts))),
+            number_spans=spans,
+            numbers=values,
         )
 
-    def learn(self, block: int, shape: bytes | None) -> int:
-        """The template of a block that is the first of its shape, or whose shape has to be its text."""
-        start, stop = self.blocks[block]
+    def parts(self) -> Iterator[tuple[int, int]]:
+        """First block and the one after the last of each part; a very long line is a part of its own."""
+        first, end = 0, min(self.tape_end + 1, len(self.blocks))
+        while first < end:
+            limit = self.blocks[first, 0] + PART_BYTES
+            stop = max(int(np.searchsorted(self.blocks[:end, 1], limit, side="right")), first + 1)
+            yield first, stop
+            first = stop
+
+    def part(self, first: int, stop: int) -> Columns:
+        """Read the blocks from `first` up to `stop`."""
+        found = self.scan(first, stop)
+        exact: dict[int, Parsed] = {}
+        for row, shape in enumerate(found.shapes):
+            known = self.index.get(shape)
+            self.rows.append(self.learn(first, row, found, exact) if known is None else known)
+        counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
+        return Columns(counts, spans + self.blocks[first, 0], values)
+
+    def tail(self) -> Columns:
+        """The blocks after the end of the tape."""
+        count = len(self.blocks) - len(self.rows)
+        if count:
+            self.rows += [self.number(b"\n", AFTER_TAPE.template)] * count
+        return Columns(np.zeros(count, np.int64), np.empty((0, 2), np.int64), np.empty(0))
+
+    def scan(self, first: int, stop: int) -> Scan:
+        """The shapes and numbers of a part; a line that is too long has no shape."""
+        blocks = self.blocks[first:stop]
+        start, end = blocks[0, 0], blocks[-1, 1]
+        lengths = blocks[:, 1] - blocks[:, 0]
+        limit = self.dialect.line_limit
+        if limit and len(blocks) == 1 and lengths[0] > limit:
+            return ONE_UNSCANNED
+        found = scan(self.source[start:end], blocks - start)
+        for row in np.flatnonzero(lengths > limit) if limit else ():
+            found.shapes[row] = None
+        return found
+
+    def learn(self, first: int, row: int, found: Scan, exact: dict[int, Parsed]) -> int:
+        """The template of a block that is the first of its shape here, or that has to be taken as it is."""
+        shape = found.shapes[row]
+        known = shapes_of(self.dialect).recall(shape) if shape is not None else None
+        if shape is not None and known is not None:
+            return self.number(shape, known)
+        start, stop = self.blocks[first + row]
         text = self.source[start:stop]
-        parsed = self.parsed(block, text)
-        key = text + b"\n"
-        if shape is not None and self.agrees(block, parsed):
-            key = shape
-        else:
-            self.exact[block] = parsed
+        parsed = self.parsed(first + row, text)
+        if shape is not None and agrees(found, row, parsed, start - self.blocks[first, 0]):
+            shapes_of(self.dialect).keep(shape, parsed.template)
+            return self.number(shape, parsed.template)
+        exact[row] = parsed
+        return self.number(b"\n\n" if parsed is NOT_READ else text + b"\n", parsed.template)
+
+    def number(self, key: bytes, template: Template) -> int:
+        """The index of a template, which is known by `key` from now on."""
         if key not in self.index:
             self.index[key] = len(self.templates)
-            self.templates.append(parsed.template)
+            self.templates.append(template)
         return self.index[key]
 
     def parsed(self, block: int, text: bytes) -> Parsed:
-        """One block by the grammar; raises SourceError."""
-        known = _CACHE.get((self.dialect.name, text))
+        """One block by the grammar; raises SourceError, unless the control may never get there."""
+        known = texts_of(self.dialect).recall(text)
         if known is not None:
             return known
         try:
+            check_length(self.dialect, len(text))
             parsed = parse_block(self.dialect, text.decode("latin-1"))
         except BlockError as fault:
-            place = Place(self.path, block + 1, fault.place + 1, text.decode("latin-1"))
-            raise SourceError.of(fault.code, fault.text, place, fault.hint) from None
-        _CACHE[self.dialect.name, text] = parsed
+            if self.in_doubt(block):
+                return NOT_READ
+            raise source_error(self.path, block, text.decode("latin-1"), fault) from None
+        texts_of(self.dialect).keep(text, parsed)
         return parsed
 
-    def agrees(self, block: int, parsed: Parsed) -> bool:
-        """Whether the scan saw the same numbers, and the same comment at the end, as the grammar."""
-        numbers = slice(*self.scan.first_number[block : block + 2])
-        start = self.blocks[block, 0]
-        spans = self.scan.spans[numbers] - start
-        comment = max(self.scan.comment[block] - start, -1)
-        return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
+    def in_doubt(self, block: int) -> bool:
+        """Whether the control may never get to a block."""
+        for row in self.rows[self.followed : block]:
+            self.reach.follow(self.templates[row])
+        self.followed = block
+        return self.reach.in_doubt
 
-    def columns(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-        """first_number, number_spans and numbers, with those of the exact blocks in their places."""
-        first, spans, values = self.scan.first_number, self.scan.spans, self.scan.values
-        if not self.exact:
-            return first, spans, values
-        counts = np.diff(first)
-        owner = np.repeat(np.arange(len(counts)), counts)
-        keep = ~np.isin(owner, list(self.exact))
-        parts = [(owner[keep], spans[keep], values[keep])]
-        for block, parsed in self.exact.items():
-            own = np.reshape(np.array(parsed.spans, dtype=np.int64), (-1, 2)) + self.blocks[block, 0]
-            parts.append((np.full(len(own), block), own, np.array(parsed.values)))
-        owner, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
-        order = np.argsort(owner, kind="stable")
-        first = np.searchsorted(owner[order], np.arange(len(counts) + 1))
-        return first, spans[order], values[order]
+
+def agrees(found: Scan, row: int, parsed: Parsed, start: int) -> bool:
+    """Whether the scan saw the same numbers, and the same comment at the end of the block, as the grammar."""
+    spans = found.spans[found.first_number[row] : found.first_number[row + 1]] - start
+    comment = max(found.comment[row] - start, -1)
+    return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
+
+
+def with_exact(found: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
+    """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
+    counts = np.diff(found.first_number)
+    if not exact:
+        return Columns(counts, found.spans, found.values)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    keep = ~np.isin(owner, list(exact))
+    parts = [(owner[keep], found.spans[keep], found.values[keep])]
+    for row, parsed in exact.items():
+        spans = np.array(parsed.spans, dtype=np.int64).reshape(-1, 2) + starts[row]
+        parts.append((np.full(len(spans), row), spans, np.array(parsed.values)))
+    owner, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order = np.argsort(owner, kind="stable")
+    return Columns(np.bincount(owner, minlength=len(counts)), spans[order], values[order])

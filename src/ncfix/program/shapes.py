@@ -22,6 +22,9 @@ MARKS = table(bytes([NUMBER_MARK, COMMENT_MARK]))
 FIXED = table(b"GgMmOo")
 """A number after these belongs to the shape: what it selects has a meaning of its own."""
 
+MAX_RETURNS = 2
+"""How many carriage returns before a line feed belong to the line end."""
+
 COMMENT = re.compile(rb"(?:\([^()\r\n]*\)|;[^\r\n]*)(?P<last>(?=[ \t]*(?:[\r\n]|\Z)))?")
 """A comment; group `last` takes part if nothing but blanks follows on the line."""
 
@@ -47,7 +50,8 @@ class Scan:
 def split_blocks(source: bytes) -> NDArray[np.int64]:
     """Start and stop byte of each line, shape (n, 2), line ends not included.
 
-    A line ends with LF or CR LF; with CR alone only in a text that has no LF. Text after the last line end is a line.
+    A line ends with LF, CR LF, or CR CR LF (which some transfers leave); with CR alone only in a text
+    that has no LF. Text after the last line end is a line.
     """
     text = np.frombuffer(source, dtype=np.uint8)
     ends = np.flatnonzero(text == ord("\n"))
@@ -57,8 +61,9 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
     stops = np.concatenate((ends, [len(text)]))
     if starts[-1] == len(text):
         starts, stops = starts[:-1], stops[:-1]
-    crlf = (stops > starts) & (text[np.maximum(stops - 1, 0)] == ord("\r")) if len(text) else np.zeros(0, dtype=bool)
-    return np.stack((starts, stops - crlf), axis=1)
+    for _ in range(MAX_RETURNS):
+        stops = stops - ((stops > starts) & (text[np.maximum(stops - 1, 0)] == ord("\r")))
+    return np.stack((starts, stops), axis=1)
 
 
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:

@@ -1,0 +1,42 @@
+"""Whether bytes are an NC program at all, before anyone tries to read them."""
+
+from __future__ import annotations
+
+import re
+
+from ncfix.diagnostics import Place, SourceError
+from ncfix.program.dialect import Dialect
+
+UTF8_MARK = b"\xef\xbb\xbf"
+UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+PROBE_BYTES = 1 << 16
+"""How much of a text is looked at to find out what it is."""
+
+
+def check_content(source: bytes, path: str, dialect: Dialect) -> None:
+    """Refuse what is not text (NCF101), holds nothing (NCF102), or is another family's language (NCF103)."""
+    if source.startswith(UTF16_MARKS):
+        raise SourceError.of("NCF101", "the text is UTF-16", Place(path, 1), "save it as ASCII, Latin-1 or UTF-8")
+    zero = source.find(b"\0")
+    if zero >= 0:
+        raise SourceError.of("NCF101", "there is a zero byte in the file", place_of(source, zero, path))
+    if not source.removeprefix(UTF8_MARK).strip():
+        raise SourceError.of("NCF102", "there is no block in the program", Place(path))
+    for family, pattern in dialect.foreign:
+        if found := re.search(pattern, source[:PROBE_BYTES]):
+            text = f"this is {family}, not {dialect.title}"
+            raise SourceError.of("NCF103", text, place_of(source, found.start(), path, "utf-8"), "see `ncfix dialects`")
+
+
+def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:
+    """The line and column of a byte, with the line's text if an encoding is given."""
+    line = source.count(b"\n", 0, byte) + 1
+    start = source.rfind(b"\n", 0, byte) + 1
+    text = source[start:].split(b"\n", 1)[0].rstrip().decode(encoding, "replace") if encoding else ""
+    return Place(path, line, byte - start + 1, text)
+
+
+def header_length(source: bytes) -> int:
+    """How many bytes stand before the first block: the mark of UTF-8, if it is there."""
+    return len(UTF8_MARK) if source.startswith(UTF8_MARK) else 0
