@@ -1,0 +1,106 @@
+"""All canonical calls that are no motions: same order, same words, at the same place among the motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+
+from differential.canon import Canon
+from differential.canon_text import Call
+from differential.segment import Fate, Segments
+
+STAMP = "ncfix"
+OFFSETS = {"SET_G92_OFFSET", "SET_G5X_OFFSET"}
+FEED_SLACK = 2e-3
+"""Relative: an F of inverse time is written with few digits, and a corrected block is a little longer or shorter."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A call and the number of original motions that are done before it; `inside`: while one is under way."""
+
+    call: Call
+    after: int
+    inside: bool
+
+
+def compare(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
+    """(line, complaint) for every difference, at most three of each kind."""
+    yield from list(_other_calls(original, fixed, segments))[:3]
+    yield from list(_feeds(original, fixed, segments))[:3]
+
+
+def _other_calls(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
+    before = [_Place(call, call.after, False) for call in original.calls if _counts(call)]
+    after = [_placed(call, segments) for call in fixed.calls if _counts(call)]
+    for one, two in zip_longest(before, after):
+        place = (one or two).after  # type: ignore[union-attr]
+        line = int(original.line[min(place, len(original) - 1)]) if len(original) else 0
+        if one is None or two is None:
+            known, found = (one or two), "missing" if two is None else "new"
+            yield line, f"{found} call {known.call.name}({known.call.arguments})"  # type: ignore[union-attr]
+            return
+        if (one.call.name, one.after) != (two.call.name, two.after) or two.inside:
+            yield line, f"{one.call.name} after {one.after} motions became {two.call.name} after {two.after}"
+            return
+        if not _same_arguments(one.call, two.call, original, fixed):
+            yield line, f"{one.call.name}({one.call.arguments}) became ({two.call.arguments})"
+
+
+def _counts(call: Call) -> bool:
+    """Feeds are compared motion by motion; the stamp is the one comment that may be new."""
+    return call.name != "SET_FEED_RATE" and not (call.name == "COMMENT" and STAMP in call.arguments.lower())
+
+
+def _placed(call: Call, segments: Segments) -> _Place:
+    done = int(np.searchsorted(segments.last, call.after, side="left"))
+    inside = done < len(segments.first) and segments.first[done] < call.after <= segments.last[done]
+    return _Place(call, done, bool(inside))
+
+
+def _same_arguments(one: Call, two: Call, original: Canon, fixed: Canon) -> bool:
+    """Offsets that are set from the current position follow the corrected position; all else is equal."""
+    if one.arguments == two.arguments:
+        return True
+    if one.name not in OFFSETS or one.after == 0 or two.after == 0:
+        return False
+    moved = np.abs(fixed.end[two.after - 1] - original.end[one.after - 1]).max() * np.sqrt(2)
+    first, second = (np.array([float(value) for value in call.arguments.split(",")]) for call in (one, two))
+    return bool(np.all(np.abs(first - second) <= moved + 3e-3))
+
+
+def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
+    """Each piece runs at the feed of its motion; with inverse time to the accuracy of its F and its length."""
+    wanted, given, inverse = _feed_of(original)[0], *_feed_of(fixed)
+    for k, (first, last) in enumerate(zip(segments.first, segments.last, strict=True)):
+        if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or not original.kind[k]:
+            continue
+        for j in range(first, last + 1):
+            slack = _inverse_slack(fixed, j) if inverse[j] else 1e-9
+            if abs(given[j] - wanted[k]) > slack * max(abs(wanted[k]), 1e-9) + 1e-4:
+                yield int(original.line[k]), f"feed {wanted[k]:g} became {given[j]:g}"
+                break
+
+
+def _inverse_slack(fixed: Canon, j: int) -> float:
+    length = float(np.linalg.norm(fixed.end[j] - fixed.start[j]))
+    return FEED_SLACK + 0.2 / max(length, 1e-3)
+
+
+def _feed_of(canon: Canon) -> tuple[list[float], list[bool]]:
+    """The feed and whether it is inverse time, for every motion."""
+    feed, inverse, position = 0.0, False, 0
+    feeds: list[float] = []
+    modes: list[bool] = []
+    for call in (*canon.calls, Call("END", "", len(canon))):
+        feeds += [feed] * (call.after - position)
+        modes += [inverse] * (call.after - position)
+        position = call.after
+        if call.name == "SET_FEED_RATE":
+            feed = float(call.arguments)
+        elif call.name == "COMMENT" and "feed mode set to" in call.arguments:
+            inverse = "inverse time" in call.arguments
+    return feeds, modes

@@ -1,0 +1,293 @@
+"""The verdict on a corrected program: does the machine with errors now do what the original meant?
+
+The control's canonical motions of both programs are compared in machine axes. A corrected command is first replaced
+by the command with which a perfect machine would have its tip there (`Machine.embedded`), so what is left to compare
+are two paths of a perfect machine. Ends of motions must agree to half an output step in every axis of the program,
+the tip along the way to the tolerance plus that rounding, motions that may not be touched exactly, and every other
+canonical call must come in the same place with the same words.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from differential import calls, paths
+from differential.canon import ARC, FEED, RAPID, Canon
+from differential.errors import Machine
+from differential.segment import Fate, Segments, match
+
+Floats = NDArray[np.float64]
+
+FLOAT_SLACK = 2e-5
+"""mm: two exact models differ by their order of composing small rotations, 2e-4 rad squared times 500 mm."""
+DENSE = (0.125, 0.25, 0.5, 0.75, 0.9)
+MOST_DENSE = 4000  # motions of a file that are looked at along their whole length, evenly spread
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What the judge holds a corrected program to.
+
+    tolerance    mm, of the tip along feeds and arcs
+    step         mm, output step of linear words; rotary_step in degrees
+    refused      lines that the product says it left as they were, with its reason
+    passed       line -> True if a motion of that line must not be touched
+    rapids       hold rapids to the tolerance along their way too
+    rotary       the strategy moves rotary axes: their ends are free by so many degrees
+    tool_length  tool number -> mm
+    """
+
+    tolerance: float = 1e-3
+    step: float = 1e-3
+    rotary_step: float = 1e-3
+    refused: Mapping[int, str] = field(default_factory=dict)
+    passed: Callable[[int], bool] = lambda line: False
+    rapids: bool = False
+    rotary: float = 0.0
+    tool_length: Mapping[int, float] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Verdict:
+    """Counts of original motions by fate, the worst distances in mm with their lines, and every complaint."""
+
+    motions: int = 0
+    compensated: int = 0
+    passed: int = 0
+    refused: int = 0
+    reasons: Counter[str] = field(default_factory=Counter)
+    worst: dict[str, tuple[float, int]] = field(default_factory=dict)
+    complaints: list[str] = field(default_factory=list)
+
+    @property
+    def right(self) -> bool:
+        """Nothing to complain about."""
+        return not self.complaints
+
+    def note(self, what: str, distance: Floats, allowed: Floats, lines: NDArray[np.int64]) -> None:
+        """Keep the worst, and complain of what is more than allowed (the first three of a kind)."""
+        if not distance.size:
+            return
+        at = int(np.argmax(distance))
+        if distance[at] >= self.worst.get(what, (-1.0, 0))[0]:
+            self.worst[what] = (float(distance[at]), int(lines[at]))
+        for row in np.flatnonzero(~(distance <= allowed))[:3]:
+            self.complain(int(lines[row]), f"{what}: {distance[row] * 1e3:.3f} um, allowed {allowed[row] * 1e3:.3f}")
+
+    def complain(self, line: int, text: str) -> None:
+        """One more complaint."""
+        self.complaints.append(f"line {line}: {text}")
+
+    def __str__(self) -> str:
+        figures = ", ".join(f"{what} {value * 1e3:.3f} um (line {at})" for what, (value, at) in self.worst.items())
+        counts = f"{self.motions} motions: {self.compensated} compensated, {self.passed} passed, {self.refused} refused"
+        return "\n".join([f"{counts}; {figures}", *self.complaints[:10]])
+
+
+def judge(original: Canon, fixed: Canon, machine: Machine, terms: Terms | None = None) -> Verdict:
+    """Compare a corrected program with the original, both as the control runs them."""
+    return _Judge(original, fixed, machine, terms or Terms()).run()
+
+
+class _Judge:
+    def __init__(self, original: Canon, fixed: Canon, machine: Machine, terms: Terms) -> None:
+        self.original, self.fixed, self.machine, self.terms = original, fixed, machine, terms
+        self.verdict = Verdict(motions=len(original))
+        self.printed = 0.0 if original.exact and fixed.exact else 3e-3
+        self.half = terms.step / 2 + FLOAT_SLACK + self.printed
+        self.length = _lengths(fixed, terms)
+
+    def run(self) -> Verdict:
+        if not (self.original.accepted and self.fixed.accepted):
+            self.verdict.complain(0, f"the control refuses: {self.original.error or self.fixed.error}")
+            return self.verdict
+        near = 2 * self.half
+        segments, self.seen = match(
+            self.original, self.fixed, self.machine, self.length, near, max(near, self.terms.rotary)
+        )
+        for k, text in segments.complaints:
+            self.verdict.complain(int(self.original.line[k]), text)
+        self.started = self.machine.embedded(self.fixed.start, self.length) if len(self.fixed) else self.seen
+        self.count(segments)
+        self.ends(segments)
+        self.along(segments)
+        self.cycles(segments)
+        for line, text in calls.compare(self.original, self.fixed, segments):
+            self.verdict.complain(line, text)
+        return self.verdict
+
+    # -- what became of the motions -----------------------------------------------------------------------------------
+
+    def count(self, segments: Segments) -> None:
+        """Every motion is compensated, passed by rule, or refused and said to be."""
+        fates = Counter(segments.fate.tolist())
+        self.verdict.compensated = fates[Fate.COMPENSATED] + fates[Fate.CYCLE] + fates[Fate.CONTOUR]
+        for k in np.flatnonzero(segments.fate == Fate.UNCHANGED):
+            line = int(self.original.line[k])
+            if self.terms.passed(line):
+                self.verdict.passed += 1
+            elif line in self.terms.refused:
+                self.verdict.refused += 1
+                self.verdict.reasons[self.terms.refused[line]] += 1
+            else:
+                self.verdict.complain(line, f"left uncorrected in silence ({self.miss(segments, k):.1f} um off)")
+        for k in np.flatnonzero(segments.fate == Fate.COMPENSATED):
+            line = int(self.original.line[k])
+            if self.terms.passed(line) and self.moved(segments, k):
+                self.verdict.complain(line, "a motion that is passed by rule was corrected")
+
+    def miss(self, segments: Segments, k: int) -> float:
+        return float(np.abs(self.seen[segments.last[k]] - self.original.end[k])[:3].max()) * 1e3
+
+    def moved(self, segments: Segments, k: int) -> bool:
+        return bool(np.any(np.abs(self.fixed.end[segments.last[k]] - self.original.end[k]) > 1e-6 + self.printed))
+
+    # -- ends ---------------------------------------------------------------------------------------------------------
+
+    def ends(self, segments: Segments) -> None:
+        """Half a step at the ends of lines, tolerance plus half a step at those of arcs, in the program's axes."""
+        done = np.flatnonzero(segments.fate == Fate.COMPENSATED)
+        last = segments.last[done]
+        off = np.abs(_turn_back(self.seen[last] - self.original.end[done], self.original.rotation[done]))
+        arc = (self.original.kind[done] == ARC) | (self.fixed.kind[last] == ARC)
+        linear = off[:, self.machine.linear].max(axis=1, initial=0.0)
+        lines = self.original.line[done]
+        if not self.terms.rotary:
+            self.verdict.note("line ends", linear[~arc], np.full(int((~arc).sum()), self.half), lines[~arc])
+            allowed = np.full(int(arc.sum()), self.half + self.terms.tolerance)
+            self.verdict.note("arc ends", linear[arc], allowed, lines[arc])
+        free = np.full(len(done), self.terms.rotary + 1e-9 + self.printed)
+        rotary = off[:, self.machine.rotary].max(axis=1, initial=0.0)
+        self.verdict.note("rotary ends (degree)", rotary, free, lines)
+
+    # -- along the way ------------------------------------------------------------------------------------------------
+
+    def along(self, segments: Segments) -> None:
+        """The tip along every piece of a sample of the compensated motions."""
+        kinds = (FEED, ARC, RAPID) if self.terms.rapids else (FEED, ARC)
+        chosen = np.flatnonzero((segments.fate == Fate.COMPENSATED) & np.isin(self.original.kind, kinds))
+        chosen = chosen[:: max(1, len(chosen) // MOST_DENSE)]
+        owner = segments.owner(len(self.fixed))
+        pieces = np.flatnonzero(np.isin(owner, chosen))
+        if not pieces.size:
+            return
+        of = owner[pieces]
+        entry, exit_ = self.fractions(segments, pieces, of)
+        for u in DENSE:
+            self.sample("along the way", segments, pieces, of, u, entry, exit_)
+        inner = pieces != segments.last[of]
+        self.sample("inserted points", segments, pieces[inner], of[inner], 1.0, entry[inner], exit_[inner])
+
+    def fractions(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """On the original motion, the fractions at which each piece begins and ends; they must grow."""
+        leaving = paths.fraction_of(self.original, of, self.seen[pieces], np.zeros(len(of)))
+        for _ in range(3 if np.any(np.abs(self.original.turns[of]) > 1) else 1):
+            before = np.where(pieces == segments.first[of], 0.0, np.roll(leaving, 1))
+            leaving = paths.fraction_of(self.original, of, self.seen[pieces], before)
+            leaving[pieces == segments.last[of]] = 1.0
+        entering = np.where(pieces == segments.first[of], 0.0, np.roll(leaving, 1))
+        for row in np.flatnonzero(leaving < entering - 1e-6)[:3]:
+            self.verdict.complain(int(self.original.line[of[row]]), "the pieces of this motion go back and forth")
+        return entering, leaving
+
+    def sample(
+        self, what: str, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64], u: float,
+        entry: Floats, exit_: Floats,
+    ) -> None:  # fmt: skip
+        """Distance of the real tip from the intended path at fraction u of every piece."""
+        if not pieces.size:
+            return
+        command = paths.at(self.fixed, pieces, np.full(len(pieces), u))
+        real = self.machine.actual_tip(command, self.length[pieces])
+        guess = entry + u * (exit_ - entry)
+        low, high = entry - 0.02, exit_ + 0.02
+
+        def intended(fraction: Floats) -> Floats:
+            return self.machine.tip(paths.at(self.original, of, fraction), self.length[pieces])
+
+        _, distance = paths.nearest(intended, real, guess, low, high)
+        allowed = self.terms.tolerance + np.sqrt(3) * self.half + self.entry_error(segments, pieces, of) * (1 - u)
+        allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
+        self.verdict.note(what, distance, allowed, self.original.line[of])
+
+    def entry_error(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> Floats:
+        """How far the tip is off where a motion begins, if the one before was not corrected; it fades on the way."""
+        begins = pieces == segments.first[of]
+        off = np.linalg.norm(self.started[pieces] - self.original.start[of], axis=1)
+        return np.where(begins & (off > 2 * self.half), off, 0.0)
+
+    def rotary_rounding(
+        self, pieces: NDArray[np.int64], of: NDArray[np.int64], segments: Segments, command: Floats
+    ) -> Floats:
+        """What half a step of the rotary words of an inserted block may do to the tip."""
+        inner = (pieces != segments.last[of]) | (pieces != segments.first[of])
+        total = np.zeros(len(pieces))
+        for axis in self.machine.rotary:
+            turned = np.abs(self.original.end[of, axis] - self.original.start[of, axis]) > 1e-9
+            nudged = command + np.eye(9)[axis] * self.terms.rotary_step / 2
+            arm = self.machine.tip(nudged, self.length[pieces]) - self.machine.tip(command, self.length[pieces])
+            total += np.where(inner & turned, np.linalg.norm(arm, axis=1), 0.0)
+        return total
+
+    # -- cycles and contours ------------------------------------------------------------------------------------------
+
+    def cycles(self, segments: Segments) -> None:
+        """The bottom of a hole to half a step; the rest of a cycle to what the correction varies over its depth."""
+        for fate, what in ((Fate.CYCLE, "cycles"), (Fate.CONTOUR, "contours")):
+            rows = np.flatnonzero(segments.fate == fate)
+            if not rows.size:
+                continue
+            miss = self.seen[segments.last[rows]] - self.original.end[rows]
+            off = np.abs(_turn_back(miss, self.original.rotation[rows]))
+            linear, lines = off[:, self.machine.linear].max(axis=1), self.original.line[rows]
+            refused = np.isin(lines, list(self.terms.refused))
+            if fate == Fate.CYCLE:
+                bottom = _bottoms(self.original, rows) & ~refused
+                self.verdict.note("cycle bottoms", linear[bottom], np.full(int(bottom.sum()), self.half), lines[bottom])
+            near = self.half + self.variation(rows)
+            self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
+            self.verdict.refused += int(refused.sum())
+            self.verdict.compensated -= int(refused.sum())
+            self.verdict.reasons.update(self.terms.refused[int(line)] for line in lines[refused])
+
+    def variation(self, rows: NDArray[np.int64]) -> Floats:
+        """How much the correction differs among the motions of a block (cycle), or near them (contour)."""
+        ends = self.original.end[rows]
+        correction = self.machine.corrected(ends, _lengths(self.original, self.terms)[rows]) - ends
+        line = self.original.line[rows]
+        change = np.flatnonzero(np.diff(line)) + 1
+        spread = np.zeros(len(rows))
+        for group in np.split(np.arange(len(rows)), change):
+            some = correction[group][:, self.machine.linear]
+            spread[group] = (some.max(axis=0) - some.min(axis=0)).max()
+        return spread
+
+
+def _bottoms(canon: Canon, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The motions that end at the bottom of a hole: feeds to the lowest point of their block, along Z."""
+    lowest: dict[int, float] = {}
+    for row in rows:
+        line = int(canon.line[row])
+        lowest[line] = min(lowest.get(line, np.inf), float(canon.end[row, 2]))
+    deep = np.array([canon.end[row, 2] <= lowest[int(canon.line[row])] + 1e-9 for row in rows])
+    return deep & (canon.kind[rows] == FEED)
+
+
+def _lengths(canon: Canon, terms: Terms) -> Floats:
+    """(n,) length of the tool in the spindle."""
+    return np.array([terms.tool_length.get(int(number), 0.0) for number in canon.tool], dtype=np.float64)
+
+
+def _turn_back(vectors: Floats, angle: Floats) -> Floats:
+    """Machine differences (n, 9) in the axes of the program, which may be turned about Z."""
+    out, cosine, sine = vectors.copy(), np.cos(angle), np.sin(angle)
+    out[:, 0], out[:, 1] = (
+        vectors[:, 0] * cosine + vectors[:, 1] * sine,
+        vectors[:, 1] * cosine - vectors[:, 0] * sine,
+    )
+    return out

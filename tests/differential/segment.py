@@ -1,0 +1,171 @@
+"""Which motions of a corrected program stand for which motion of the original: one or more each, in order.
+
+A corrected motion is compared by where it takes the tool on the machine with errors. It ends where the original ends
+(compensated), or it is the original's own command (unchanged), or it is a piece on the way. A canned cycle and a
+contour under cutter compensation are the control's own making and are matched block by block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from differential import paths
+from differential.canon import ARC, FEED, PROBE, SPLINE, TAP, Canon
+from differential.errors import Machine
+
+Floats = NDArray[np.float64]
+
+LOOKAHEAD = 4000  # pieces that one motion may have
+FAR = 1.0  # mm, degree: a piece farther from the original path than this belongs to something else
+CYCLES = {730, 760, *range(810, 900, 10)}
+
+
+class Fate(IntEnum):
+    """What became of an original motion."""
+
+    COMPENSATED = 0
+    UNCHANGED = 1
+    CYCLE = 2
+    CONTOUR = 3
+    WRONG = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """For every original motion its fate and its corrected motions first[k] : last[k] + 1."""
+
+    fate: NDArray[np.int64]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+    complaints: tuple[tuple[int, str], ...]
+
+    def owner(self, n: int) -> NDArray[np.int64]:
+        """(n,) the original motion of each corrected one, -1 for none."""
+        owner = np.full(n, -1)
+        for k, (first, last) in enumerate(zip(self.first, self.last, strict=True)):
+            owner[first : last + 1] = k
+        return owner
+
+
+@dataclass(slots=True)
+class _Matcher:
+    """Walks both programs at once."""
+
+    original: Canon
+    fixed: Canon
+    seen: Floats
+    near: Floats
+    fate: list[int] = field(default_factory=list)
+    first: list[int] = field(default_factory=list)
+    last: list[int] = field(default_factory=list)
+    complaints: list[tuple[int, str]] = field(default_factory=list)
+    j: int = 0
+
+    def run(self) -> Segments:
+        k = 0
+        while k < len(self.original):
+            if int(self.original.mode[k]) in CYCLES:
+                k = self.block(k, Fate.CYCLE)
+            elif self.original.side[k] in (410, 420):
+                k = self.block(k, Fate.CONTOUR)
+            else:
+                self.motion(k)
+                k += 1
+        if self.j < len(self.fixed):
+            self.complaints.append((len(self.original) - 1, f"{len(self.fixed) - self.j} motions too many at the end"))
+        return Segments(*(np.array(part, dtype=np.int64) for part in (self.fate, self.first, self.last)),
+                        tuple(self.complaints))  # fmt: skip
+
+    def motion(self, k: int) -> None:
+        """Consume the corrected motions of one original motion."""
+        for j in range(self.j, min(self.j + LOOKAHEAD, len(self.fixed))):
+            if not self.same_kind(k, j):
+                break
+            if self.arrives(k, j):
+                return self.take(k, j, Fate.COMPENSATED)
+            if j == self.j and self.unchanged(k, j):
+                return self.take(k, j, Fate.UNCHANGED)
+            if not self.on_the_way(k, j):
+                break
+        self.complaints.append((k, self.describe(k)))
+        return self.take(k, min(self.j, len(self.fixed) - 1), Fate.WRONG)
+
+    def take(self, k: int, last: int, fate: Fate) -> None:
+        self.fate.append(fate)
+        self.first.append(self.j)
+        self.last.append(last)
+        self.j = last + 1
+
+    def same_kind(self, k: int, j: int) -> bool:
+        original, fixed = self.original.kind[k], self.fixed.kind[j]
+        return bool(original == fixed or (original == ARC and fixed == FEED))
+
+    def arrives(self, k: int, j: int) -> bool:
+        """The tool gets where the original takes it, to a step; probing, tapping and splines never are corrected."""
+        if self.original.kind[k] in (PROBE, TAP, SPLINE):
+            return False
+        return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= self.near))
+
+    def unchanged(self, k: int, j: int) -> bool:
+        """The command is the original's; an axis without a word, or with an increment, stays off by what it was."""
+        turn = -self.original.rotation[k]
+        off = _turned(self.fixed.end[j] - self.original.end[k], turn)
+        carried = _turned(self.fixed.start[j] - self.original.start[k], turn)
+        return bool(np.all((np.abs(off) <= 1e-6) | (np.abs(off - carried) <= 1e-6)))
+
+    def on_the_way(self, k: int, j: int) -> bool:
+        """The piece ends near the original path; unless the first one, which may be the only one of its motion."""
+        row, point = np.array([k]), self.seen[j][None]
+        fraction = paths.fraction_of(self.original, row, point, np.zeros(1))
+        return bool(np.all(np.abs(paths.at(self.original, row, fraction) - point) <= FAR))
+
+    def describe(self, k: int) -> str:
+        j = min(self.j, len(self.fixed) - 1)
+        off = self.seen[j] - self.original.end[k]
+        axis = int(np.argmax(np.abs(off)))
+        return f"ends {off[axis]:+.4f} off in {'XYZABCUVW'[axis]} (kinds {self.original.kind[k]}, {self.fixed.kind[j]})"
+
+    def block(self, k: int, fate: Fate) -> int:
+        """Match a block that the control expands: as many motions on both sides, or a complaint."""
+        stop, end = _same_line(self.original, k), _same_line(self.fixed, self.j)
+        pairs = min(stop - k, end - self.j)
+        for n in range(k, stop):
+            self.fate.append(fate)
+            self.first.append(min(self.j + min(n - k, pairs - 1), len(self.fixed) - 1))
+            self.last.append(self.first[-1])
+        if stop - k != end - self.j:
+            self.complaints.append((k, f"{stop - k} motions of a block became {end - self.j}"))
+        self.j = end
+        return stop
+
+
+def _same_line(canon: Canon, k: int) -> int:
+    """One past the last motion that comes from the same line as motion k."""
+    stop = k + 1
+    while stop < len(canon) and canon.line[stop] == canon.line[k]:
+        stop += 1
+    return min(stop, len(canon))
+
+
+def _turned(vector: Floats, angle: float) -> Floats:
+    """Turn X and Y of a machine vector, into the program's axes."""
+    out, cosine, sine = vector.copy(), np.cos(angle), np.sin(angle)
+    out[0], out[1] = vector[0] * cosine - vector[1] * sine, vector[0] * sine + vector[1] * cosine
+    return out
+
+
+def match(
+    original: Canon, fixed: Canon, machine: Machine, length: Floats, linear: float, rotary: float
+) -> tuple[Segments, Floats]:
+    """The segments, and (m, 9) where the corrected motions end as the machine with errors does them.
+
+    length          (m,) tool length of the corrected motions, mm
+    linear, rotary  mm, degree: how near an end must be to count as reached; the judge looks closer afterwards
+    """
+    seen = machine.embedded(fixed.end, length) if len(fixed) else fixed.end
+    near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3)
+    return _Matcher(original, fixed, seen, near).run(), seen
