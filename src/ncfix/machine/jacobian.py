@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.machine.axis import Axis, Tool
+from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import advance, columns, cross
-
-TIP, PER_JOINT = 1, 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,21 +29,28 @@ class Jacobians:
     joints: Array
 
 
-def nominal_jacobians(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> tuple[Array, Array]:
-    """Both derivatives with the poses last: (6, n_axes, n) and (6, n_joints, 6, n)."""
-    tip, lines, triads = _in_workpiece_frame(axes, tool, poses)
-    n = poses.positions.shape[1]
-    by_axis, by_joint = np.empty((6, len(axes), n)), np.empty((6, len(axes) + 1, 6, n))
+def axis_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+    """By the axis positions, poses last: (6, n_axes, n)."""
+    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=False)
+    columns = np.empty((6, len(axes), poses.positions.shape[1]))
     for index, axis in enumerate(axes):
-        sign = -1.0 if axis.workpiece_side else 1.0
-        direction, point = lines[index]
-        by_axis[:, index] = sign * (_turning(direction, tip - point) if axis.rotary else _shifting(direction))
-    for index, (triad, reference) in enumerate(triads):
+        direction, point = joints[index][:, 0], joints[index][:, 1]
+        column = _turning(direction, tip - point) if axis.rotary else _shifting(direction)
+        columns[:, index] = -column if axis.workpiece_side else column
+    return columns
+
+
+def joint_jacobian(axes: tuple[Axis, ...], tool: Tool, poses: Poses) -> Array:
+    """By the error twists of the joints, poses last: (6, n_joints, 6, n)."""
+    tip, joints = _in_workpiece_frame(axes, tool, poses, with_errors=True)
+    columns = np.empty((6, len(axes) + 1, 6, poses.positions.shape[1]))
+    for index, own in enumerate(joints):
         sign = -1.0 if index < len(axes) and axes[index].workpiece_side else 1.0
+        arm = tip - own[:, 3]
         for k in range(3):
-            by_joint[:, index, k] = sign * _shifting(triad[:, k])
-            by_joint[:, index, 3 + k] = sign * _turning(triad[:, k], tip - reference)
-    return by_axis, by_joint
+            columns[:, index, k] = sign * _shifting(own[:, k])
+            columns[:, index, 3 + k] = sign * _turning(own[:, k], arm)
+    return columns
 
 
 def _shifting(direction: Array) -> Array:
@@ -57,17 +62,18 @@ def _turning(direction: Array, arm: Array) -> Array:
 
 
 def _in_workpiece_frame(
-    axes: tuple[Axis, ...], tool: Tool, poses: Poses
-) -> tuple[Array, list[tuple[Array, Array]], list[tuple[Array, Array]]]:
-    """The tip; direction and point of each axis line; error axes and reference point of each joint.
+    axes: tuple[Axis, ...], tool: Tool, poses: Poses, with_errors: bool
+) -> tuple[Array, list[Array]]:
+    """The tip (3, n), and the vectors of each joint (3, 2 or 4, n), the spindle last.
 
     All of them are carried together, one growing bundle of columns: each joint adds its own where it stands.
     """
-    bundle, weight = _spindle_bundle(tool, poses)
-    order = list(range(len(axes), len(axes) + 1))
+    tip = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :]
+    bundle, weight = _joined(tip, np.ones((1, 1)), *_spindle_vectors(tool, with_errors))
+    order = [len(axes)]
     for index in reversed(range(len(axes))):
         axis, position = axes[index], poses.positions[index]
-        own, own_weight = _joint_bundle(axis, position)
+        own, own_weight = _error_vectors(axis, position) if with_errors else _line_vectors(axis)
         if axis.workpiece_side:
             bundle, weight = _joined(bundle, weight, own, own_weight)
             bundle = advance(axis, -position, bundle, weight)
@@ -75,44 +81,33 @@ def _in_workpiece_frame(
             bundle = advance(axis, position, bundle, weight)
             bundle, weight = _joined(bundle, weight, own, own_weight)
         order.append(index)
-    n = poses.positions.shape[1]
-    bundle = np.broadcast_to(bundle, (3, bundle.shape[1], n))
-    return _unpacked(bundle, order)
+    bundle = np.broadcast_to(bundle, (3, bundle.shape[1], poses.positions.shape[1]))
+    size = 4 if with_errors else 2
+    starts = {joint: 1 + size * place for place, joint in enumerate(order)}
+    return bundle[:, 0], [bundle[:, starts[joint] : starts[joint] + size] for joint in range(len(order))]
 
 
-def _unpacked(bundle: Array, order: list[int]) -> tuple[Array, list[tuple[Array, Array]], list[tuple[Array, Array]]]:
-    starts = {joint: TIP + PER_JOINT * place for place, joint in enumerate(order)}
-    lines, triads = [], []
-    for joint in range(len(order)):
-        start = starts[joint]
-        triads.append((bundle[:, start : start + 3], bundle[:, start + 3]))
-        lines.append((bundle[:, start + 4], bundle[:, start + 5]))
-    return bundle[:, 0], lines, triads
+def _line_vectors(axis: Axis) -> tuple[Array, Array]:
+    """Direction and point of an axis line: where its motion leaves them."""
+    return columns(axis.direction, axis.point), np.array([[0.0], [1.0]])
 
 
-def _spindle_bundle(tool: Tool, poses: Poses) -> tuple[Array, Array]:
-    tip = np.moveaxis(tool.tip(poses.tool_length), -1, 0)[:, None, :]
-    zero = (0.0, 0.0, 0.0)
-    own = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), tool.point, zero, zero)
-    return _joined(tip, np.ones((1, 1)), own, _weights())
-
-
-def _joint_bundle(axis: Axis, position: Array) -> tuple[Array, Array]:
-    """Error axes and reference point, direction and point of the axis line, in the zero position frame of the joint."""
+def _error_vectors(axis: Axis, position: Array) -> tuple[Array, Array]:
+    """Error axes and reference point of a joint, in the frame of its body's zero position."""
     triad = columns(*axis.error_axes)
     if axis.moving_frame:
         triad = advance(axis, position, triad, weight=0.0)
     reference = advance(axis, position, columns(axis.reference))
-    parts = (triad, reference, columns(axis.direction, axis.point))
-    n = max(part.shape[-1] for part in parts)
-    return np.concatenate([np.broadcast_to(p, (*p.shape[:2], n)) for p in parts], axis=1), _weights()
+    return _joined(triad, np.zeros((3, 1)), reference, np.ones((1, 1)))
 
 
-def _weights() -> Array:
-    return np.array([0.0, 0.0, 0.0, 1.0, 0.0, 1.0])[:, None]
+def _spindle_vectors(tool: Tool, with_errors: bool) -> tuple[Array, Array]:
+    if not with_errors:
+        return columns(ORIGIN, ORIGIN), np.zeros((2, 1))
+    return columns(*BASE_AXES, tool.point), np.array([[0.0], [0.0], [0.0], [1.0]])
 
 
 def _joined(bundle: Array, weight: Array, own: Array, own_weight: Array) -> tuple[Array, Array]:
     n = max(bundle.shape[-1], own.shape[-1])
-    both = [np.broadcast_to(part, (*part.shape[:2], n)) for part in (bundle, own)]
+    both = [np.broadcast_to(part, (3, part.shape[1], n)) for part in (bundle, own)]
     return np.concatenate(both, axis=1), np.concatenate([weight, own_weight])

@@ -14,7 +14,7 @@ import numpy as np
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import Slot, Sort, joint_index, signals_of, slot_of, unit_motion
-from ncfix.machine.jacobian import nominal_jacobians
+from ncfix.machine.jacobian import joint_jacobian
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import advance, columns, cross
@@ -37,7 +37,7 @@ def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], 
 def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
     """See `Machine.design`; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
-    _, by_joint = nominal_jacobians(axes, tool, poses)
+    by_joint = joint_jacobian(axes, tool, poses)
     parts = [np.empty((6, 0, n))]
     for effect in effects:
         twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))

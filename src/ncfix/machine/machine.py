@@ -151,14 +151,21 @@ class Machine:
         turn = se3.rotation_vector(actual[..., :3, :3] @ np.swapaxes(nominal[..., :3, :3], -1, -2))
         return np.concatenate([shift, turn], axis=-1)
 
-    def jacobians(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Jacobians:
-        """Derivatives of the tip pose at the nominal pose; see `Jacobians`."""
+    def axis_jacobian(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
+        """The derivative of the nominal tip pose by the axis positions, shape (..., 6, n_axes); see `Jacobians`."""
         shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
-        parts = [jacobian.nominal_jacobians(self.axes, self.tool, part) for _, part in poses.chunks()]
-        if not parts:
-            parts = [(np.empty((6, len(self.axes), 0)), np.empty((6, len(self.axes) + 1, 6, 0)))]
-        axes, joints = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-        return Jacobians(_poses_first(axes, shape), _poses_first(joints, shape))
+        out = np.empty((poses.positions.shape[1], 6, len(self.axes)))
+        for part, chunk in poses.chunks():
+            out[part] = np.moveaxis(jacobian.axis_jacobian(self.axes, self.tool, chunk), -1, 0)
+        return out.reshape(*shape, 6, len(self.axes))
+
+    def jacobians(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Jacobians:
+        """Derivatives of the nominal tip pose by axis positions and by joint errors; see `Jacobians`."""
+        shape, poses = flatten(q, State(tool_length), self.axes, frozenset())
+        out = np.empty((poses.positions.shape[1], 6, len(self.axes) + 1, 6))
+        for part, chunk in poses.chunks():
+            out[part] = np.moveaxis(jacobian.joint_jacobian(self.axes, self.tool, chunk), -1, 0)
+        return Jacobians(self.axis_jacobian(q, tool_length), out.reshape(*shape, *out.shape[1:]))
 
     def joint_errors(self, q: ArrayLike, state: State = State()) -> Array:  # noqa: B008
         """The error twist of each joint to first order, shape (..., n_joints, 6): [ex ey ez ea eb ec], mm and rad.
@@ -210,11 +217,12 @@ class Machine:
             axes = np.broadcast_to(POSE_COLUMNS, (3, 3, tip.shape[-1]))
             start = np.concatenate([axes, tip], axis=1)
             offset = columns(self.workpiece_offset) * POSE_WEIGHTS
-            return carry(self._chain.at(part, model), start, POSE_WEIGHTS) - offset
+            pose: Array = carry(self._chain.at(part, model), start, POSE_WEIGHTS) - offset
+            return pose
 
-        result = self._evaluated(poses, q, state, model, 4)
-        bottom = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*result.shape[:-2], 1, 4))
-        return np.concatenate([result, bottom], axis=-2)
+        rows = self._evaluated(poses, q, state, model, 4)
+        bottom = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*rows.shape[:-2], 1, 4))
+        return np.concatenate([rows, bottom], axis=-2)
 
     def _evaluated(
         self, function: Callable[[Poses], Array], q: ArrayLike, state: State, model: ErrorModel | None, width: int
@@ -229,5 +237,5 @@ class Machine:
 
 def _poses_first(values: Array, shape: tuple[int, ...]) -> Array:
     """From (..., n) to (*shape, ...), contiguous."""
-    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape(*shape, *values.shape[:-1])
+    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape((*shape, *values.shape[:-1]))
     return first

@@ -11,28 +11,28 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_SERIES_BELOW = 1e-3
-"""Squared angle below which four terms of a power series are exact to double precision."""
+_SERIES_BELOW = 0.02
+"""Squared angle below which five terms of a power series are exact to double precision."""
 
 
-def rotation_factors(squared: Array) -> tuple[Array, Array, Array]:
-    """The three factors of Rodrigues' formulas for squared angles: sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3."""
-    if squared.size == 0 or squared.max() < _SERIES_BELOW:
-        return _series(squared)
-    angle = np.sqrt(np.maximum(squared, _SERIES_BELOW))
-    half = np.sin(angle / 2)
-    exact = np.sin(angle) / angle, 2 * half**2 / angle**2, (angle - np.sin(angle)) / angle**3
-    small = squared < _SERIES_BELOW
-    first, second, third = (np.where(small, s, e) for s, e in zip(_series(squared), exact, strict=True))
-    return first, second, third
+def rotation_factors(squared: Array) -> tuple[Array, Array]:
+    """The factors of Rodrigues' formula for squared angles: sin a / a and (1 - cos a) / a^2."""
+    x = squared
+    first = 1 - x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72)))
+    second = 0.5 - x / 24 * (1 - x / 30 * (1 - x / 56 * (1 - x / 90)))
+    if x.size == 0 or x.max() < _SERIES_BELOW:
+        return first, second
+    angle = np.sqrt(np.maximum(x, _SERIES_BELOW))
+    small = x < _SERIES_BELOW
+    return np.where(small, first, np.sin(angle) / angle), np.where(small, second, 2 * (np.sin(angle / 2) / angle) ** 2)
 
 
-def _series(x: Array) -> tuple[Array, Array, Array]:
-    return (
-        1 - x / 6 * (1 - x / 20 * (1 - x / 42)),
-        0.5 - x / 24 * (1 - x / 30 * (1 - x / 56)),
-        1 / 6 - x / 120 * (1 - x / 42 * (1 - x / 72)),
-    )
+def screw_factor(squared: Array) -> Array:
+    """The factor (a - sin a) / a^3 of a screw's translation, for squared angles."""
+    x = squared
+    series = 1 / 6 - x / 120 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110)))
+    angle = np.sqrt(np.maximum(x, _SERIES_BELOW))
+    return np.where(x < _SERIES_BELOW, series, (angle - np.sin(angle)) / angle**3)
 
 
 def skew(vector: ArrayLike) -> Array:
@@ -46,7 +46,7 @@ def skew(vector: ArrayLike) -> Array:
 def rotation(vector: ArrayLike) -> Array:
     """The rotation of a rotation vector, shape (..., 3) [rad] -> (..., 3, 3)."""
     vector = np.asarray(vector, dtype=np.float64)
-    first, second, _ = rotation_factors((vector * vector).sum(-1))
+    first, second = rotation_factors((vector * vector).sum(-1))
     cross = skew(vector)
     result: Array = np.eye(3) + first[..., None, None] * cross + second[..., None, None] * (cross @ cross)
     return result
@@ -80,7 +80,8 @@ def exp(twist: ArrayLike) -> Array:
     """The motion of a screw: twist (v, w) of shape (..., 6) [mm, rad], translation first -> (..., 4, 4)."""
     twist = np.asarray(twist, dtype=np.float64)
     velocity, vector = twist[..., :3], twist[..., 3:]
-    _, second, third = rotation_factors((vector * vector).sum(-1))
+    squared = (vector * vector).sum(-1)
+    second, third = rotation_factors(squared)[1], screw_factor(squared)
     once = np.cross(vector, velocity)
     moved = velocity + second[..., None] * once + third[..., None] * np.cross(vector, once)
     return rigid(rotation(vector), moved)

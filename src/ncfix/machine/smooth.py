@@ -150,7 +150,7 @@ def powers(u: Array, degree: tuple[int, ...]) -> Array:
     ladder = np.empty((max(degree) + 1, *u.shape))
     ladder[0] = 1.0
     for power in range(1, len(ladder)):
-        np.multiply(ladder[power - 1], u, out=ladder[power])
+        ladder[power] = ladder[power - 1] * u
     return ladder if degree == tuple(range(len(ladder))) else ladder[list(degree)]
 
 

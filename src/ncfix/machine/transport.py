@@ -79,7 +79,7 @@ class SmallMotion:
 
 def rotated_by(vector: Array, arm: Array) -> Array:
     """By how much a rotation vector moves the end of an arm: (R - 1) arm, without loss of digits for small angles."""
-    first, second, _ = se3.rotation_factors((vector * vector).sum(0))
+    first, second = se3.rotation_factors((vector * vector).sum(0))
     if vector.size == 3:
         turning = se3.skew(vector.ravel())
         matrix = first.ravel() * turning + second.ravel() * (turning @ turning)
@@ -112,7 +112,8 @@ def composed(motions: Sequence[tuple[Array, Array]], rotates: bool) -> SmallMoti
 
 def _integrated(vector: Array, velocity: Array) -> Array:
     """The translation of the screw with this rotation vector and velocity of the center."""
-    _, second, third = se3.rotation_factors((vector * vector).sum(0))
+    squared = (vector * vector).sum(0)
+    second, third = se3.rotation_factors(squared)[1], se3.screw_factor(squared)
     once = cross(vector, velocity)
     result: Array = velocity + second * once + third * cross(vector, once)
     return result
