@@ -1,0 +1,73 @@
+"""The product as a black box: the command line `ncfix`, run in this process, files in and files out."""
+
+from __future__ import annotations
+
+import io
+import json
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ncfix.cli.main import run
+
+DONE, FINDINGS, USAGE, UNREADABLE, REFUSED, FAULT = range(6)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a run came to.
+
+    code    exit code
+    text    the corrected program; None if none was written
+    entry   the object of this file that `--json` prints
+    errors  the messages on standard error
+    """
+
+    code: int
+    text: bytes | None
+    entry: dict[str, Any] = field(default_factory=dict)
+    errors: str = ""
+
+    @property
+    def refused(self) -> dict[int, str]:
+        """Lines that were left as they were, and why."""
+        return {int(each["line"]): str(each["reason"]) for each in self.entry.get("refused", [])}
+
+    @property
+    def codes(self) -> list[str]:
+        """Codes of the errors that ended the run."""
+        return [each["code"] for each in self.entry.get("errors", [])]
+
+    @property
+    def places(self) -> list[int | None]:
+        """Lines of the errors that ended the run."""
+        return [each["line"] for each in self.entry.get("errors", [])]
+
+
+def command(*arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of one `ncfix` command line."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = run([str(argument) for argument in arguments])
+    return code, out.getvalue(), err.getvalue()
+
+
+def fix(program: Path, machine: Path, folder: Path, *options: object) -> Outcome:
+    """Fix a file; what is written goes to `folder` under the program's own name."""
+    target = folder / f"fixed-{program.name}"
+    target.unlink(missing_ok=True)
+    code, out, err = command("fix", program, "-m", machine, "-o", target, "--json", *options)
+    try:
+        answer = json.loads(out)
+    except json.JSONDecodeError:
+        answer = {}
+    entry = answer.get("files", [{"errors": answer.get("errors", [])}])[0]
+    return Outcome(code, target.read_bytes() if target.exists() else None, entry, err)
+
+
+def fix_text(text: str | bytes, machine: Path, folder: Path, *options: object, name: str = "program.ngc") -> Outcome:
+    """Fix a program given as text."""
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode("latin-1"))
+    return fix(path, machine, folder, *options)

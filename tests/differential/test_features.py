@@ -1,0 +1,80 @@
+"""Every feature on its own: corrected right, or left alone with its line named; never anything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from differential import corpus, product, setups
+from differential.canon import Canon
+from differential.cases import CASES, Case
+from differential.errors import LETTERS, Machine
+from differential.judge import Terms, Verdict, judge
+
+Try = Callable[..., tuple[product.Outcome, Verdict | None]]
+
+
+@pytest.fixture
+def tried(
+    rs274: Callable[..., Canon], machine: Callable[[str], Machine], machine_file: Callable[[str], Path], tmp_path: Path
+) -> Try:
+    """Correct a case and judge it; None for the verdict where nothing was written."""
+
+    def run(case: Case, strategy: str, *options: str) -> tuple[product.Outcome, Verdict | None]:
+        model = machine(case.machine)
+        axes = "".join(LETTERS[column] for column in (*model.linear, *model.rotary))
+        setup = setups.write(tmp_path, case.controls, axes, case.start)
+        chosen = ("--setup", setup, "--strategy", strategy, *options)
+        outcome = product.fix_text(case.source, machine_file(case.machine), tmp_path, *chosen)
+        if outcome.text is None:
+            return outcome, None
+        original, fixed = rs274(case.source.encode(), case.controls), rs274(outcome.text, case.controls)
+        assert original.accepted, original.error
+        return outcome, judge(original, fixed, model, _terms(case, outcome, model))
+
+    return run
+
+
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "position"])
+@pytest.mark.parametrize("name", CASES)
+def test_right_or_refused_with_the_line(tried: Try, name: str, strategy: str) -> None:
+    case = CASES[name]
+    outcome, verdict = tried(case, strategy, "--allow-refused")
+    assert outcome.code in (product.DONE, product.REFUSED), outcome.errors
+    if verdict is None:
+        assert case.expect != "right", outcome.errors
+        assert any(outcome.places), outcome.errors
+        return
+    assert verdict.right, f"{verdict}\n{outcome.errors}"
+    assert case.expect != "right" or not outcome.refused, outcome.errors
+    assert case.expect != "refused" or outcome.refused
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if case.expect != "right"])
+def test_a_refusal_writes_nothing_unless_allowed(tried: Try, name: str) -> None:
+    allowed, _ = tried(CASES[name], "position", "--allow-refused")
+    strict, _ = tried(CASES[name], "position")
+    refused = bool(allowed.refused) or allowed.code == product.REFUSED
+    assert strict.code == (product.REFUSED if refused else product.DONE), strict.errors
+    assert (strict.text is None) == refused
+
+
+def test_every_refused_block_stays_as_it_was(tried: Try) -> None:
+    for name, case in CASES.items():
+        outcome, _ = tried(case, "position", "--allow-refused")
+        before = case.source.split("\n")
+        after = (outcome.text or b"").decode("latin-1").split("\n")
+        missing = [line for line in outcome.refused if outcome.text and before[line - 1] not in after]
+        assert not missing, f"{name}: lines {missing}"
+
+
+def _terms(case: Case, outcome: product.Outcome, model: Machine) -> Terms:
+    return Terms(
+        step=model.linear_step,
+        rotary_step=model.rotary_step,
+        refused=outcome.refused,
+        passed=corpus.passed_by_rule(case.source.encode()),
+        tool_length={number: length for number, (length, _) in case.controls.tools.items()},
+    )
