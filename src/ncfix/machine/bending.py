@@ -20,7 +20,7 @@ def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Arra
     """See `Machine.feature_lengths`."""
     lengths = np.full(len(axes), np.inf)
     for effect, index, signal, is_factor in _dependencies(axes, effects):
-        span = _span(axes[index]) / abs(signal.scale)
+        span = _span(axes[index], signal) / abs(signal.scale)
         feature = span / 4 if is_factor else effect.basis.feature(span)
         length = feature * abs(signal.scale) * signal.unit
         lengths[index] = min(lengths[index], length)
@@ -30,9 +30,13 @@ def feature_lengths(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Arra
 def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...], index: int) -> Array:
     """See `Machine.breakpoints`."""
     places: set[float] = set()
+    ends = {limit / axes[index].unit for limit in axes[index].range}
     for effect, axis, signal, is_factor in _dependencies(axes, effects):
-        if axis == index and not is_factor:
-            places.update((signal.center + signal.scale * u) * signal.unit for u in effect.basis.kinks)
+        if axis == index:
+            held = {signal.low, signal.high} - ends
+            kinks = () if is_factor else effect.basis.kinks
+            places.update(x * signal.unit for x in held if np.isfinite(x))
+            places.update((signal.center + signal.scale * u) * signal.unit for u in kinks)
     return np.array(sorted(places), dtype=np.float64)
 
 
@@ -58,9 +62,8 @@ def _dependencies(axes: tuple[Axis, ...], effects: tuple[Effect, ...]) -> Iterat
                     yield effect, signal.axis, signal, is_factor
 
 
-def _span(axis: Axis) -> float:
+def _span(axis: Axis, signal: Signal) -> float:
     """The range in the unit of the machine file."""
-    low, high = axis.range
-    if np.isfinite(low) and np.isfinite(high):
-        return (high - low) / axis.unit
+    if np.isfinite(signal.low) and np.isfinite(signal.high):
+        return signal.high - signal.low
     return 360.0 if axis.rotary else UNKNOWN_RANGE

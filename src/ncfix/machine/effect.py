@@ -32,6 +32,7 @@ class Effect:
     covariance       of the coefficients
     reference        the point at which rotations cause no translation, base frame with all axes at zero, mm;
                      None: the axis point of a rotary axis, the base origin for a linear one
+    range            of x: outside it the end values hold; None: the range of the axis
     input            the signal x if it is not the axis position: another axis, or a name in `State.inputs`
     times            a second signal whose u multiplies the sum
     times_center, times_scale   of that u; None: those of `center` and `scale`
@@ -46,6 +47,7 @@ class Effect:
     scale: float = 1.0
     covariance: Matrix | None = None
     reference: Vector | None = None
+    range: tuple[float, float] | None = None
     input: str | None = None
     times: str | None = None
     times_center: float | None = None

@@ -102,6 +102,7 @@ def _options(section: Section, letters: tuple[str, ...], size: int) -> dict[str,
     options = {
         "covariance": _covariance(section, size),
         "reference": reference,
+        "range": _range(section),
         "input": _signal(section, "input", letters),
         "times": _signal(section, "times", letters),
         "time_constant_s": _positive(section, "time_constant_s"),
@@ -112,6 +113,16 @@ def _options(section: Section, letters: tuple[str, ...], size: int) -> dict[str,
         "times_scale": _scale(section, "times_scale"),
     }
     return {key: value for key, value in options.items() if value is not None}
+
+
+def _range(section: Section) -> tuple[float, float] | None:
+    limits = section.numbers("range", count=2)
+    if limits is None:
+        return None
+    low, high = limits
+    if low >= high:
+        section.note("NCF308", "range", f"empty range: {low:g} is not below {high:g}")
+    return low, high
 
 
 def _signal(section: Section, key: str, letters: tuple[str, ...]) -> str | None:

@@ -21,7 +21,7 @@ class Signal:
     name        axis letter or input
     axis        index of the axis; None for a state input
     unit        internal units per unit of x
-    low, high   where x is held
+    low, high   the x beyond which the end values hold
     endless     x is an angle that may turn round and round
     center, scale   of u
     constant_s  time constant of a first-order lag; 0 for none
@@ -56,14 +56,14 @@ class Signal:
         return position
 
     def u(self, poses: Poses, domain: tuple[float, float]) -> Array:
-        """What the basis sees; `domain` is its range of u, into which an endless axis is turned back."""
+        """What the basis sees; `domain` is the basis's own range of u."""
         x = poses.inputs[self.lagged_name] if self.constant_s else self.raw(poses)
+        if self.endless:
+            x = turned_back(x, self.low, self.high)
         if np.isfinite(self.low) or np.isfinite(self.high):
             x = np.clip(x, self.low, self.high)
         u = x if (self.center, self.scale) == (0.0, 1.0) else (x - self.center) / self.scale
-        if self.endless and np.isfinite(domain[0]):
-            return turned_back(u, domain, 360.0 / abs(self.scale))
-        return u
+        return turned_back(u, *domain, 360.0 / abs(self.scale)) if self.endless else u
 
 
 def axis_signal(axes: tuple[Axis, ...], index: int) -> Signal:
@@ -73,10 +73,12 @@ def axis_signal(axes: tuple[Axis, ...], index: int) -> Signal:
     return Signal(axis.name, index, axis.unit, low, high, axis.endless)
 
 
-def turned_back(u: Array, domain: tuple[float, float], turn: float) -> Array:
-    """Angles outside the domain moved by whole turns to start at its lower end."""
-    outside = (u < domain[0]) | (u > domain[1])
-    return np.where(outside, domain[0] + np.mod(u - domain[0], turn), u) if outside.any() else u
+def turned_back(angle: Array, low: float, high: float, turn: float = 360.0) -> Array:
+    """Angles outside low ... high moved by whole turns to the first turn from `low`; infinite limits leave them."""
+    if not np.isfinite(low):
+        return angle
+    outside = (angle < low) | (angle > high)
+    return np.where(outside, low + np.mod(angle - low, turn), angle) if outside.any() else angle
 
 
 def with_lags(poses: Poses, signals: Iterable[Signal]) -> Poses:

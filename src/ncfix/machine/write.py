@@ -69,6 +69,7 @@ def effect_keys(effect: Effect) -> dict[str, Any]:
         **parameters,
         "center": effect.center or None,
         "scale": None if effect.scale == 1 else effect.scale,
+        "range": effect.range,
         "times": effect.times,
         "times_center": effect.times_center,
         "times_scale": effect.times_scale,
