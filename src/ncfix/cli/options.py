@@ -1,8 +1,11 @@
-"""Options that several verbs share."""
+"""Options that several verbs share, and the inputs that they name."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +13,7 @@ from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
     from ncfix.machine import Machine
+    from ncfix.program.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 machine_option = click.option(
@@ -18,7 +22,37 @@ machine_option = click.option(
 optional_machine_option = click.option(
     "-m", "--machine", "machine_path", metavar="FILE", help="The machine file (TOML)."
 )
-dialect_option = click.option("--dialect", metavar="NAME", help="The control's language; detected if not given.")
+dialect_option = click.option("--dialect", metavar="NAME", help="The control's language; found out if not given.")
+table_option = click.option("-o", "--output", metavar="FILE", default=STREAM, help="Where to write the table (CSV).")
+force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
+
+SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc")
+"""Under what a subprogram's file may go besides its name."""
+
+
+class Positive(click.ParamType):  # type: ignore[type-arg]
+    """A finite number above zero."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number."""
+        try:
+            found = float(value)
+        except ValueError:
+            found = math.nan
+        if not 0 < found < math.inf:
+            self.fail(f"{value!r} is not a number above zero", param, ctx)
+        return found
+
+
+tolerance_option = click.option(
+    "--tolerance-um",
+    type=Positive(),
+    default=1.0,
+    show_default=True,
+    help="How far the tool tip may leave the intended path.",
+)
 
 
 def load_machine(path: str) -> Machine:
@@ -26,3 +60,32 @@ def load_machine(path: str) -> Machine:
     from ncfix.machine import load, loads
 
     return load(path) if path != STREAM else loads(read(path).decode("utf-8", "replace"), shown(path))
+
+
+def read_program(path: str, dialect: str | None, machine: Machine | None = None) -> Program:
+    """A program from a file or standard input, in the dialect given, else in that of the machine's control.
+
+    A control that has no dialect of its own leaves it to what the program looks like.
+    """
+    from ncfix.program import dialects
+    from ncfix.program.reader import read as read_source
+
+    if dialect is None and machine is not None and machine.control in dialects.names():
+        dialect = machine.control
+    return read_source(read(path), shown(path), dialect)
+
+
+def subprograms(path: str) -> Callable[[str], bytes | None]:
+    """Finds the files of subprograms: beside the program, by their name with or without a suffix."""
+    folder = "." if path == STREAM else os.path.dirname(path) or "."
+
+    def find(name: str) -> bytes | None:
+        if os.path.basename(name) != name:
+            return None
+        for suffix in SUBPROGRAM_SUFFIXES:
+            candidate = os.path.join(folder, name + suffix)
+            if os.path.isfile(candidate):
+                return read(candidate)
+        return None
+
+    return find

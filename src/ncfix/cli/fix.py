@@ -1,0 +1,156 @@
+"""`ncfix fix`: programs in, corrected programs out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import (
+    dialect_option,
+    json_option,
+    load_machine,
+    machine_option,
+    read_program,
+    subprograms,
+    tolerance_option,
+)
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.targets import STREAM, Target, shown, targets
+from ncfix.diagnostics import ExitCode, Message, NcfixError, Place, UsageError
+
+if TYPE_CHECKING:
+    from ncfix.compensate.fix import Fixed, FixOptions
+    from ncfix.machine import Machine
+    from ncfix.program.setup import Setup
+
+
+@click.command()
+@click.argument("programs", nargs=-1, required=True, metavar="PROGRAM...")
+@machine_option
+@click.option("-o", "--output", metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout.")
+@click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
+@click.option("--force", is_flag=True, help="Replace an existing output; correct a program that carries a stamp.")
+@click.option("--strategy", default="rotary-then-linear", show_default=True, metavar="NAME", help="How to correct.")
+@click.option("--thesis", is_flag=True, help="Ellingsdalen's printed algorithm, without the corrections to it.")
+@tolerance_option
+@dialect_option
+@setup_options
+@click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
+@click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@json_option
+def fix(
+    programs: tuple[str, ...],
+    machine_path: str,
+    output: str | None,
+    in_place: bool,
+    force: bool,
+    dialect: str | None,
+    given: SetupOptions,
+    as_json: bool,
+    **choices: Any,
+) -> int:
+    """Rewrite each PROGRAM so that this machine cuts what was meant.
+
+    Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
+    was written.
+    """
+    found = targets(programs, output, in_place, force)
+    if as_json and any(target.path == STREAM for target in found):
+        text = "the program and the JSON object would both go to standard output"
+        raise UsageError.of("NCF010", text, hint="-o FILE")
+    job = _job(machine_path, dialect, given, {**choices, "force": force})
+    outcomes = [job.outcome(target) for target in found]
+    if as_json:
+        console.put_json(files=[outcome.entry for outcome in outcomes])
+    return max(outcome.code for outcome in outcomes)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one program: its exit code and its entry in the JSON object."""
+
+    code: int
+    entry: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is the same for all programs."""
+
+    machine: Machine
+    setup: Setup
+    dialect: str | None
+    options: FixOptions
+
+    def outcome(self, target: Target) -> Outcome:
+        """Fix one program and say what came of it; an error ends this program only."""
+        try:
+            with console.busy(f"fixing {shown(target.source)}"):
+                fixed = self.fixed(target.source)
+            return _written(fixed, target, self.options.allow_refused)
+        except NcfixError as error:
+            console.tell(*error.messages)
+            entry = {"path": shown(target.source), "output": None}
+            return Outcome(error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]})
+
+    def fixed(self, source: str) -> Fixed:
+        """The corrected program."""
+        from ncfix.compensate.fix import fix_program
+
+        program = read_program(source, self.dialect, self.machine)
+        return fix_program(program, self.machine, self.setup, self.options, resolve=subprograms(source))
+
+
+def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> Job:
+    from ncfix.compensate.fix import FixOptions
+
+    return Job(load_machine(machine_path), setup.load(), dialect, FixOptions(**choices))
+
+
+def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:
+    entry: dict[str, Any] = fixed.report.as_dict()
+    console.tell(*fixed.report.warnings)
+    console.tell(*_refusals(target.source, entry["refused"]))
+    refused = bool(entry["refused"]) and not allow_refused
+    if not refused:
+        _write(fixed, target)
+        entry["output"] = target.path
+    for line in _summary(entry, refused):
+        console.say(line)
+    return Outcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry)
+
+
+def _write(fixed: Fixed, target: Target) -> None:
+    if target.in_place and not fixed.changed:
+        return
+    target.write(fixed.text)
+
+
+def _refusals(source: str, refused: Sequence[dict[str, Any]]) -> list[Message]:
+    return [Message(each["code"], each["reason"], Place(shown(source), each["line"])) for each in refused]
+
+
+def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
+    """What was done, for people."""
+    output = "nothing written" if refused else "<stdout>" if entry["output"] == STREAM else entry["output"]
+    counts = f"{entry['compensated']} corrected, {entry['passed']} passed by rule, {len(entry['refused'])} refused"
+    lines = [
+        f"{entry['path']} -> {output}",
+        f"  motion blocks       {counts}; {entry['inserted_blocks']} inserted",
+        f"  largest correction  {entry['max_correction_um']:.1f} um",
+    ]
+    if entry["error_before_um"]:
+        lines.append(f"  tip error before    {_figures(entry['error_before_um'])}")
+        lines.append(f"  tip error after     {_figures(entry['error_after_um'])}")
+    if entry["leaves"]:
+        lines.append(f"  {entry['strategy']}: {entry['leaves']}")
+    return lines
+
+
+def _figures(error: dict[str, float]) -> str:
+    where = f", worst at line {error['where']}" if error.get("where") else ""
+    return f"max {error['max']:.2f} um, rms {error['rms']:.2f} um{where}"

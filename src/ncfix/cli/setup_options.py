@@ -1,0 +1,160 @@
+"""The options that say what a program cannot know: work offsets, tools, start position."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from ncfix.program.setup import Setup
+
+OFFSET_AXES = "XYZABC"
+"""The order of the numbers of a work offset."""
+
+AXIS = re.compile(r"[XYZABCUVW]")
+
+
+class Assignment(click.ParamType):  # type: ignore[type-arg]
+    """`KEY=VALUE`; the value as `convert_value` makes it, which raises ValueError with what is wrong."""
+
+    def __init__(self, metavar: str, convert_value: Callable[[str, str], Any]) -> None:
+        self.name = metavar
+        self.convert_value = convert_value
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The key in upper case and the value."""
+        key, equals, text = str(value).partition("=")
+        if not equals:
+            self.fail(f"{value!r} has no =; it reads like {self.name}", param, ctx)
+        try:
+            return key.strip().upper(), self.convert_value(key.strip().upper(), text)
+        except ValueError as error:
+            self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)
+
+
+def number(text: str) -> float:
+    """A finite number with a decimal point."""
+    found = float(text)
+    if found - found != 0.0:
+        raise ValueError(f"{text.strip()} is not a number")
+    return found
+
+
+def offset_values(name: str, text: str) -> dict[str, float]:
+    """A work offset by axis letter: `0,0,-300`, or `X=..` where the option is written `G54=X0,Z-300`."""
+    parts = [part.strip() for part in text.split(",")]
+    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*)?", name):
+        raise ValueError(f"{name} is not a work offset")
+    if all(AXIS.match(part.upper()) for part in parts):
+        return {part[0].upper(): number(part[1:]) for part in parts}
+    if not 1 <= len(parts) <= len(OFFSET_AXES):
+        raise ValueError(f"{len(parts)} numbers, at most {len(OFFSET_AXES)} axes")
+    return dict(zip(OFFSET_AXES, map(number, parts), strict=False))
+
+
+def tool_values(name: str, text: str) -> tuple[float, ...]:
+    """The length of a tool, and its radius if it is given."""
+    if not name.isdecimal():
+        raise ValueError(f"{name!r} is not a tool number")
+    values = tuple(map(number, text.split(",")))
+    if len(values) > 2:
+        raise ValueError("a length, and a radius if wanted")
+    return values
+
+
+class Position(click.ParamType):  # type: ignore[type-arg]
+    """`X=0,Z=300`: positions by axis letter."""
+
+    name = "X=0,Z=300"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Axis letter -> position."""
+        found: dict[str, float] = {}
+        for part in str(value).split(","):
+            letter, equals, text = part.strip().upper().partition("=")
+            try:
+                if not equals or not AXIS.fullmatch(letter):
+                    raise ValueError(f"{part.strip()!r} is not an axis and a number")
+                found[letter] = number(text)
+            except ValueError as error:
+                self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)
+        return found
+
+
+OPTIONS = (
+    click.option("--setup", "setup_file", metavar="FILE", help="Work offsets, tools and start position (TOML)."),
+    click.option(
+        "--offset",
+        "offsets",
+        type=Assignment("G54=0,0,-300", offset_values),
+        multiple=True,
+        help="A work offset in the order X Y Z A B C, mm and degrees.",
+    ),
+    click.option(
+        "--tool",
+        "tools",
+        type=Assignment("12=120.0", tool_values),
+        multiple=True,
+        help="The length of a tool, mm; and its radius, as 12=120.0,5.0.",
+    ),
+    click.option("--tool-table", "tool_table", metavar="FILE", help="The control's own tool table."),
+    click.option("--initial", type=Position(), help="Where the axes are at the start, machine coordinates."),
+    click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SetupOptions:
+    """What was said on the command line about the setup."""
+
+    setup_file: str | None = None
+    offsets: tuple[tuple[str, dict[str, float]], ...] = ()
+    tools: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    tool_table: str | None = None
+    initial: dict[str, float] | None = None
+    assume_zero: bool = False
+
+    def load(self) -> Setup:
+        """The setup: the file, then the tool table, then the single options, each over the one before."""
+        from ncfix.program import setup_file
+        from ncfix.program.setup import Setup, Tool
+
+        setup = setup_file.load(self.setup_file) if self.setup_file else Setup()
+        tools = dict(setup.tools)
+        if self.tool_table:
+            tools |= setup_file.load_tool_table(self.tool_table)
+        tools |= {int(key): Tool(*values) for key, values in self.tools}
+        return replace(
+            setup,
+            work_offsets={**setup.work_offsets, **dict(self.offsets)},
+            tools=tools,
+            initial={**setup.initial, **(self.initial or {})},
+            assume_zero=setup.assume_zero or self.assume_zero,
+        )
+
+
+def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a verb these options; it gets them as one argument `given`."""
+
+    @wraps(command)
+    def with_given(
+        *arguments: Any,
+        setup_file: str | None,
+        offsets: tuple[tuple[str, dict[str, float]], ...],
+        tools: tuple[tuple[str, tuple[float, ...]], ...],
+        tool_table: str | None,
+        initial: dict[str, float] | None,
+        assume_zero: bool,
+        **others: Any,
+    ) -> Any:
+        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, assume_zero)
+        return command(*arguments, given=given, **others)
+
+    for option in reversed(OPTIONS):
+        with_given = option(with_given)
+    return with_given

@@ -1,0 +1,93 @@
+"""What options say about the setup."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.program.setup import Setup, Tool
+
+
+def given(*arguments: str) -> SetupOptions:
+    """What a verb with the setup options gets."""
+    found: list[SetupOptions] = []
+
+    @click.command()
+    @setup_options
+    def verb(given: SetupOptions) -> None:
+        found.append(given)
+
+    result = CliRunner().invoke(verb, arguments)
+    if result.exit_code:
+        raise click.UsageError(result.output)
+    return found[0]
+
+
+def test_nothing_said_is_an_empty_setup() -> None:
+    assert given().load() == Setup()
+
+
+@pytest.mark.parametrize(
+    ("option", "offsets"),
+    [
+        ("G54=0,0,-300", {"G54": {"X": 0.0, "Y": 0.0, "Z": -300.0}}),
+        ("g55=1", {"G55": {"X": 1.0}}),
+        ("G59.3=1,2,3,4,5,6", {"G59.3": dict(zip("XYZABC", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), strict=True))}),
+        ("G54=Z-300, b45", {"G54": {"Z": -300.0, "B": 45.0}}),
+    ],
+)
+def test_offsets(option: str, offsets: dict[str, dict[str, float]]) -> None:
+    assert given("--offset", option).load().work_offsets == offsets
+
+
+def test_tools_and_start() -> None:
+    setup = given("--tool", "12=120.0", "--tool", "3=80,5", "--initial", "X=0,z=300", "--assume-zero").load()
+    assert setup.tools == {12: Tool(120.0), 3: Tool(80.0, 5.0)}
+    assert setup.initial == {"X": 0.0, "Z": 300.0}
+    assert setup.assume_zero
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--offset", "G54"], "no ="),
+        (["--offset", "54=1,2,3"], "not a work offset"),
+        (["--offset", "G54=1,2,3,4,5,6,7"], "at most 6"),
+        (["--offset", "G54=1;2"], "1;2"),
+        (["--offset", "G54="], "G54="),
+        (["--offset", "G54=nan"], "nan is not a number"),
+        (["--tool", "T12=3"], "not a tool number"),
+        (["--tool", "12=1,2,3"], "a length"),
+        (["--tool", "12=inf"], "inf is not a number"),
+        (["--initial", "X0"], "not an axis and a number"),
+        (["--initial", "XY=0"], "not an axis and a number"),
+        (["--initial", "X=1,5"], "not an axis and a number"),
+    ],
+)
+def test_what_is_wrong_is_said(arguments: list[str], said: str) -> None:
+    with pytest.raises(click.UsageError, match=said):
+        given(*arguments)
+
+
+def test_options_win_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "setup.toml"
+    file.write_text(
+        "tools.1 = { length = 50.0 }\ntools.2 = { length = 60.0 }\n[work_offsets]\nG54 = [1, 2, 3]\nG55 = [4, 5, 6]\n"
+    )
+    setup = given("--setup", str(file), "--tool", "2=70", "--offset", "G54=9").load()
+    assert {number: tool.length for number, tool in setup.tools.items()} == {1: 50.0, 2: 70.0}
+    assert setup.work_offsets["G54"] == {"X": 9.0}
+    assert setup.work_offsets["G55"] == {"X": 4.0, "Y": 5.0, "Z": 6.0}
+
+
+@pytest.mark.parametrize("option", ["--setup", "--tool-table"])
+def test_a_file_that_is_not_there(ncfix: Any, option: str, tmp_path: Path) -> None:
+    (tmp_path / "part.ngc").write_text("G1 X1 F100\nM2\n")
+    result = ncfix("check", tmp_path / "part.ngc", option, tmp_path / "nosuch")
+    assert result.code == 3
+    assert "nosuch" in result.err
