@@ -14,6 +14,14 @@ from ncfix.program.moves import Kind, Moves, Rule
 
 
 @dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a block is refused: a code that `ncfix explain` knows, and a sentence."""
+
+    code: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Refusal:
     """A motion block that was left as it was although it is not right, and why."""
 
@@ -28,31 +36,26 @@ class Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Motion blocks by what became of them: block -> reason (empty for compensated ones)."""
+    """Motion blocks by what became of them; every one is in exactly one of the three.
+
+    passed   block -> the rule by which it was passed
+    refused  block -> why
+    """
 
     compensated: frozenset[int]
     passed: Mapping[int, str]
-    refused: Mapping[int, str]
+    refused: Mapping[int, Reason]
 
     @classmethod
-    def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, str]) -> Account:
-        """Account for the motions; `reasons` (block -> reason) explains blocks kept beyond the tracer's own rules.
-
-        A block of several motions counts as refused if any of them is, else as compensated if any of them is.
-        """
+    def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
+        """Account for the motions. A block with several motions is refused if any of them is, else passed if any is."""
         motion = moves.kind != Kind.DWELL
-        refused: dict[int, str] = {}
-        passed: dict[int, str] = {}
-        for row in np.flatnonzero(motion & kept):
-            block = int(moves.block[row])
-            reason = moves.reasons[moves.reason[row]]
-            if moves.rule[row] == Rule.PASS:
-                passed.setdefault(block, reason)
-            else:
-                refused.setdefault(block, reasons.get(block, reason))
-        compensated = frozenset(moves.block[motion & ~kept].tolist()) - refused.keys()
+        by_rule = np.flatnonzero(motion & (moves.rule == Rule.PASS))
+        refused = {block: reasons[block] for block in moves.block[motion & kept].tolist() if block in reasons}
+        passed = {int(moves.block[row]): moves.reasons[moves.reason[row]] for row in by_rule}
         passed = {block: reason for block, reason in passed.items() if block not in refused}
-        return cls(compensated - passed.keys(), passed, refused)
+        compensated = frozenset(moves.block[motion & ~kept].tolist()) - refused.keys() - passed.keys()
+        return cls(compensated, passed, refused)
 
     @property
     def total(self) -> int:
@@ -61,7 +64,7 @@ class Account:
 
     def reasons(self) -> Counter[str]:
         """How often each reason of refusal occurs, in blocks."""
-        return Counter(self.refused.values())
+        return Counter(reason.text for reason in self.refused.values())
 
 
 @dataclass(frozen=True, slots=True)

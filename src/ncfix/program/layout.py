@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ncfix.program.tree import Anchor, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
+from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
 
-AXIS_LETTERS = frozenset("XYZABCUVW")
+#: In the order in which programs write them.
+AXIS_LETTERS = "XYZABCUVW"
 MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
@@ -68,9 +69,11 @@ def layout_of(program: Program, block: int) -> Layout:
 
 
 def _code(program: Program, block: int, word: Word, address: str) -> float | None:
-    if word.address != address or not isinstance(word.value, Literal):
+    if word.address != address:
         return None
-    return float(program.values_of(block)[word.value.slot])
+    if isinstance(word.value, Constant):
+        return word.value.value
+    return float(program.values_of(block)[word.value.slot]) if isinstance(word.value, Literal) else None
 
 
 def _coded(program: Program, block: int, words: list[Word], address: str, codes: frozenset[float]) -> Word | None:

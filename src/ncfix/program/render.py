@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.layout import CENTRE_LETTERS, Layout
+from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
-from ncfix.program.tree import Literal, Program, Word
+from ncfix.program.tree import Constant, Literal, Program, Word
 
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
@@ -91,6 +91,7 @@ class BlockRenderer:
         self.target = target
         self.out = Rendered()
         self.added: list[str] = []
+        self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
 
     def render(self) -> Rendered:
@@ -113,7 +114,7 @@ class BlockRenderer:
     def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
         self._motion_code()
         base = position.copy()
-        for column, letter in enumerate(self.target.letters):
+        for column, letter in self.columns:
             word = self.layout.axes.get(letter)
             if word is None:
                 self._absent_axis(position, column, end[column])
@@ -144,8 +145,7 @@ class BlockRenderer:
     def _motion_code(self) -> None:
         wanted, word = self.target.code, self.layout.motion
         if word is not None:
-            written = self.program.values_of(self.block)[self._slot(word)]
-            if round(written * 10) != wanted:
+            if round(self._value(word, np.nan) * 10) != wanted:
                 self._rewrite(word, wanted / 10, 0)
         elif wanted != self.target.active_code:
             at = self.program.position(self.block, self.layout.code_at)
@@ -224,7 +224,7 @@ class BlockRenderer:
         end = target.ends[piece]
         position = position.copy()
         words = []
-        for column, letter in enumerate(target.letters):
+        for column, letter in self.columns:
             if not abs(end[column] - position[column]) >= self.half[column]:
                 continue
             base = position[column] if target.incremental else 0.0
@@ -252,11 +252,9 @@ class BlockRenderer:
 
     # -- words --------------------------------------------------------------------------------------------------------
 
-    def _slot(self, word: Word) -> int:
-        assert isinstance(word.value, Literal)
-        return word.value.slot
-
     def _value(self, word: Word, otherwise: float) -> float:
+        if isinstance(word.value, Constant):
+            return word.value.value
         if isinstance(word.value, Literal):
             return float(self.program.values_of(self.block)[word.value.slot])
         return otherwise
@@ -264,7 +262,7 @@ class BlockRenderer:
     def _rewrite(self, word: Word, value: float, decimals: int) -> float:
         """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
         start, stop = self.program.span(self.block, word.value_span)
-        literal = isinstance(word.value, Literal)
+        literal = isinstance(word.value, (Literal, Constant))
         style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
         text = style.write(value, decimals)
         self.out.edits.append((start, stop, text))

@@ -1,0 +1,168 @@
+"""A program in, a corrected program out, and the proof of what that does to the path.
+
+    Program --trace--> Moves --plan--> Pieces --emit--> edits --apply--> text --read, trace--> Moves again
+
+The text that comes out is read and followed again before anybody gets it: the control must understand exactly what the
+plan meant. If it would not, that is a fault of ncfix, and nothing is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix import __version__
+from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.proof import check_reading
+from ncfix.compensate.settle import Settled, settle
+from ncfix.compensate.strategies import get_strategy
+from ncfix.diagnostics import Message, RefusedError, SourceError
+from ncfix.machine import Machine
+from ncfix.program import stamp
+from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.setup import Setup
+from ncfix.program.trace import trace
+from ncfix.program.tree import Program
+from ncfix.program.writer import apply
+
+Resolve = Callable[[str], bytes | None]
+
+__all__ = ["FixOptions", "Fixed", "fix_program"]
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """The corrected program, whether it differs from the original, and what there is to report."""
+
+    text: bytes
+    changed: bool
+    report: FixReport
+
+
+def fix_program(
+    program: Program,
+    machine: Machine,
+    setup: Setup,
+    options: FixOptions = FixOptions(),  # noqa: B008
+    resolve: Resolve | None = None,
+) -> Fixed:
+    """Correct a program for a machine. A program that needs no change comes back as it is, without a stamp.
+
+    resolve  gives the text of a subprogram file by its name
+
+    Raises SourceError for what cannot be followed or is not known, RefusedError NCF430 for a program that carries a
+    stamp. Motions that had to be left uncorrected are in `report.refused`; whether that is acceptable is for the
+    caller to decide.
+    """
+    strategy = get_strategy(options.strategy)
+    _refuse_stamped(program, options)
+    if machine.is_perfect:
+        return _untouched(program)
+    placed = _placed(machine, setup)
+    followed = trace(program, setup, machine.axis_names, _rotary_names(machine), resolve)
+    _require_tool_lengths(program, followed.moves, placed)
+    settled = settle(program, followed.moves, placed, options)
+    text = _written(program, settled, machine, options, followed)
+    if text != program.source:
+        check_reading(
+            program,
+            text,
+            settled,
+            lambda again: trace(again, setup, machine.axis_names, _rotary_names(machine), resolve),
+        )
+    errors = None
+    return Fixed(text, text != program.source, _report(program, followed, settled, errors, strategy.leaves, options))
+
+
+def _refuse_stamped(program: Program, options: FixOptions) -> None:
+    block = stamp.find(program)
+    if block is not None and not options.force:
+        text = "the program has been corrected already; correcting it again would put the error back in"
+        raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
+
+
+def _placed(machine: Machine, setup: Setup) -> Machine:
+    """The machine with the workpiece where the setup has it."""
+    x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
+    return machine.replace(workpiece_offset=(x, y, z))
+
+
+def _rotary_names(machine: Machine) -> frozenset[str]:
+    return frozenset(axis.name for axis in machine.axes if axis.rotary)
+
+
+def _require_tool_lengths(program: Program, moves: Moves, machine: Machine) -> None:
+    """Errors that depend on the tool length need it: raise SourceError NCF431 naming every tool that lacks it."""
+    if not machine.depends_on_tool_length:
+        return
+    unknown = np.isnan(moves.tool_length) & (moves.rule == Rule.CORRECT)
+    messages = []
+    for tool in np.unique(moves.tool[unknown]).tolist():
+        row = int(np.flatnonzero(unknown & (moves.tool == tool))[0])
+        text = f"the length of tool {tool} is needed: the errors of this machine depend on it"
+        hint = f"give it with --tool {tool}=LENGTH or in the setup file, or say --assume-zero"
+        messages.append(Message("NCF431", text, program.place(int(moves.block[row])), hint))
+    if messages:
+        raise SourceError.collected(messages)
+
+
+def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
+    if not settled.emission.edits:
+        return program.source
+    words = (
+        f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
+    )
+    if followed.assumed:
+        words += f", assumed zero: {', '.join(followed.assumed)}"
+    limit = program.dialect.line_limit or 250
+    edit = stamp.insertion(program, words[: limit - 10])
+    edits = sorted((*settled.emission.edits, edit), key=lambda each: (each.start, each.stop))
+    return apply(program.source, edits)
+
+
+def _untouched(program: Program) -> Fixed:
+    report = FixReport(program.path, len(program), 0, 0, 0, False)
+    return Fixed(program.source, False, report)
+
+
+def _report(
+    program: Program, followed: Trace, settled: Settled, errors: None, leaves: str, options: FixOptions
+) -> FixReport:
+    moves = followed.moves
+    account = Account.of(moves, settled.kept, settled.reasons)
+    refused = [
+        Refusal(program.line(block), reason.code, reason.text) for block, reason in sorted(account.refused.items())
+    ]
+    findings = [
+        message
+        for finding in settled.plan.findings
+        for message in finding.messages(lambda row: program.place(int(moves.block[row])))
+    ]
+    return FixReport(
+        path=program.path,
+        blocks=len(program),
+        moves=len(moves),
+        compensated=len(account.compensated),
+        passed=len(account.passed),
+        changed=bool(settled.emission.edits),
+        inserted_blocks=settled.emission.added_blocks,
+        max_correction_um=_largest_correction(moves, settled) * 1e3,
+        error_before_um={},
+        error_after_um={},
+        refused=tuple(refused),
+        warnings=(*followed.messages, *findings),
+        strategy=options.strategy,
+        leaves=leaves,
+    )
+
+
+def _largest_correction(moves: Moves, settled: Settled) -> float:
+    """The largest shift of a linear command, mm."""
+    pieces = settled.plan.pieces
+    last = np.searchsorted(pieces.move, np.arange(len(moves)), side="right") - 1
+    shift = settled.emission.end[last] - moves.end
+    shift = shift[~settled.kept][:, ~moves.rotary]
+    return float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)) if len(shift) else 0.0

@@ -1,0 +1,113 @@
+"""Plan and text brought into agreement: what cannot be written is kept, and then the rest is planned anew.
+
+A block that is executed from several states may need another correction each time; a refused arc must begin where it
+began. Both show only when the text is written, and both change what the other motions have to do. So plan and emitter
+take turns until nothing more has to be kept; motions are only ever added to those that are, so this ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.account import Reason
+from ncfix.compensate.budget import Closure
+from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.path import Plan, plan
+from ncfix.compensate.strategies import get_strategy
+from ncfix.machine import Machine
+from ncfix.program.emit import PINNED, Emission, closure_of_refusals, emit
+from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.tree import Program
+
+CODE_OF_RULE = "NCF432"
+CODE_OF_TEXT = "NCF433"
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A plan that can be written, and its text.
+
+    moves    the motions as programmed
+    kept     (n,) those left as they were
+    reasons  block -> why it was refused
+    """
+
+    moves: Moves
+    plan: Plan
+    emission: Emission
+    kept: Mask
+    reasons: dict[int, Reason]
+
+
+def settle(program: Program, moves: Moves, machine: Machine, options: FixOptions) -> Settled:
+    """Plan and write until both agree."""
+    kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL))
+    reasons = _by_rule(moves)
+    while True:
+        kept, pinned = closure_of_refusals(moves, kept)
+        _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
+        kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
+        planned = _planned(program, moves, machine, options, kept)
+        refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
+        if refused.any():
+            _explain_findings(reasons, planned, moves, refused)
+            kept |= refused
+            continue
+        emission = emit(program, moves, planned.pieces, increments(machine))
+        if not emission.conflicts:
+            return Settled(moves, planned, emission, kept, reasons)
+        for block, why in emission.conflicts.items():
+            _explain(reasons, [block], CODE_OF_TEXT, why)
+
+
+def increments(machine: Machine) -> Array:
+    """(n_axes,) what the control can resolve, mm and rad."""
+    linear, rotary = machine.least_increment
+    return np.where(machine.rotary, rotary, linear)
+
+
+def rounding(machine: Machine) -> float:
+    """How far the tip may be off because the linear axes' numbers are rounded: the norm of half output steps, mm."""
+    return float(0.5 * machine.least_increment[0] * np.sqrt(np.count_nonzero(~machine.rotary)))
+
+
+def _planned(program: Program, moves: Moves, machine: Machine, options: FixOptions, kept: Mask) -> Plan:
+    dialect = program.dialect
+    return plan(
+        machine,
+        moves,
+        get_strategy(options.strategy),
+        options.tolerance_mm,
+        Closure(dialect.closure_mm, dialect.closure_relative),
+        kept,
+        rounding_mm=rounding(machine),
+        split_rapids=options.split_rapids,
+    )
+
+
+def _first_rows(planned: Plan, n: int) -> Array:
+    return np.searchsorted(planned.pieces.move, np.arange(n))
+
+
+def _by_rule(moves: Moves) -> dict[int, Reason]:
+    reasons: dict[int, Reason] = {}
+    for row in np.flatnonzero(moves.rule == Rule.REFUSE):
+        _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, moves.reasons[moves.reason[row]])
+    return reasons
+
+
+def _explain(reasons: dict[int, Reason], blocks: list[int], code: str, text: str) -> None:
+    for block in blocks:
+        reasons.setdefault(block, Reason(code, text))
+
+
+def _explain_findings(reasons: dict[int, Reason], planned: Plan, moves: Moves, refused: Mask) -> None:
+    for finding in planned.findings:
+        for k, row in enumerate(finding.moves.tolist()):
+            if refused[row]:
+                _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))
+    for row in np.flatnonzero(refused):
+        _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, "no correction was found for it")
