@@ -1,0 +1,186 @@
+"""Chain files: any serial chain as a list of elementary transformations, in TOML. docs/derive.md describes them.
+
+The transformations are text, `T(0, -e, -e/tan(Yp))` or `Rz(Cp)`, from the workpiece to the tool. They are read as
+arithmetic and nothing else: no name but those of the variables, pi and sin, cos, tan, sqrt.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import sympy as sp
+
+from ncfix.diagnostics import ConfigError, NcfixError, Place
+from ncfix.machine.fields import Report, Section, did_you_mean
+from ncfix.machine.symbolic.chain import Chain
+from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation
+from ncfix.machine.symbolic.variables import Size, Variable
+from ncfix.machine.toml_lines import key_lines
+
+SCHEMA = 1
+OPERATORS: Mapping[type, Callable[..., Expr]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+FUNCTIONS: Mapping[str, Callable[[Expr], Expr]] = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sqrt": sp.sqrt}
+STEPS = ("T", "Rx", "Ry", "Rz")
+
+
+def load_chain(path: str | Path) -> Chain:
+    """The chain that a file describes; raises `ConfigError` with every fault found (NCF302 ... NCF305, NCF391)."""
+    try:
+        text = Path(path).read_bytes().decode("utf-8")
+    except OSError as error:
+        raise ConfigError.of("NCF300", f"cannot read the chain file: {error.strerror}", Place(str(path))) from error
+    except UnicodeDecodeError as error:
+        raise ConfigError.of("NCF301", f"not a text in UTF-8 (byte {error.start})", Place(str(path))) from error
+    return loads_chain(text, str(path))
+
+
+def loads_chain(text: str, path: str = "<chain>") -> Chain:
+    """The chain that a text describes; raises as `load_chain`."""
+    try:
+        values = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError.of("NCF301", f"not TOML: {error}", Place(path)) from error
+    report = Report(path, text, key_lines(text))
+    chain = _chain(Section(values, (), report))
+    if report.messages:
+        raise ConfigError.collected(report.messages)
+    return chain
+
+
+def _chain(root: Section) -> Chain:
+    version = root.integer("ncfix-chain", required=True)
+    if version not in (None, SCHEMA):
+        root.note("NCF317", "ncfix-chain", f"schema version {version}, this ncfix reads {SCHEMA}")
+    name = root.text("name") or "chain"
+    variables = _variables(root)
+    senses = {axis: -1 if axis in _texts(root, "left_handed") else 1 for axis in UNITS}
+    formulas = _Formulas({variable.name: variable.sign * variable.symbol for variable in variables})
+    found = [_step(root, index, text, formulas, senses) for index, text in enumerate(_texts(root, "chain", True))]
+    steps = [step for step in found if step is not None]
+    axis = root.numbers("tool_axis", count=3) or (0.0, 0.0, 1.0)
+    root.close()
+    _check_linear(root, variables, steps)
+    return Chain(name, variables, tuple(steps), tuple(sp.Rational(str(part)) for part in axis))
+
+
+def _texts(root: Section, key: str, required: bool = False) -> list[str]:
+    values = root.get(key, required)
+    if values is None:
+        return []
+    if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
+        root.note("NCF304", key, "expected a list of texts")
+        return []
+    return values
+
+
+def _variables(root: Section) -> tuple[Variable, ...]:
+    tables = root.table("variable", required=True)
+    found = [_variable(tables, name) for name in tables.values] if tables else []
+    return tuple(variable for variable in found if variable)
+
+
+def _variable(tables: Section, name: str) -> Variable | None:
+    section = tables.table(name)
+    if section is None:
+        return None
+    size = section.text("size", required=True)
+    if size not in (None, "large", "small"):
+        section.note("NCF304", "size", f"{size!r} is neither large nor small")
+    angle, value, sign = section.flag("angle"), section.number("value"), section.integer("sign")
+    if sign not in (None, 1, -1):
+        section.note("NCF304", "sign", f"{sign} is neither 1 nor -1")
+    arguments = tuple(_texts(section, "depends_on"))
+    definition, axis = section.text("definition") or "", section.flag("axis")
+    section.close()
+    number = None if value is None else float(value * sp.pi / 180) if angle else value
+    try:
+        kind = Size.SMALL if size == "small" else Size.LARGE
+        return Variable(name, kind, definition, axis, angle, arguments, number, sign or 1)
+    except NcfixError as error:
+        tables.note("NCF391", name, error.messages[0].text, error.messages[0].hint)
+        return None
+
+
+def _step(root: Section, index: int, text: str, formulas: _Formulas, senses: Mapping[str, int]) -> Step | None:
+    try:
+        return formulas.step(text, senses)
+    except _FormulaError as error:
+        root.report.note("NCF391", ("chain", index), f"{text!r}: {error}", error.hint)
+        return None
+
+
+def _check_linear(root: Section, variables: tuple[Variable, ...], steps: list[Step]) -> None:
+    smalls = [variable.symbol for variable in variables if variable.small]
+    for step in steps:
+        if isinstance(step, Rotation) and sp.Poly(step.angle, *smalls, domain="EX").total_degree() > 1:
+            root.note("NCF391", "chain", f"the angle {step.angle} is not linear in the small variables")
+
+
+class _FormulaError(Exception):
+    """What is wrong with a formula."""
+
+    def __init__(self, text: str, hint: str = "") -> None:
+        super().__init__(text)
+        self.hint = hint
+
+
+class _Formulas:
+    """Reads formulas in some names."""
+
+    def __init__(self, names: Mapping[str, Expr]) -> None:
+        self._names = {**names, "pi": sp.pi}
+
+    def step(self, text: str, senses: Mapping[str, int]) -> Step:
+        """An elementary transformation."""
+        call = _parsed(text)
+        if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.func.id not in STEPS:
+            raise _FormulaError("a transformation is T(x, y, z), Rx(angle), Ry(angle) or Rz(angle)")
+        values = [self._value(argument) for argument in call.args]
+        wanted = 3 if call.func.id == "T" else 1
+        if len(values) != wanted or call.keywords:
+            raise _FormulaError(f"{call.func.id} takes {wanted} {'lengths' if wanted == 3 else 'angle'}")
+        if call.func.id == "T":
+            return Translation((values[0], values[1], values[2]))
+        axis = call.func.id[1]
+        return Rotation(UNITS[axis], senses[axis] * values[0])
+
+    def _value(self, node: ast.AST) -> Expr:
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            return sp.Rational(str(node.value))
+        if isinstance(node, ast.Name):
+            return self._named(node.id)
+        if isinstance(node, ast.UnaryOp) and type(node.op) in OPERATORS:
+            return OPERATORS[type(node.op)](self._value(node.operand))
+        if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+            return OPERATORS[type(node.op)](self._value(node.left), self._value(node.right))
+        if isinstance(node, ast.Call) and len(node.args) == 1 and not node.keywords:
+            function = FUNCTIONS.get(ast.unparse(node.func))
+            if function:
+                return function(self._value(node.args[0]))
+        text = f"{ast.unparse(node)!r} cannot be part of a formula"
+        raise _FormulaError(text, "numbers, names, + - * / **, sin, cos, tan, sqrt")
+
+    def _named(self, name: str) -> Expr:
+        if name not in self._names:
+            raise _FormulaError(f"no variable {name!r}", did_you_mean(name, self._names))
+        return self._names[name]
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise _FormulaError("cannot be read") from error

@@ -1,0 +1,140 @@
+"""The nominal inverse: axis positions from tip position and tool direction, where a closed form is reachable.
+
+The tool direction gives the rotary axes: with two of them, u_a . d = u_a . R(u_b, b) t gives b and the rotation about
+u_a from R(u_b, b) t to d gives a (subproblems of Paden and Kahan; Lynch and Park, Modern Robotics (2017), 6.1). The
+linear axes then follow from a linear system. Every axis is turned or shifted by its own number alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from ncfix.machine.symbolic.algebra import Algebra
+from ncfix.machine.symbolic.chain import Chain
+from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
+from ncfix.machine.symbolic.steps import Expr, Rotation, linear_part, rodrigues
+
+BRANCH = sp.Symbol("branch", real=True)
+"""Which of two solutions: +1 or -1."""
+TARGET = sp.Matrix([sp.Symbol(name, real=True) for name in DIRECTION])
+TIP = sp.Matrix([sp.Symbol(name, real=True) for name in POSITION])
+
+
+@dataclass(frozen=True, slots=True)
+class Inverse:
+    """Formulas per axis, in the order in which they can be evaluated, and what could not be had or must be known."""
+
+    formulas: Mapping[str, sp.Expr]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """A rotary axis: its direction with all axes at zero, with the sign in which it turns the tool."""
+
+    name: str
+    direction: sp.Matrix
+
+
+class _UnreachableError(Exception):
+    """Why there is no closed form."""
+
+
+def inverse_nominal(derivation: Derivation) -> Inverse:
+    """The formulas that there are; what is missing is in the notes."""
+    formulas: dict[str, sp.Expr] = {}
+    notes: list[str] = []
+    for solve in (_rotary, _linear):
+        try:
+            found, remarks = solve(derivation)
+            formulas |= found
+            notes += remarks
+        except _UnreachableError as reason:
+            notes.append(str(reason))
+    return Inverse(formulas, tuple(notes))
+
+
+def _rotary(derivation: Derivation) -> tuple[dict[str, Expr], list[str]]:
+    turns, tool = _turns(derivation.chain)
+    if len(turns) > 2:
+        names = ", ".join(turn.name for turn in turns)
+        raise _UnreachableError(f"rotary axes: a tool direction does not determine {names}: no closed form")
+    if not turns:
+        return {}, []
+    if len(turns) == 1:
+        return {turns[0].name: _about(turns[0], tool)}, [
+            f"only tool directions that {turns[0].name} reaches have a solution"
+        ]
+    outer, inner = turns
+    formulas = {inner.name: _to_level(outer, inner, tool)}
+    moved = rodrigues(tuple(inner.direction), sp.Symbol(inner.name, real=True)) * tool
+    formulas[outer.name] = _about(outer, moved)
+    notes = [f"{BRANCH} = 1 or -1: two solutions", f"{outer.name} is free where the tool is parallel to its axis"]
+    return formulas, notes
+
+
+def _turns(chain: Chain) -> tuple[list[_Turn], sp.Matrix]:
+    """The rotary axes from the workpiece to the tool, and the tool axis, with all axes at zero."""
+    smalls = [variable.symbol for variable in chain.smalls]
+    rotary = {variable.symbol for variable in chain.axes if variable.rotary}
+    fixed, turns = sp.eye(3), []
+    for step in chain.steps:
+        if not isinstance(step, Rotation):
+            continue
+        angle, _ = linear_part(step.angle, smalls)
+        names = angle.free_symbols & rotary
+        if not names:
+            fixed = fixed * rodrigues(step.direction, angle)
+            continue
+        sign = angle / next(iter(names))
+        if sign not in (1, -1):
+            raise _UnreachableError(f"rotary axes: a rotation by {angle} is not that of one axis: no closed form")
+        turns.append(_Turn(str(next(iter(names))), sign * fixed * sp.Matrix(step.direction)))
+    return turns, fixed * sp.Matrix(chain.tool_axis)
+
+
+def _to_level(outer: _Turn, inner: _Turn, tool: sp.Matrix) -> Expr:
+    """The inner angle at which the tool has the right angle to the outer axis."""
+    along = outer.direction.dot(inner.direction) * inner.direction.dot(tool)
+    even = outer.direction.dot(tool) - along
+    odd = outer.direction.dot(inner.direction.cross(tool))
+    level = outer.direction.dot(TARGET) - along
+    even, odd, level = _shortest([even, odd, level])
+    if even == 0 and odd == 0:
+        raise _UnreachableError(f"rotary axes: {inner.name} does not change the tool's angle to {outer.name}")
+    size = sp.Abs(even) if odd == 0 else sp.Abs(odd) if even == 0 else sp.sqrt(even**2 + odd**2)
+    return sp.atan2(odd, even) + BRANCH * sp.acos(sp.expand(level / size))
+
+
+def _about(turn: _Turn, start: sp.Matrix) -> Expr:
+    """The angle about the axis from a start direction to the target."""
+    u = turn.direction
+    sine = u.dot(start.cross(TARGET))
+    cosine = start.dot(TARGET) - u.dot(start) * u.dot(TARGET)
+    return sp.atan2(*_shortest([sine, cosine]))
+
+
+def _linear(derivation: Derivation) -> tuple[dict[str, Expr], list[str]]:
+    axes = [variable for variable in derivation.chain.axes if not variable.rotary]
+    if not axes:
+        return {}, []
+    if len(axes) != 3:
+        raise _UnreachableError(f"linear axes: {len(axes)} of them for three coordinates: no unique solution")
+    symbols = [axis.symbol for axis in axes]
+    tip = sp.Matrix([derivation.nominal[name] for name in POSITION])
+    matrix = tip.jacobian(symbols)
+    rest = TIP - tip.xreplace(dict.fromkeys(symbols, sp.Integer(0)))
+    determinant = _shortest([matrix.det()])[0]
+    if determinant == 0:
+        raise _UnreachableError("linear axes: they do not span space: no solution")
+    solution = [part / determinant for part in _shortest(list(matrix.adjugate() * rest))]
+    notes = ["x y z: the tip; the rotary axes as above"] if len(derivation.chain.axes) > 3 else []
+    return {axis.name: component for axis, component in zip(axes, solution, strict=True)}, notes
+
+
+def _shortest(expressions: list[Expr]) -> list[Expr]:
+    algebra = Algebra([sp.expand(expression) for expression in expressions])
+    return [algebra.expression(algebra.poly(expression)) for expression in expressions]
