@@ -1,0 +1,114 @@
+"""G2 and G3: from the words of a block to an arc in commands."""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.arcs import ARC_FAULT, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.builder import Arc
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.coordinates import CENTRE_LETTERS, IDENTITY, INCH, Plane, Vector, dot
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.feeds import check_feed
+from ncfix.program.rs274.targets import destination
+
+CLOCKWISE = 20
+
+
+def arc(control: Control, block: Block, code: int) -> None:
+    """An arc, helix or full circle."""
+    check_feed(control, block)
+    control.modal.motion = code
+    plane = control.modal.plane
+    check_words(control, block, plane)
+    control.settle((plane.first, plane.second))
+    target, unknown = destination(control, block)
+    step = in_frame(control, [b - a for a, b in zip(control.position, target, strict=True)])
+    end = step[plane.first], step[plane.second]
+    doubtful = bool(unknown or control.unknown or block.runtime or control.shaky)
+    clockwise = code == CLOCKWISE
+    try:
+        centre = centre_of(control, block, plane, end, clockwise=clockwise)
+    except Fault:
+        if not doubtful:
+            raise
+        centre = (1.0, 0.0)
+    turns = turns_of(block) if control.rules.strict else 1
+    sweep = sweep_angle(centre, end, turns, clockwise=clockwise)
+    refusal = refusal_of(block, plane)
+    control.move(
+        Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep)
+    )
+
+
+def turns_of(block: Block) -> int:
+    """The P word: in how many turns the arc reaches its end."""
+    turns = whole(block.get("P", 1.0), "P, the number of turns")
+    if turns < 1:
+        raise Fault(ARC_FAULT, f"P, the number of turns, is {turns}, and must be 1 or more")
+    return turns
+
+
+def refusal_of(block: Block, plane: Plane) -> str:
+    """Why an arc is refused: its centre is known only at run time."""
+    centre_words = {CENTRE_LETTERS[index] for index in (plane.first, plane.second)} | {"R"}
+    if block.runtime & centre_words:
+        return "the centre of the arc is known only at run time"
+    return ""
+
+
+def check_words(control: Control, block: Block, plane: Plane) -> None:
+    """Raise `Fault` unless the block has the words that an arc in its plane needs."""
+    if plane.across > 2:
+        raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
+    centre = [letter for letter in CENTRE_LETTERS if letter in block.values]
+    if "R" in block.values:
+        if centre:
+            raise Fault(ARC_FAULT, f"the arc has both R and {centre[0]}")
+        if not block.axes & (1 << plane.first | 1 << plane.second):
+            raise Fault(ARC_FAULT, "an arc given by R needs an end point in its plane")
+        return
+    if not centre:
+        raise Fault(ARC_FAULT, "the arc has neither R nor a centre (I J K)")
+    across = CENTRE_LETTERS[plane.across]
+    if control.rules.strict and across in block.values:
+        raise Fault(ARC_FAULT, f"{across} belongs to no arc in the plane G{plane.code // 10}")
+    wanted = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    missing = [letter for letter in wanted if letter not in block.values]
+    if control.modal.arc_absolute and missing:
+        raise Fault(ARC_FAULT, f"with absolute centres (G90.1) the arc needs {missing[0]}")
+
+
+def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clockwise: bool) -> Point:
+    """The centre relative to the start, mm; raises `Fault` if the control refuses the arc."""
+    unit = control.modal.unit
+    if "R" in block.values:
+        return centre_from_radius(end, unit * block.values["R"], clockwise=clockwise)
+    first, second = (unit * block.get(CENTRE_LETTERS[index]) for index in (plane.first, plane.second))
+    if control.modal.arc_absolute:
+        here = control.program_position()
+        first, second = first - here[plane.first], second - here[plane.second]
+    tolerance = control.dialect.closure_mm * (1.0 if unit == 1.0 else INCH / 10)
+    check_closure((first, second), end, tolerance, control.dialect.closure_relative)
+    return first, second
+
+
+def in_frame(control: Control, step: Vector) -> Vector:
+    """A difference of commands in the axes of the program's frame, mm and rad."""
+    if not control.is_rotated:
+        return step
+    return [dot(row, step) for row in control.inverse] + step[3:]
+
+
+def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:
+    """The circle in commands."""
+    local = [0.0, 0.0, 0.0]
+    local[plane.first], local[plane.second] = centre
+    normal = IDENTITY[plane.across]
+    if control.is_rotated:
+        local = [dot(row, local) for row in control.rotation]
+        normal = tuple(dot(row, normal) for row in control.rotation)  # type: ignore[assignment]
+    x, y, z = (math.nan if i in control.unknown else control.position[i] + local[i] for i in range(3))
+    return Arc((x, y, z), normal, sweep)

@@ -1,0 +1,204 @@
+"""Motions gathered as columns: single ones in lists, stretches as arrays; no object is kept per motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.moves import Frame, Kind, Moves, Rule
+from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Rotation, Vector
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class Style(NamedTuple):
+    """What many motions have in common; `frame` and `reason` are indices."""
+
+    kind: Kind
+    rule: Rule
+    reason: int
+    frame: int
+    incremental: bool
+    arc_absolute: bool
+    tcp: bool
+    compensated: bool
+    tool: int
+    tool_length: float
+    feed_mode: int
+    modal: int
+
+
+DTYPES: dict[str, type[np.generic]] = {
+    "kind": np.int8,
+    "rule": np.int8,
+    "reason": np.int16,
+    "frame": np.int32,
+    "tool": np.int32,
+    "tool_length": np.float64,
+    "feed_mode": np.int8,
+    "modal": np.int16,
+}
+"""The types of the columns of `Moves` that styles hold; the others are flags."""
+
+
+class Arc(NamedTuple):
+    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep."""
+
+    centre: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    sweep: float
+
+
+@dataclass(slots=True)
+class Stretch:
+    """Consecutive motions as columns; `programmed` is a bit mask by letter, `start` and `end` are (n, 9)."""
+
+    block: IntArray
+    programmed: IntArray
+    style: IntArray
+    feed: FloatArray
+    start: FloatArray
+    end: FloatArray
+
+
+@dataclass(slots=True)
+class Buffer:
+    """Motions that came one by one."""
+
+    block: list[int] = field(default_factory=list)
+    programmed: list[int] = field(default_factory=list)
+    style: list[int] = field(default_factory=list)
+    feed: list[float] = field(default_factory=list)
+    start: list[float] = field(default_factory=list)
+    end: list[float] = field(default_factory=list)
+
+    def stretch(self) -> Stretch:
+        """The motions as columns."""
+        return Stretch(
+            np.array(self.block, dtype=np.int64),
+            np.array(self.programmed, dtype=np.int64),
+            np.array(self.style, dtype=np.int64),
+            np.array(self.feed, dtype=np.float64),
+            np.array(self.start, dtype=np.float64).reshape(-1, N_LETTERS),
+            np.array(self.end, dtype=np.float64).reshape(-1, N_LETTERS),
+        )
+
+
+BUFFERED = 65536
+"""Motions that are kept as Python numbers before they become arrays."""
+
+
+class Builder:
+    """Gathers motions; `moves()` makes the columns of them."""
+
+    def __init__(self, axes: tuple[str, ...], rotary: frozenset[str]) -> None:
+        self.axes = axes
+        self.rotary = np.array([axis in rotary for axis in axes], dtype=np.bool_)
+        self.columns = [INDEX[axis] for axis in axes]
+        self.count = 0
+        self._buffer = Buffer()
+        self._stretches: list[Stretch] = []
+        self._styles: dict[Style, int] = {}
+        self._reasons: dict[str, int] = {"": 0}
+        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool], int] = {}
+        self._arcs: dict[int, Arc] = {}
+
+    # -- what is shared -----------------------------------------------------------------------------------------------
+
+    def style(self, style: Style) -> int:
+        """The index of a style."""
+        return self._styles.setdefault(style, len(self._styles))
+
+    def reason(self, text: str) -> int:
+        """The index of a reason."""
+        return self._reasons.setdefault(text, len(self._reasons))
+
+    def frame(self, offset: Vector, rotation: Rotation, unit: float, diameter: bool) -> int:
+        """The index of a frame; `offset` has one number per letter."""
+        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter)
+        return self._frames.setdefault(key, len(self._frames))
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def add(self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector) -> None:
+        """One motion."""
+        buffer = self._buffer
+        buffer.block.append(block)
+        buffer.programmed.append(programmed)
+        buffer.style.append(style)
+        buffer.feed.append(feed)
+        buffer.start.extend(start)
+        buffer.end.extend(end)
+        self.count += 1
+        if len(buffer.block) >= BUFFERED:
+            self._flush()
+
+    def arc(self, arc: Arc) -> None:
+        """The circle of the motion that is added next."""
+        self._arcs[self.count] = arc
+
+    def extend(self, stretch: Stretch) -> None:
+        """Many motions."""
+        self._flush()
+        self._stretches.append(stretch)
+        self.count += len(stretch.block)
+
+    def _flush(self) -> None:
+        if self._buffer.block:
+            self._stretches.append(self._buffer.stretch())
+            self._buffer = Buffer()
+
+    # -- the result ---------------------------------------------------------------------------------------------------
+
+    def moves(self) -> Moves:
+        """All motions so far."""
+        self._flush()
+        parts = self._stretches or [Buffer().stretch()]
+        block, mask, style, feed, start, end = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("block", "programmed", "style", "feed", "start", "end")
+        )
+        bits = np.array([1 << column for column in self.columns], dtype=np.int64)
+        centre, normal, sweep = self._arc_columns(len(block))
+        return Moves(
+            axes=self.axes,
+            rotary=self.rotary,
+            start=start[:, self.columns],
+            end=end[:, self.columns],
+            programmed=(mask[:, None] & bits) != 0,
+            block=block.astype(np.int32),
+            feed=feed,
+            centre=centre,
+            normal=normal,
+            sweep=sweep,
+            frames=self._frame_table(),
+            reasons=tuple(self._reasons),
+            **self._style_columns(style),
+        )
+
+    def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
+        """The columns of what styles hold, one row per motion."""
+        rows = list(self._styles)
+        return {
+            name: np.array([row[index] for row in rows], dtype=DTYPES.get(name, np.bool_))[style]
+            for index, name in enumerate(Style._fields)
+        }
+
+    def _frame_table(self) -> tuple[Frame, ...]:
+        return tuple(
+            Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter)
+            for offset, rotation, unit, diameter in self._frames
+        )
+
+    def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        centre, normal, sweep = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
+        rows = list(self._arcs)
+        if rows:
+            centre[rows] = [arc.centre for arc in self._arcs.values()]
+            normal[rows] = [arc.normal for arc in self._arcs.values()]
+            sweep[rows] = [arc.sweep for arc in self._arcs.values()]
+        return centre, normal, sweep

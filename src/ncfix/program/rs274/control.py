@@ -1,0 +1,290 @@
+"""The control while it follows a program: modal state, offsets, parameters, and where the axes stand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from ncfix.diagnostics import Message, Place
+from ncfix.program.dialect import Dialect
+from ncfix.program.moves import Kind, Rule
+from ncfix.program.rs274.builder import Arc, Builder, Style
+from ncfix.program.rs274.coordinates import (
+    DEGREE,
+    IDENTITY,
+    INDEX,
+    LETTERS,
+    ROTARY_LETTERS,
+    Rotation,
+    Vector,
+    product,
+    rotated,
+    transposed,
+    zeros,
+)
+from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
+from ncfix.program.rs274.knowledge import Knowledge
+from ncfix.program.rs274.modal import Modal, Offsets, Saved
+from ncfix.program.rs274.parameters import Parameters
+from ncfix.program.setup import Setup
+
+AT_START = "where the axis {} stands when the program starts is not given"
+"""Why a position is not known at first; asked of the setup when it matters."""
+
+UNKNOWN_AXIS = "NCF206"
+
+Unknown = dict[int, str]
+"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
+
+
+@dataclass(slots=True)
+class Block:
+    """One block while it is executed.
+
+    index    the block in its program
+    values   the values of its words by address, in program units
+    runtime  addresses whose value is known only at run time
+    axes     bit mask of the axis words, by letter
+    """
+
+    index: int
+    values: dict[str, float]
+    runtime: frozenset[str]
+    axes: int
+
+    def get(self, letter: str, default: float = 0.0) -> float:
+        """The value of a word."""
+        return self.values.get(letter, default)
+
+
+@dataclass(slots=True)
+class Tools:
+    """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
+
+    lengths   lengths that the program has set (G10 L1), mm
+    measured  tools whose length it has set from what is known only at run time
+    """
+
+    selected: int = 0
+    spindle: int = 0
+    offset: int | None = None
+    lengths: dict[int, float] = field(default_factory=dict)
+    measured: set[int] = field(default_factory=set)
+
+
+class Control:
+    """Everything that the steps of a block read and change.
+
+    position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
+    unknown    letter index -> why the position is not known
+    shaky      letter index -> why the offset of the letter is not known
+    refusal    why every motion from here on is refused; empty while all is well
+    suspended  the same, for as long as a code is in force
+    saved      the modal states that M70 saved, one place for each call level
+    """
+
+    def __init__(self, setup: Setup, axes: tuple[str, ...], rotary: frozenset[str], dialect: Dialect) -> None:
+        self.setup = setup
+        self.dialect = dialect
+        self.rules: Rules = LINUXCNC if dialect.semantics == "linuxcnc" else ISO
+        self.machine = tuple(INDEX[axis] for axis in axes)
+        self.rotary = tuple((letter in rotary) if letter in axes else letter in ROTARY_LETTERS for letter in LETTERS)
+        self.builder = Builder(axes, rotary)
+        self.modal = Modal()
+        self.offsets = Offsets()
+        self.parameters = Parameters()
+        self.knowledge = Knowledge(setup, self.place)
+        self.tools = Tools()
+        self.saved: list[Saved | None] = [None]
+        self.messages: dict[str, Message] = {}
+        self.foreign: dict[str, Message] = {}
+        self.refusal = ""
+        self.suspended: dict[str, str] = {}
+        self.external = ""
+        self.tcp = setup.tcp
+        self.shaky: Unknown = {}
+        self.row_block = 0
+        self.locate: Callable[[], Place] = lambda: Place("")
+        self.numbers: Sequence[float] = ()
+        self.first = 0
+        self.offset_checked = False
+        self._frame = -1
+        self.refresh()
+        self.position = zeros()
+        self.unknown: Unknown = {}
+        self._start(axes)
+
+    def _start(self, axes: tuple[str, ...]) -> None:
+        """The start position, as far as it is given."""
+        for axis in axes:
+            index = INDEX[axis]
+            if axis in self.setup.initial:
+                self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)
+            else:
+                self.unknown[index] = AT_START
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        return self.locate()
+
+    def warn(self, code: str, text: str, hint: str = "") -> None:
+        """A remark, once per text."""
+        if text not in self.messages:
+            self.messages[text] = Message(code, text, self.place(), hint)
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Compose the offsets; to be called after any of them, the unit or the diameter mode has changed."""
+        offsets = self.offsets
+        centre = offsets.centre
+        if offsets.rotation is not IDENTITY:
+            turned = rotated(offsets.rotation, centre)
+            inner = [s + c - t for s, c, t in zip(offsets.shift, centre, turned, strict=True)]
+        else:
+            inner = offsets.shift
+        outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
+        tool = zeros() if self.tcp else offsets.tool
+        self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
+        self.rotation: Rotation = product(offsets.turn, offsets.rotation)
+        self.is_rotated = self.rotation != IDENTITY
+        self.inverse = transposed(self.rotation)
+        self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]
+        if self.modal.diameter:
+            self.scale[0] /= 2
+        self._frame = -1
+
+    @property
+    def frame(self) -> int:
+        """The index of the frame that is in force."""
+        if self._frame < 0:
+            self._frame = self.builder.frame(self.offset, self.rotation, self.modal.unit, self.modal.diameter)
+        return self._frame
+
+    def program_position(self) -> Vector:
+        """Where the control stands in the frame of the program, mm and rad."""
+        inner = [p - o for p, o in zip(self.position, self.offset, strict=True)]
+        return rotated(self.inverse, inner) if self.is_rotated else inner
+
+    def coordinate(self, index: int) -> float:
+        """Where an axis stands in program units; marks the value where it is known only at run time."""
+        self.settle((index,))
+        if index in self.unknown or index in self.shaky:
+            self.parameters.touched = True
+        return self.program_position()[index] / self.scale[index]
+
+    # -- what is known ------------------------------------------------------------------------------------------------
+
+    def settle(self, indices: Sequence[int]) -> None:
+        """The start positions of these axes matter: they are given, or lacking and taken as zero."""
+        for index in indices:
+            if self.unknown.get(index) is AT_START:
+                self.knowledge.start_position(LETTERS[index])
+                del self.unknown[index]
+
+    def lose(self, indices: Sequence[int], reason: str) -> None:
+        """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
+        for index in indices:
+            if index in self.machine:
+                self.unknown[index] = reason
+
+    def tool_length(self) -> tuple[int, float]:
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        if self.tools.offset is not None:
+            return self.tools.offset, self.offsets.tool[2]
+        known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
+        return self.tools.spindle, math.nan if known is None else known
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def move(
+        self,
+        kind: Kind,
+        axes: int,
+        target: Vector,
+        unknown: Unknown,
+        code: int,
+        *,
+        refusal: str = "",
+        passing: str = "",
+        arc: Arc | None = None,
+    ) -> None:
+        """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed."""
+        if not passing:
+            self._ask_for_start(kind, unknown)
+        rule, reason = self._verdict(kind, unknown, refusal, passing)
+        style = self._style(kind, rule, reason, code)
+        if arc is not None:
+            self.builder.arc(arc)
+        start, end = self.position, target
+        if self.unknown:
+            start = blanked(start, self.unknown)
+        if unknown:
+            end = blanked(end, unknown)
+        self.builder.add(self.row_block, axes, style, self.modal.feed, start, end)
+        self.position = target
+        self.unknown = unknown
+
+    def _ask_for_start(self, kind: Kind, unknown: Unknown) -> None:
+        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
+        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
+            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
+            self.settle(everywhere)
+            for index in [index for index, why in unknown.items() if why is AT_START]:
+                del unknown[index]
+
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
+        """What may be done to the motion, and why."""
+        if passing:
+            return Rule.PASS, passing
+        reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
+        if not reason and unknown:
+            reason = first_reason(unknown)
+        if not reason and kind != Kind.RAPID and self.unknown:
+            reason = first_reason(self.unknown)
+        if not reason and self.external:
+            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
+        return (Rule.REFUSE, reason) if reason else (Rule.CORRECT, "")
+
+    def style_of(self, kind: Kind, code: int) -> int:
+        """The style of motions whose start and end are known and that have no reason of their own."""
+        rule, reason = self._verdict(kind, {}, "", "")
+        return self._style(kind, rule, reason, code)
+
+    def note_foreign(self, letter: str) -> None:
+        """The program moves an axis that the machine lacks."""
+        names = " ".join(self.builder.axes)
+        text = f"the program moves the axis {letter}, and the machine has only {names}"
+        self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), "is it the right machine file?")
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
+        modal = self.modal
+        tool, length = self.tool_length()
+        return self.builder.style(
+            Style(
+                kind,
+                rule,
+                self.builder.reason(reason),
+                self.frame,
+                modal.incremental,
+                modal.arc_absolute,
+                self.tcp,
+                modal.compensated != 0,
+                tool,
+                length,
+                modal.feed_mode,
+                code,
+            )
+        )
+
+
+def blanked(position: Vector, unknown: Unknown) -> Vector:
+    """A position with NaN where it is not known."""
+    return [math.nan if index in unknown else value for index, value in enumerate(position)]
+
+
+def first_reason(unknown: Unknown) -> str:
+    """The reason for the first axis whose position is not known."""
+    index = min(unknown)
+    return unknown[index].format(LETTERS[index])

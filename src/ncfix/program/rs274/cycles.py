@@ -1,0 +1,145 @@
+"""Canned cycles G73, G74, G81 to G89: one motion per hole, and where the control stands after it.
+
+Source: LinuxCNC documentation, "Canned cycles"; what it leaves open was tried out on `rs274`: in incremental mode R
+counts from where the series of holes began, and a block without R or Z repeats those of the cycle in force.
+"""
+
+from __future__ import annotations
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block, Control, Unknown
+from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, dot
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.feeds import INVERSE_TIME
+from ncfix.program.rs274.systems import check_system
+from ncfix.program.rs274.targets import unknown_after
+
+BAD_CYCLE = "NCF226"
+NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
+"""Words without which LinuxCNC refuses to begin a cycle."""
+
+
+def cycle(control: Control, block: Block, code: int) -> None:
+    """Drill the holes of one block."""
+    modal, plane = control.modal, control.modal.plane
+    check_cycle(control, block, code)
+    if not modal.incremental and not control.offset_checked:
+        check_system(control)
+    control.settle(tuple(control.unknown))
+    take_words(control, block, code, plane)
+    program = control.program_position()
+    initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
+    r, depth = levels(control, initial)
+    modal.cycle.initial, modal.motion = initial, code
+    clear = r if modal.retract_to_r else max(initial, r)
+    for _ in range(repeats(control, block)):
+        place_hole(control, block, program)
+        drill(control, block, code, program, depth, clear)
+
+
+def check_cycle(control: Control, block: Block, code: int) -> None:
+    """Raise `Fault` where LinuxCNC refuses a cycle."""
+    if not control.rules.strict:
+        return
+    modal = control.modal
+    if not modal.feed_given or modal.feed_mode == INVERSE_TIME:
+        raise Fault("NCF225", "a canned cycle needs a feed (F) per minute or revolution")
+    if modal.compensated:
+        raise Fault(BAD_CYCLE, "canned cycles cannot be used with cutter compensation")
+    turned = [letter for letter in "ABC" if letter in block.values]
+    if turned:
+        raise Fault(BAD_CYCLE, f"{turned[0]} cannot move in a canned cycle")
+    missing = [letter for letter in NEEDED_WORDS.get(code, "") if letter not in block.values]
+    if modal.motion != code and missing:
+        raise Fault(BAD_CYCLE, f"{missing[0]} is missing: G{code // 10} cannot begin without it")
+    if "Q" in NEEDED_WORDS.get(code, "") and block.get("Q", 1.0) <= 0.0:
+        raise Fault(BAD_CYCLE, "Q, the depth of one peck, must be positive")
+
+
+def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
+    """Take R and the depth from the block, or keep those in force."""
+    sticky = control.modal.cycle
+    in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
+    depth_letter = LETTERS[plane.across]
+    for letter in ("R", depth_letter):
+        if letter not in block.values and not in_force:
+            raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
+    if not in_force:
+        sticky.runtime = False
+    if "R" in block.values:
+        sticky.r = control.modal.unit * block.values["R"]
+    if depth_letter in block.values:
+        sticky.depth = control.scale[plane.across] * block.values[depth_letter]
+    sticky.runtime |= bool(block.runtime & {"R", depth_letter})
+
+
+def levels(control: Control, initial: float) -> tuple[float, float]:
+    """R and the depth in the program's frame."""
+    sticky = control.modal.cycle
+    r, depth = sticky.r, sticky.depth
+    if control.modal.incremental:
+        r += initial
+        depth += r
+    if r < depth:
+        raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({r:g} and {depth:g} mm)")
+    return r, depth
+
+
+def repeats(control: Control, block: Block) -> int:
+    """How many times the block drills: L, or K of ISO controls."""
+    letter = "L" if control.rules.strict or "L" in block.values else "K"
+    count = whole(block.get(letter, 1.0), letter)
+    if count < 1 and control.rules.strict:
+        raise Fault(BAD_CYCLE, "L, the number of repeats, must be 1 or more")
+    return count
+
+
+def place_hole(control: Control, block: Block, program: Vector) -> None:
+    """Move `program` over the next hole."""
+    across = control.modal.plane.across
+    for index, letter in enumerate(LETTERS):
+        if index != across and letter in block.values:
+            step = program[index] if control.modal.incremental else 0.0
+            program[index] = step + control.scale[index] * block.values[letter]
+
+
+def drill(control: Control, block: Block, code: int, program: Vector, depth: float, clear: float) -> None:
+    """One hole: a motion to its bottom, after which the control stands at `clear` above it."""
+    across = control.modal.plane.across
+    unknown = hole_unknown(control, block)
+    refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
+    height = control.unknown.get(across)
+    program[across] = depth
+    control.move(Kind.CYCLE, block.axes, command(control, block, program), unknown, code, refusal=refusal)
+    program[across] = clear
+    control.position = command(control, block, program)
+    if height is not None and not control.modal.retract_to_r:
+        control.unknown = {**unknown, across: height}
+
+
+def hole_unknown(control: Control, block: Block) -> Unknown:
+    """Which axes are not known at the bottom of a hole."""
+    modal = control.modal
+    unknown = dict(unknown_after(control, block, modal.incremental))
+    if not modal.incremental:
+        unknown.pop(modal.plane.across, None)
+        if modal.plane.across in control.shaky:
+            unknown[modal.plane.across] = control.shaky[modal.plane.across]
+    if control.is_rotated and unknown.keys() & {0, 1, 2}:
+        reason = unknown[min(unknown)]
+        unknown |= {index: reason for index in (0, 1, 2) if index in control.machine}
+    return unknown
+
+
+def command(control: Control, block: Block, program: Vector) -> Vector:
+    """The command of a point in the program's frame; axes that the cycle does not move stay exactly where they are."""
+    plane = control.modal.plane
+    inner = [dot(row, program) for row in control.rotation] + program[3:] if control.is_rotated else program
+    moved = {plane.across, *(index for index in range(len(LETTERS)) if block.axes >> index & 1)}
+    if control.is_rotated:
+        moved |= {0, 1, 2}
+    return [
+        control.offset[index] + inner[index] if index in moved else value
+        for index, value in enumerate(control.position)
+    ]

@@ -1,0 +1,91 @@
+"""Expressions of a block made into functions, once per shape; a function reads its numbers from a `Scope`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from ncfix.program.rs274.arithmetic import BINARY, UNARY, whole
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
+
+
+class Values(Protocol):
+    """The parameters as expressions see them."""
+
+    def numbered(self, index: int) -> float:
+        """The value of `#index`; raises `Fault`."""
+
+    def named(self, name: str) -> float:
+        """The value of `#<name>`; raises `Fault`."""
+
+    def exists(self, key: int | str) -> bool:
+        """Whether the parameter has been defined."""
+
+
+class Scope(Protocol):
+    """What an expression may refer to."""
+
+    @property
+    def numbers(self) -> Sequence[float]:
+        """The numbers of the program."""
+
+    @property
+    def first(self) -> int:
+        """Where those of the block begin."""
+
+    @property
+    def parameters(self) -> Values:
+        """The parameters."""
+
+
+Evaluate = Callable[[Scope], float]
+
+
+def compiled(expression: Expression) -> Evaluate:
+    """The function that computes an expression; it raises `Fault` where the control would stop."""
+    match expression:
+        case Literal(slot):
+            return lambda scope: scope.numbers[scope.first + slot]
+        case Constant(value):
+            return lambda scope: value
+        case Parameter(index):
+            number = compiled(index)
+            return lambda scope: scope.parameters.numbered(whole(number(scope), "the number of a parameter"))
+        case NamedParameter(name):
+            return lambda scope: scope.parameters.named(name)
+        case Exists(parameter):
+            return existence(parameter)
+        case Unary(operator, operand):
+            return unary(operator, compiled(operand))
+        case Binary(operator, left, right):
+            return binary(operator, compiled(left), compiled(right))
+
+
+def unary(operator: str, operand: Evaluate) -> Evaluate:
+    """A sign or a function of one argument."""
+    function = UNARY[operator]
+    return lambda scope: function(operand(scope))
+
+
+def binary(operator: str, left: Evaluate, right: Evaluate) -> Evaluate:
+    """An operator between two operands."""
+    function = BINARY[operator]
+
+    def evaluate(scope: Scope) -> float:
+        value = function(left(scope), right(scope))
+        if not math.isfinite(value):
+            raise Fault("NCF210", f"the result of {operator} is not a finite number")
+        return value
+
+    return evaluate
+
+
+def existence(parameter: Parameter | NamedParameter) -> Evaluate:
+    """`EXISTS[...]`: 1 or 0."""
+    if isinstance(parameter, NamedParameter):
+        name = parameter.name
+        return lambda scope: float(scope.parameters.exists(name))
+    number = compiled(parameter.index)
+    return lambda scope: float(scope.parameters.exists(whole(number(scope), "the number of a parameter")))

@@ -1,0 +1,323 @@
+"""The walk through a program: block after block, as flow control leads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ncfix.diagnostics import Place, SourceError
+from ncfix.program.dialect import Dialect
+from ncfix.program.reader import read
+from ncfix.program.rs274 import predefined, systems
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.flow import FlowControl
+from ncfix.program.rs274.groups import CYCLES, LENGTH
+from ncfix.program.rs274.lane import run_lane
+from ncfix.program.rs274.modal import NO_MOTION
+from ncfix.program.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
+from ncfix.program.rs274.order import MACHINE, MOTIONS
+from ncfix.program.rs274.plans import Codes, Plan, grouped_codes
+from ncfix.program.rs274.settings import unknown_code
+from ncfix.program.rs274.unit import Unit
+from ncfix.program.rs274.wordcheck import unused_word
+from ncfix.program.tree import Program, Span, Word
+
+MAX_BLOCKS = 10_000_000
+"""Blocks that are executed before a program counts as endless."""
+
+ENDLESS = "NCF233"
+NO_END = "NCF234"
+UNUSED = "NCF209"
+CALL, RETURN = 980, 990
+PROGRAM_ENDS = (20, 300)
+MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
+SKIPPED_BLOCKS = "NCF235"
+
+
+class Interpreter:
+    """Follows one program."""
+
+    def __init__(
+        self,
+        control: Control,
+        program: Program,
+        resolve: Callable[[str], bytes | None] | None,
+        max_blocks: int,
+    ) -> None:
+        self.control = control
+        self.resolve = resolve
+        self.budget = max_blocks
+        self.files: dict[str, Unit | None] = {}
+        self.axes = sum(1 << index for index in control.machine)
+        self.main = Unit(program, control.rules, self.axes)
+        self.flow = FlowControl(control, self.main, self.find)
+        self.span: Span | None = None
+        control.locate = self.place
+        control.parameters.persistent = lambda number: systems.before_persistent(control, number)
+        predefined.install(control, self.flow)
+        systems.load_setup(control)
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        unit, block = self.flow.unit, self.flow.block - 1
+        return unit.program.place(block, self.span) if 0 <= block < len(unit) else Place(unit.program.path)
+
+    def find(self, name: str) -> Unit | None:
+        """The file of a subprogram."""
+        if name not in self.files:
+            source = self.resolve(name) if self.resolve else None
+            dialect: Dialect = self.main.program.dialect
+            self.files[name] = self.unit_of(read(source, name, dialect), name) if source else None
+        return self.files[name]
+
+    def unit_of(self, program: Program, name: str) -> Unit:
+        """The unit of a subprogram file."""
+        return Unit(program, self.control.rules, self.axes, name)
+
+    def run(self) -> None:
+        """Follow the program to its end; raises SourceError where the control would stop."""
+        try:
+            self.walk()
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def walk(self) -> None:
+        """Block after block."""
+        flow = self.flow
+        while True:
+            if flow.skipping is not None and not flow.next_flow():
+                self.at_skipped_end()
+            if flow.block >= len(flow.unit):
+                self.at_end_of_text()
+                return
+            plan = flow.unit.plan(flow.block)
+            if plan.lane is not None:
+                done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main)
+                if done:
+                    flow.block += done
+                    self.spend(done)
+                    continue
+            flow.block += 1
+            self.span = None
+            self.spend(1)
+            if self.execute(plan):
+                return
+
+    def spend(self, blocks: int) -> None:
+        """Count executed blocks; raises `Fault` when there are too many."""
+        self.budget -= blocks
+        if self.budget < 0:
+            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+
+    def at_end_of_text(self) -> None:
+        """The text is over without M2, M30 or `%`."""
+        fault = self.flow.unfinished()
+        if fault is not None:
+            raise fault
+        self.control.warn(NO_END, "the program does not end with M2 or M30", "some controls refuse it")
+
+    def at_skipped_end(self) -> None:
+        """The text is over while something is looked for."""
+        fault = self.flow.missing_end()
+        unit, block = self.flow.skipping_from
+        self.flow.unit, self.flow.block = unit, block + 1
+        raise fault
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan) -> bool:
+        """Execute the block before `flow.block`; True if the program ends there."""
+        control, unit, index = self.control, self.flow.unit, self.flow.block - 1
+        control.numbers, control.first = unit.numbers, unit.first[index]
+        if unit is self.main:
+            control.row_block, control.external = index, ""
+        else:
+            control.external = unit.name
+        if plan.skip and self.is_skipped():
+            return False
+        if plan.tape:
+            return self.at_tape(index)
+        if plan.flow is not None:
+            self.span = plan.flow.span
+            self.flow.follow(plan.flow)
+            if self.flow.unit is not self.main and unit is self.main:
+                control.row_block = index
+            return False
+        return self.execute_words(plan, index)
+
+    def is_skipped(self) -> bool:
+        """Whether blocks with `/` are passed over."""
+        if self.control.setup.block_skip:
+            return True
+        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "--block-skip: they are skipped")
+        return False
+
+    def at_tape(self, index: int) -> bool:
+        """`%`: the first line of a tape, or its end."""
+        first = next(b for b in range(len(self.flow.unit)) if self.flow.unit.plan(b).tape)
+        if index == first and self.flow.unit.begins_with_tape():
+            return False
+        fault = self.flow.unfinished()
+        if fault is not None:
+            raise fault
+        return True
+
+    def execute_words(self, plan: Plan, index: int) -> bool:
+        """Execute a block of words and assignments."""
+        control = self.control
+        if plan.fault is not None:
+            raise plan.fault
+        block = self.evaluate(plan, index)
+        codes = plan.codes or self.computed_codes(plan)
+        motion = self.motion_of(plan, codes)
+        self.check_words(plan, codes, motion)
+        if plan.command is not None:
+            self.command(plan.command)
+        self.note_foreign(plan)
+        for code in codes.unknown:
+            unknown_code(control, code)
+        for step, code in codes.steps:
+            step(control, block, code)
+        if motion is not None:
+            self.move(block, codes, motion)
+        return self.after(codes, block)
+
+    def evaluate(self, plan: Plan, index: int) -> Block:
+        """The values of a block; its assignments take effect when all have been read."""
+        control = self.control
+        numbers, first, parameters = control.numbers, control.first, control.parameters
+        values = {letter: numbers[first + slot] for letter, slot in plan.literals}
+        runtime = []
+        for letter, function, span in plan.computed:
+            parameters.touched = False
+            self.span = span
+            values[letter] = function(control)
+            if parameters.touched:
+                runtime.append(letter)
+        if plan.assignments:
+            self.assign(plan)
+        self.span = None
+        return Block(index, values, frozenset(runtime), plan.axes)
+
+    def assign(self, plan: Plan) -> None:
+        """Set the parameters that a block sets, all at once."""
+        parameters = self.control.parameters
+        pending = []
+        for target, function, span in plan.assignments:
+            self.span = span
+            parameters.touched = False
+            key = whole(target(self.control), "the number of a parameter") if callable(target) else target
+            parameters.check_writable(key)
+            pending.append((key, function(self.control), parameters.touched))
+        for key, value, runtime in pending:
+            parameters.assign(key, value, runtime)
+
+    def computed_codes(self, plan: Plan) -> Codes:
+        """The codes of a block in which some are computed."""
+        parameters = self.control.parameters
+        parameters.touched = False
+        pairs: list[tuple[Word, int]] = []
+        for word, function in plan.code_words:
+            tenths = 10 * function(self.control)
+            if abs(tenths - round(tenths)) > 0.001:
+                raise Fault(BAD_MOTION, f"{word.address}{tenths / 10:g} is not a code", span=word.span)
+            pairs.append((word, round(tenths)))
+        if parameters.touched:
+            self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
+        return grouped_codes(pairs, plan.letters, self.control.rules)
+
+    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+        """The motion code that a block executes; raises `Fault` where its axis words have no code."""
+        modal, strict = self.control.modal.motion, self.control.rules.strict
+        has_axes = bool(plan.axes) or bool(plan.letters & {"@", "^"})
+        if codes.motion is not None:
+            return self.explicit_motion(codes, has_axes, strict)
+        if codes.takes or (has_axes and codes.g.get(LENGTH) in (431, 432)):
+            return None
+        if has_axes:
+            if modal == NO_MOTION or modal < 0:
+                return self.without_code(codes)
+            return modal
+        if plan.letters & {"I", "J", "K"} and modal in (20, 30):
+            return modal
+        return None
+
+    def explicit_motion(self, codes: Codes, has_axes: bool, strict: bool) -> int | None:
+        """The motion code that a block names."""
+        motion = codes.motion
+        if codes.takes:
+            if motion == NO_MOTION:
+                return motion
+            if strict:
+                raise Fault(BAD_MOTION, "two G codes of the block both use its axis words")
+            self.control.modal.motion = motion if motion is not None else NO_MOTION
+            return None
+        if strict and motion == NO_MOTION and has_axes:
+            raise Fault(BAD_MOTION, "axis words cannot be used with G80")
+        needs_axes = motion not in (0, 10, 20, 30, 52, NO_MOTION) and not 700 <= (motion or 0) <= 722
+        if needs_axes and not has_axes:
+            if strict:
+                raise Fault(BAD_MOTION, f"G{(motion or 0) / 10:g} needs an axis word")
+            self.control.modal.motion = motion if motion is not None else NO_MOTION
+            return None
+        return motion
+
+    def without_code(self, codes: Codes) -> int | None:
+        """Axis words while no motion code is in force."""
+        if self.control.rules.strict:
+            raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
+        if not codes.unknown:
+            self.control.refusal = self.control.refusal or NO_CODE
+        return None
+
+    def check_words(self, plan: Plan, codes: Codes, motion: int | None) -> None:
+        """Raise `Fault` for a word that no code uses, where the control does."""
+        if not self.control.rules.strict or motion in plan.checked:
+            return
+        g_codes, m_codes = frozenset(codes.g.values()), frozenset(codes.m.values())
+        letter = unused_word(plan.letters, motion, g_codes, m_codes)
+        if letter is not None:
+            span = next(word.span for word in plan.template.words if word.address == letter)
+            raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=span)
+        if plan.codes is not None:
+            plan.checked.add(motion)
+
+    def note_foreign(self, plan: Plan) -> None:
+        """Note axes that the program moves and the machine lacks."""
+        control = self.control
+        for index in range(N_LETTERS):
+            if plan.axes >> index & 1 and index not in control.machine and LETTERS[index] not in control.foreign:
+                self.span = next(word.span for word in plan.template.words if word.address == LETTERS[index])
+                control.note_foreign(LETTERS[index])
+        self.span = None
+
+    def command(self, span: Span) -> None:
+        """A command to the control itself: homing and jogging move the machine."""
+        text = self.flow.unit.program.slice(self.flow.block - 1, span).upper().replace(" ", "")
+        if text.startswith(("$H", "$J")):
+            self.control.lose(self.control.machine, MACHINE_MOVED)
+
+    def move(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block."""
+        if MACHINE in codes.g.values():
+            in_machine_coordinates(self.control, block, motion)
+        else:
+            MOTIONS[motion](self.control, block, motion)
+        if motion not in CYCLES:
+            self.control.modal.cycle.initial = None
+
+    def after(self, codes: Codes, block: Block) -> bool:
+        """What a block does last: M2, M30, M98, M99. True if the program ends."""
+        if codes.stop in PROGRAM_ENDS:
+            return True
+        if codes.call == CALL:
+            label = str(whole(block.get("P"), "P of M98"))
+            self.flow.call_by_code(label, whole(block.get("L", 1.0), "L of M98"))
+        if codes.call == RETURN:
+            if not self.flow.calls:
+                return True
+            self.flow.finish()
+        return False

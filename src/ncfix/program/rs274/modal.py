@@ -1,0 +1,90 @@
+"""The modal state: what one block sets and later blocks rely on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ncfix.program.rs274.coordinates import IDENTITY, PLANES, Plane, Rotation, Vector, zeros
+
+NO_MOTION = 800
+"""G80: no motion code is in force; the state at the start of a program."""
+
+
+@dataclass(slots=True)
+class Cycle:
+    """What of a canned cycle stays in force, in mm of the program's frame.
+
+    depth    the word of the axis across the plane
+    r        the R word
+    initial  where the series of holes began, across the plane; None while no cycle is in force
+    runtime  one of these is known only at run time
+    """
+
+    depth: float = 0.0
+    r: float = 0.0
+    initial: float | None = None
+    runtime: bool = False
+
+
+@dataclass(slots=True)
+class Modal:
+    """What is in force. G codes in tenths.
+
+    motion        motion code
+    plane         of arcs and cycles
+    unit          mm per unit of linear words
+    diameter      X words are diameters (G7)
+    incremental   G91
+    arc_absolute  G90.1
+    feed_mode     93, 94 or 95
+    feed          mm/min, 1/min or mm/rev; NaN where none is set, or one that is known only at run time
+    feed_given    a feed other than zero is set
+    speed         S
+    retract_to_r  G99: canned cycles end at R
+    compensated   41, 42 or 0: cutter radius compensation
+    system        1..9: G54..G59.3
+    tool_code     430 while a tool length offset is in force, 490 without
+    spindle       3, 4 or 5
+    """
+
+    motion: int = NO_MOTION
+    plane: Plane = PLANES[170]
+    unit: float = 1.0
+    diameter: bool = False
+    incremental: bool = False
+    arc_absolute: bool = False
+    feed_mode: int = 94
+    feed: float = math.nan
+    feed_given: bool = False
+    speed: float = 0.0
+    retract_to_r: bool = False
+    compensated: int = 0
+    system: int = 1
+    tool_code: int = 490
+    spindle: int = 5
+    cycle: Cycle = field(default_factory=Cycle)
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """A modal state that M70 or M73 has saved; `at_return`: it is restored when the subprogram returns."""
+
+    modal: Modal
+    at_return: bool
+
+
+@dataclass(slots=True)
+class Offsets:
+    """What lies between a program's numbers and commands, mm and rad, each a position in the order of `LETTERS`.
+
+    `command = origin + tool + turn @ (shift + centre + rotation @ (program - centre))`, `turn` that of the work offset
+    (G10 R) and `rotation` that of G68.
+    """
+
+    origin: Vector = field(default_factory=zeros)
+    turn: Rotation = IDENTITY
+    shift: Vector = field(default_factory=zeros)
+    tool: Vector = field(default_factory=zeros)
+    centre: Vector = field(default_factory=zeros)
+    rotation: Rotation = IDENTITY

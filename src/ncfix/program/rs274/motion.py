@@ -1,0 +1,187 @@
+"""Straight motions, reference points, probing, and motions that are followed only as far as their end."""
+
+from __future__ import annotations
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.control import Block, Control, Unknown
+from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Vector
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.feeds import PER_REVOLUTION, check_feed
+from ncfix.program.rs274.systems import REFERENCES, is_given, store, stored
+from ncfix.program.rs274.targets import destination, machine_destination
+
+BAD_MOTION = "NCF221"
+MACHINE_COORDINATES = "machine coordinates (G53)"
+REFERENCE_POINT = "reference point ({})"
+PROBING = "probing"
+AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
+AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
+AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
+NO_CODE = "no motion code is in force"
+
+REFUSALS = {
+    50: "spline (G5)",
+    51: "spline (G5.1)",
+    52: "spline (G5.2)",
+    330: "threading (G33)",
+    331: "rigid tapping (G33.1)",
+    760: "threading cycle (G76)",
+}
+
+
+def straight(control: Control, block: Block, code: int) -> None:
+    """G0 and G1; with G53 in machine coordinates."""
+    if code:
+        check_feed(control, block)
+    control.modal.motion = code
+    if not block.axes:
+        return
+    target, unknown = destination(control, block)
+    control.move(Kind.FEED if code else Kind.RAPID, block.axes, target, unknown, code)
+
+
+def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
+    """G53 with G0 or G1."""
+    if code not in (0, 10):
+        raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
+    if control.modal.incremental:
+        raise Fault(BAD_MOTION, "G53 cannot be used with incremental coordinates (G91)")
+    if code:
+        check_feed(control, block)
+    control.modal.motion = code
+    if block.axes:
+        target, unknown = machine_destination(control, block)
+        kind = Kind.FEED if code else Kind.RAPID
+        control.move(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES)
+
+
+def one_way(control: Control, block: Block, code: int) -> None:
+    """G60: a rapid to the words from one side (ISO controls)."""
+    target, unknown = destination(control, block)
+    control.move(Kind.RAPID, block.axes, target, unknown, 0)
+
+
+# -- reference points -------------------------------------------------------------------------------------------------
+
+
+def go_to_reference(control: Control, block: Block, code: int) -> None:
+    """G28 and G30: by way of the words to the reference point, along the axes named, or along all."""
+    name = f"G{code // 10}"
+    passing = REFERENCE_POINT.format(name)
+    modal = control.modal.motion
+    checked, control.offset_checked = control.offset_checked, True
+    way, unknown = destination(control, block)
+    control.offset_checked = checked
+    if way != control.position:
+        control.move(Kind.RAPID, block.axes, way, unknown, modal, passing=passing)
+    axes = block.axes or sum(1 << index for index in control.machine)
+    target, unknown = reference_target(control, name, axes)
+    control.move(Kind.RAPID, block.axes, target, unknown, modal, passing=passing)
+
+
+def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Unknown]:
+    """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
+    first = REFERENCES[name]
+    runtime = control.parameters.numbers.runtime
+    reference = stored(control, first)
+    target, unknown = control.position[:], dict(control.unknown)
+    for index in range(N_LETTERS):
+        if not axes >> index & 1:
+            continue
+        target[index] = reference[index]
+        unknown.pop(index, None)
+        given = is_given(control, first, index) and first + index not in runtime
+        if index in control.machine and not given and not assumed(control, name):
+            unknown[index] = AFTER_REFERENCE
+    if control.tcp:
+        tcp.from_machine(control, target, unknown)
+    return target, unknown
+
+
+def assumed(control: Control, name: str) -> bool:
+    """Whether a reference point that is not given counts as zero."""
+    if control.setup.assume_zero:
+        control.knowledge.reference_point(name)
+    return control.setup.assume_zero
+
+
+def save_reference(control: Control, block: Block, code: int) -> None:
+    """G28.1 and G30.1: the position becomes the reference point."""
+    control.settle(tuple(control.unknown))
+    first = REFERENCES[f"G{code // 10}"]
+    for index, value in enumerate(control.position):
+        store(control, first, index, value, index in control.unknown)
+
+
+# -- probing ----------------------------------------------------------------------------------------------------------
+
+
+def probe(control: Control, block: Block, code: int) -> None:
+    """G38.2 to G38.5, and G31 of ISO controls: towards the words until the probe switches."""
+    if control.rules.strict:
+        if not control.modal.feed_given:
+            raise Fault("NCF225", "probing, and no feed (F) is set")
+        if control.modal.feed_mode == PER_REVOLUTION:
+            raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
+    control.modal.motion = code
+    target, unknown = destination(control, block)
+    moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
+    if control.rules.strict and code % 2 == 0 and not moved:
+        raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
+    ends = unknown | {index: AFTER_PROBING for index in moved if index in control.machine}
+    control.move(Kind.FEED, block.axes, target, ends, code, passing=PROBING)
+    program = control.program_position()
+    for index in range(N_LETTERS):
+        value = program[index] / control.scale[index]
+        control.parameters.assign(5061 + index, value, runtime=True)
+    control.parameters.assign(5070, 1.0, runtime=True)
+
+
+# -- followed only as far as their end --------------------------------------------------------------------------------
+
+
+def refused(control: Control, block: Block, code: int) -> None:
+    """Splines and threads: the end is followed, the path is not."""
+    if code in (330, 331, 760):
+        control.modal.motion = code
+        if control.rules.strict and control.modal.spindle == 5:
+            raise Fault(BAD_MOTION, f"the spindle does not turn in {REFUSALS[code]}")
+    elif code in (50, 51):
+        check_feed(control, block)
+    else:
+        control.modal.motion = code
+    target, unknown = destination(control, block)
+    before, known = control.position, control.unknown
+    control.move(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code])
+    if code == 331:
+        control.position, control.unknown = before, known
+
+
+def end_spline(control: Control, block: Block, code: int) -> None:
+    """G5.3: the spline that the G5.2 blocks described is done."""
+    if control.modal.motion != 52:
+        raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
+    control.modal.motion = -1
+
+
+def turning_cycle(control: Control, block: Block, code: int) -> None:
+    """G70 to G72 of turning: where it goes is written elsewhere in the program."""
+    unknown = dict(control.unknown)
+    for letter in "XZ":
+        if INDEX[letter] in control.machine:
+            unknown[INDEX[letter]] = AFTER_CYCLE
+    refusal = f"turning cycle (G{code / 10:g})"
+    control.move(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal)
+
+
+def dwell(control: Control, block: Block, code: int) -> None:
+    """G4."""
+    if control.rules.strict and block.get("P", -1.0) == -1.0:
+        raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
+    control.move(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing="dwell")
+
+
+def cancel(control: Control, block: Block, code: int) -> None:
+    """G80."""
+    control.modal.motion = code

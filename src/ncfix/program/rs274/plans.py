@@ -1,0 +1,219 @@
+"""A plan for each shape of block: what its words are, which codes it has, and what is done in which order.
+
+Everything that does not depend on numbers is settled once per shape, so that a block costs little when it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ncfix.program.rs274 import groups
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.rs274.expressions import Evaluate, compiled
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.groups import Rules
+from ncfix.program.rs274.order import Step, steps_of
+from ncfix.program.tree import (
+    Assignment,
+    Comment,
+    Constant,
+    Flow,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Skip,
+    Span,
+    Tape,
+    Template,
+    Word,
+)
+
+NO_WORDS = frozenset("GMNO")
+"""Addresses that do not come as values to the steps of a block."""
+
+LANE_LETTERS = frozenset("FN") | INDEX.keys()
+CONFLICT = "NCF208"
+UNKNOWN_M = "NCF229"
+MAX_M_CODES = 4
+
+AXES_TAKEN = frozenset((100, 220, 280, 300, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
+"""G codes that take the axis words of their block for themselves, so that it has no motion."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """The codes of a block, by group.
+
+    steps    what is done before the motion
+    motion   the motion code, if the block has one
+    stop     M0, M1, M2, M30, M60 in tenths
+    call     M98 or M99 in tenths
+    takes    one of the codes takes the axis words
+    unknown  G codes that are not known
+    """
+
+    g: dict[str, int]
+    m: dict[str, int]
+    steps: tuple[tuple[Step, int], ...]
+    motion: int | None
+    stop: int | None
+    call: int | None
+    takes: bool
+    unknown: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A block that is nothing but a straight motion with plain numbers.
+
+    axes    pairs of letter index and slot
+    feed    slot of F, -1 without
+    motion  0, 10, or -1 if the code in force stays
+    """
+
+    axes: tuple[tuple[int, int], ...]
+    feed: int
+    motion: int
+
+
+@dataclass(frozen=True, slots=True)
+class FlowLine:
+    """A flow-control line: its label, as text or as a function, its keyword, and the functions of its arguments."""
+
+    label: str | Evaluate
+    keyword: str
+    arguments: tuple[Evaluate, ...]
+    span: Span
+
+
+@dataclass(slots=True)
+class Plan:
+    """What is done with every block of a shape.
+
+    literals     (address, slot) of words with a plain number
+    computed     words with an expression
+    assignments  parameters that are set
+    code_words   G and M words whose code is computed; else `codes` are the codes
+    flow         the flow-control line that the block is
+    skip, tape   the block begins with `/`; it is a `%`
+    command      where a command to the control itself stands (`$H` of Grbl)
+    axes         bit mask of the axis words
+    fault        what is wrong with the codes, raised when the block runs
+    lane         set if the block may go through the fast lane
+    checked      motion codes with which the words have been found to be used
+    """
+
+    template: Template
+    literals: tuple[tuple[str, int], ...] = ()
+    computed: tuple[tuple[str, Evaluate, Span], ...] = ()
+    assignments: tuple[tuple[int | str | Evaluate, Evaluate, Span], ...] = ()
+    code_words: tuple[tuple[Word, Evaluate], ...] = ()
+    codes: Codes | None = None
+    flow: FlowLine | None = None
+    skip: bool = False
+    tape: bool = False
+    command: Span | None = None
+    axes: int = 0
+    letters: frozenset[str] = frozenset()
+    fault: Fault | None = None
+    lane: Lane | None = None
+    checked: set[int | None] = field(default_factory=set)
+
+
+def plan_of(template: Template, rules: Rules) -> Plan:
+    """The plan for a shape."""
+    words = template.words
+    values = [word for word in words if word.address not in NO_WORDS]
+    code_words = [word for word in words if word.address in "GM"]
+    plan = Plan(template)
+    plan.literals = tuple((w.address, w.value.slot) for w in values if isinstance(w.value, Literal))
+    plan.computed = tuple((w.address, compiled(w.value), w.span) for w in values if not isinstance(w.value, Literal))
+    plan.letters = frozenset(word.address for word in values)
+    plan.axes = sum(1 << INDEX[word.address] for word in values if word.address in INDEX)
+    plan.assignments = tuple(assignment(item) for item in template.items if isinstance(item, Assignment))
+    plan.flow = next((flow_line(item) for item in template.items if isinstance(item, Flow)), None)
+    plan.skip = any(isinstance(item, Skip) for item in template.items)
+    plan.tape = any(isinstance(item, Tape) for item in template.items)
+    plan.command = next((i.span for i in template.items if isinstance(i, Opaque) and i.kind == "command"), None)
+    if all(isinstance(word.value, Constant) for word in code_words):
+        pairs = [(word, round(10 * word.value.value)) for word in code_words if isinstance(word.value, Constant)]
+        try:
+            plan.codes = grouped_codes(pairs, plan.letters, rules)
+        except Fault as fault:
+            plan.fault = fault
+    else:
+        plan.code_words = tuple((word, compiled(word.value)) for word in code_words)
+    plan.lane = lane_of(plan)
+    return plan
+
+
+def flow_line(item: Flow) -> FlowLine:
+    """A flow-control line with its expressions as functions."""
+    label = item.label if isinstance(item.label, str) else compiled(item.label)
+    return FlowLine(label, item.keyword, tuple(map(compiled, item.arguments)), item.span)
+
+
+def assignment(item: Assignment) -> tuple[int | str | Evaluate, Evaluate, Span]:
+    """Target and value of an assignment; a name as it is, a number as a function."""
+    target = item.target.name if isinstance(item.target, NamedParameter) else compiled(item.target.index)
+    return target, compiled(item.value), item.span
+
+
+def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], rules: Rules) -> Codes:
+    """The codes of a block by group; raises `Fault` where two exclude one another or one is not known."""
+    g: dict[str, int] = {}
+    m: dict[str, int] = {}
+    unknown = []
+    for word, code in pairs:
+        if word.address == "G":
+            if code in rules.harmless_g:
+                continue
+            if code not in rules.g_groups:
+                unknown.append(code)
+                continue
+            enter(g, rules.g_groups[code], word, code, rules)
+        else:
+            enter_m(m, word, code, rules)
+    if rules.strict and sum(word.address == "M" for word, _ in pairs) > MAX_M_CODES:
+        raise Fault(CONFLICT, f"more than {MAX_M_CODES} M codes in a block", span=pairs[-1][0].span)
+    return Codes(
+        g,
+        m,
+        steps_of(g, m, letters),
+        g.get(groups.MOTION),
+        m.get(groups.STOP),
+        m.get(groups.CALL),
+        bool(AXES_TAKEN & set(g.values())),
+        tuple(unknown),
+    )
+
+
+def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:
+    """Note a code; raises `Fault` if its group has one already (LinuxCNC: even the same one)."""
+    if group in codes and (rules.strict or codes[group] != code):
+        first, second = (f"{word.address}{number / 10:g}" for number in (codes[group], code))
+        raise Fault(CONFLICT, f"{first} and {second} exclude one another (both set the {group})", span=word.span)
+    codes[group] = code
+
+
+def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
+    """Note an M code; one that is not known changes no coordinates, but LinuxCNC refuses it."""
+    group = groups.LINUXCNC_M.get(code)
+    if group is not None:
+        enter(codes, group, word, code, rules)
+    elif rules.strict:
+        raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
+
+
+def lane_of(plan: Plan) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
+    codes = plan.codes
+    plain = all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
+    if not plain or plan.command or codes is None or plan.computed or not plan.letters <= LANE_LETTERS:
+        return None
+    if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or codes.motion not in (None, 0, 10):
+        return None
+    axes = tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX)
+    feed = dict(plan.literals).get("F", -1)
+    return Lane(axes, feed, -1 if codes.motion is None else codes.motion)

@@ -1,0 +1,74 @@
+"""Shifts and rotations of all coordinate systems: G52, G92 to G92.3, and G68 of ISO controls.
+
+Source: LinuxCNC documentation, "G52", "G92"; for G68 and G69 the Fanuc 30i programming manual.
+"""
+
+from __future__ import annotations
+
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.settings import unfollowed
+from ncfix.program.rs274.systems import SHIFT, mark_shaky, store, stored, words_of
+
+SHIFT_ACTIVE = 5210
+
+
+def shift_system(control: Control, block: Block, code: int) -> None:
+    """G52 and G92: shift all coordinate systems, by the words or so that the position gets their values."""
+    if code in (520, 920) and not block.axes:
+        if control.rules.strict:
+            raise Fault("NCF221", f"G{code // 10} needs an axis word")
+        return
+    if code in (520, 920):
+        set_shift(control, block, from_position=code == 920)
+    else:
+        control.offsets.shift = stored(control, SHIFT) if code == 923 else zeros()
+    if code == 921:
+        for index in range(N_LETTERS):
+            store(control, SHIFT, index, 0.0, runtime=False)
+    control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
+    mark_shaky(control)
+    control.refresh()
+
+
+def set_shift(control: Control, block: Block, *, from_position: bool) -> None:
+    """The shift that the words ask for."""
+    shift = control.offsets.shift[:]
+    if from_position:
+        control.settle(tuple(control.unknown) if control.is_rotated else words_of(block))
+    position = control.program_position()
+    doubtful = {*control.unknown, *control.shaky} if from_position else set()
+    for index in words_of(block):
+        value = control.scale[index] * block.values[LETTERS[index]]
+        shift[index] = position[index] + shift[index] - value if from_position else value
+        store(control, SHIFT, index, shift[index], index in doubtful or LETTERS[index] in block.runtime)
+    control.offsets.shift = shift
+
+
+def rotate_system(control: Control, block: Block, code: int) -> None:
+    """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
+    control.offsets.rotation, before = IDENTITY, control.offsets.rotation
+    if code == 680:
+        turn_about_point(control, block, before if control.modal.incremental else IDENTITY)
+    else:
+        control.offsets.centre = zeros()
+        unfollowed(control, block, code)
+    control.refresh()
+
+
+def turn_about_point(control: Control, block: Block, before: tuple[tuple[float, float, float], ...]) -> None:
+    """Put a rotation by R about the words of the plane into force, on top of another."""
+    plane = control.modal.plane
+    centre = control.program_position()
+    for index in (plane.first, plane.second):
+        letter = LETTERS[index]
+        if letter in block.values:
+            step = centre[index] if control.modal.incremental else 0.0
+            centre[index] = control.scale[index] * block.values[letter] + step
+        else:
+            control.settle((index,))
+    if block.runtime or control.unknown.keys() & {plane.first, plane.second}:
+        control.refusal = control.refusal or "the centre or angle of a rotation (G68) is known only at run time"
+    control.offsets.rotation = product(before, about(plane, block.get("R")))  # type: ignore[arg-type]
+    control.offsets.centre = centre

@@ -1,0 +1,119 @@
+"""Where the axis words of a block lead, as commands, and which of the axes are then known.
+
+Source: LinuxCNC documentation, "G-code overview" and "G90, G91", "G53"; the composition of offsets is that of
+`Offsets`. A word that is absent leaves its axis where it is.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.control import Block, Control, Unknown
+from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, X, Y, Z, rotated
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.systems import check_system
+
+RUNTIME = "where the axis {} stands is known only at run time"
+POLAR = "NCF223"
+
+
+def destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+    """The command at which a motion of this block ends."""
+    incremental = control.modal.incremental
+    if not incremental and not control.offset_checked:
+        check_system(control)
+    if "@" in block.values or "^" in block.values:
+        block = cartesian(control, block)
+        incremental = False
+    if control.is_rotated and block.axes & 7:
+        return rotated_destination(control, block, incremental)
+    target = control.position[:]
+    for letter, value in block.values.items():
+        if letter in INDEX:
+            index = INDEX[letter]
+            origin = target[index] if incremental else control.offset[index]
+            target[index] = origin + control.scale[index] * value
+    return target, unknown_after(control, block, incremental)
+
+
+def unknown_after(control: Control, block: Block, incremental: bool) -> Unknown:
+    """Which axes are not known where the motion ends."""
+    if not (control.unknown or control.shaky or block.runtime):
+        return control.unknown
+    unknown = dict(control.unknown)
+    for index, letter in enumerate(LETTERS):
+        if not block.axes >> index & 1 or index not in control.machine:
+            continue
+        if not incremental:
+            unknown.pop(index, None)
+            if index in control.shaky:
+                unknown[index] = control.shaky[index]
+        if letter in block.runtime:
+            unknown[index] = RUNTIME
+    return unknown
+
+
+def rotated_destination(control: Control, block: Block, incremental: bool) -> tuple[Vector, Unknown]:
+    """`destination` in a rotated frame, where one word moves several axes."""
+    program = control.program_position()
+    for letter, value in block.values.items():
+        if letter in INDEX:
+            index = INDEX[letter]
+            program[index] = control.scale[index] * value + (program[index] if incremental else 0.0)
+    outer = rotated(control.rotation, program)
+    target = [a + b for a, b in zip(outer, control.offset, strict=True)]
+    for index in range(len(LETTERS)):
+        mixed = index < 3 and any(control.rotation[index][k] != 0.0 and block.axes >> k & 1 for k in range(3))
+        if not mixed and not block.axes >> index & 1:
+            target[index] = control.position[index]
+    return target, rotated_unknown(control, block, incremental)
+
+
+def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknown:
+    """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
+    own = unknown_after(control, block, incremental)
+    if not own:
+        return own
+    unknown = {index: why for index, why in own.items() if index > Z}
+    for index in (X, Y, Z):
+        mixed = [k for k in (X, Y, Z) if control.rotation[index][k] != 0.0 and k in own]
+        if mixed and index in control.machine:
+            unknown[index] = own[mixed[0]]
+    return unknown
+
+
+def cartesian(control: Control, block: Block) -> Block:
+    """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
+    if control.modal.plane.code != 170:
+        raise Fault(POLAR, "polar coordinates are for the plane G17 only")
+    if block.axes & 3:
+        raise Fault(POLAR, "a block has either polar coordinates or X and Y")
+    program = [control.coordinate(index) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)]
+    radius, angle = math.hypot(program[X], program[Y]), math.degrees(math.atan2(program[Y], program[X]))
+    incremental = control.modal.incremental
+    if radius == 0.0 and (incremental or "^" not in block.values):
+        raise Fault(POLAR, "at the origin a polar coordinate needs both radius and angle, absolute")
+    others = {letter: value for letter, value in block.values.items() if letter not in "@^"}
+    if incremental:
+        others |= {letter: value + program[INDEX[letter]] for letter, value in others.items() if letter in INDEX}
+        radius, angle = radius + block.get("@"), angle + block.get("^")
+    else:
+        radius, angle = block.get("@", radius), block.get("^", angle)
+    ends = {"X": radius * math.cos(math.radians(angle)), "Y": radius * math.sin(math.radians(angle))}
+    return Block(block.index, others | ends, block.runtime, block.axes | 3)
+
+
+def machine_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+    """The command at which a motion in machine coordinates (G53) ends."""
+    target, unknown = control.position[:], dict(control.unknown)
+    for letter, value in block.values.items():
+        if letter in INDEX:
+            index = INDEX[letter]
+            target[index] = control.scale[index] * value
+            unknown.pop(index, None)
+            if letter in block.runtime:
+                unknown[index] = RUNTIME
+    if control.tcp:
+        tcp.from_machine(control, target, unknown)
+    return target, unknown

@@ -1,0 +1,85 @@
+"""A program text while it is executed: the main program, or the file of a subprogram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.rs274.groups import Rules
+from ncfix.program.rs274.plans import Plan, plan_of
+from ncfix.program.tree import Flow, Program
+
+
+def view(array: NDArray[Any]) -> Sequence[Any]:
+    """An array as a sequence of plain Python numbers, made one at a time."""
+    return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]
+
+
+@dataclass(slots=True, eq=False)
+class Unit:
+    """A program with the plans of its shapes.
+
+    axes      bit mask of the letters that the machine has
+    name      of a subprogram file; empty for the main program
+    template  index of each block's shape
+    first     where the numbers of each block begin
+    numbers   all numbers
+    flows     the blocks that are flow control, ascending
+    """
+
+    program: Program
+    rules: Rules
+    axes: int
+    name: str = ""
+    template: Sequence[int] = field(init=False)
+    first: Sequence[int] = field(init=False)
+    numbers: Sequence[float] = field(init=False)
+    flows: list[int] = field(init=False)
+    _plans: list[Plan | None] = field(init=False)
+    _lane_stops: NDArray[np.int64] | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        program = self.program
+        self.template = view(program.template)
+        self.first = view(program.first_number)
+        self.numbers = view(program.numbers)
+        self._plans = [None] * len(program.templates)
+        shapes = {index for index, t in enumerate(program.templates) if any(isinstance(i, Flow) for i in t.items)}
+        self.flows = [block for block, shape in enumerate(self.template) if shape in shapes] if shapes else []
+
+    def __len__(self) -> int:
+        return len(self.template)
+
+    def plan(self, block: int) -> Plan:
+        """The plan of a block."""
+        shape = self.template[block]
+        return self._plans[shape] or self.plan_of_shape(shape)
+
+    def plan_of_shape(self, shape: int) -> Plan:
+        """The plan of a shape."""
+        plan = self._plans[shape]
+        if plan is None:
+            plan = self._plans[shape] = plan_of(self.program.templates[shape], self.rules)
+            if plan.axes & ~self.axes:
+                plan.lane = None
+        return plan
+
+    def lane_end(self, block: int) -> int:
+        """The first block from `block` on that cannot go through the fast lane."""
+        if self._lane_stops is None:
+            lanes = [self.plan_of_shape(shape).lane is not None for shape in range(len(self._plans))]
+            closed = ~np.array(lanes, dtype=np.bool_)[self.program.template]
+            self._lane_stops = np.append(np.flatnonzero(closed), len(self))
+        return int(self._lane_stops[np.searchsorted(self._lane_stops, block)])
+
+    def begins_with_tape(self) -> bool:
+        """Whether the first block that is not blank is a `%`."""
+        for block in range(len(self)):
+            plan = self.plan(block)
+            if plan.tape or plan.template.items:
+                return plan.tape
+        return False

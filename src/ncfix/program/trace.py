@@ -1,0 +1,49 @@
+"""Following a program as the control would: from its tree to its motions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ncfix.diagnostics import UsageError
+from ncfix.program import stamp
+from ncfix.program.moves import Trace
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.coordinates import LETTERS
+from ncfix.program.rs274.interpreter import MAX_BLOCKS, Interpreter
+from ncfix.program.setup import Setup
+from ncfix.program.tree import Program
+
+NO_LETTER = "NCF207"
+
+
+def trace(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Callable[[str], bytes | None] | None = None,
+    max_blocks: int = MAX_BLOCKS,
+) -> Trace:
+    """The motions of a program, in commands in mm and rad with all offsets in, in the order of execution.
+
+    `axes` are the machine's axis letters, the columns of the motions; `rotary` those of them that turn. `resolve` gives
+    the text of a subprogram file by its name (`foo` for `o<foo> call`, `100` for `M98 P100`), None if there is none.
+
+    Raises SourceError NCF2xx at the first block at which the control would stop, UsageError with everything that the
+    program uses and the setup does not give, and with every axis that the program moves and the machine lacks.
+    """
+    strangers = [axis for axis in axes if axis not in LETTERS]
+    if strangers:
+        raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
+    control = Control(setup, axes, rotary, program.dialect)
+    Interpreter(control, program, resolve, max_blocks).run()
+    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
+    if lacking:
+        raise UsageError.collected(lacking)
+    marked = stamp.find(program)
+    return Trace(
+        moves=control.builder.moves(),
+        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
+        assumed=tuple(control.knowledge.assumed),
+        stamp="" if marked is None else program.text_of(marked),
+    )
