@@ -303,7 +303,7 @@ MISTAKES = [
     ("degree = [1, 2, 3]", "degre = [1, 2, 3]", "NCF303", "key 'degree' is missing | did you mean 'degre'?"),
     ("[0, 1e-8, 0]", "[1e-8, 1e-8, 0]", "NCF312", "not symmetric"),
     ('"polynomial"\ndegree = [1, 2, 3]', '"fourier"\norder = [1]', "NCF315", "needs the angle of a rotary axis"),
-    ('"polynomial"\ndegree = [1, 2, 3]', '"spline"\nknots = [0, 1]\ndegree = 1.5', "NCF304", "a whole number, found 1.5"),
+    ('"polynomial"\ndegree = [1, 2, 3]', '"spline"\nknots = [0]\ndegree = 1.5', "NCF304", "a whole number, found 1.5"),
     ('name = "EXX"', 'name = "EXX"\ncarried = true', "NCF315", "EXX is not a location error"),
 ]  # fmt: skip
 
