@@ -206,7 +206,7 @@ def test_a_machine_without_effects_depends_on_nothing() -> None:
         (Effect("EAX", (1.0,)), True),
         (Effect("EAX", (0.0,)), False),
         (Effect("EC0Y", (1.0,)), False),
-        (Effect("EC0Y", (1.0,), carried=True), True),
+        (Effect("EA0Y", (1.0,), carried=True), True),
         (Effect("EX0C", (1.0,)), False),
         (Effect("EA0C", (1.0,)), True),
         (Effect("EX0S", (1.0,)), False),

@@ -1,0 +1,58 @@
+"""Keys of a TOML text are found on their lines."""
+
+from __future__ import annotations
+
+from ncfix.machine.toml_lines import key_lines, line_of
+
+TEXT = '''\
+name = "a"
+
+[axis.X]   # a comment
+"quoted key" = 1
+direction = [
+    1,
+    0 ]
+note = """
+range = 5
+[axis.Z]
+"""
+range = [0, 1]
+
+[[effect]]
+name = "EXX"
+[[effect]]
+name = "EYX"
+inner.key = 1
+[effect.table]
+deep = 2
+[ provenance ]
+date = 1
+'''
+
+
+def test_lines() -> None:
+    lines = key_lines(TEXT)
+    expected = {
+        ("name",): 1,
+        ("axis", "X"): 3,
+        ("axis", "X", "quoted key"): 4,
+        ("axis", "X", "direction"): 5,
+        ("axis", "X", "note"): 8,
+        ("axis", "X", "range"): 12,
+        ("effect", 0): 14,
+        ("effect", 0, "name"): 15,
+        ("effect", 1): 16,
+        ("effect", 1, "name"): 17,
+        ("effect", 1, "inner", "key"): 18,
+        ("effect", 1, "table"): 19,
+        ("effect", 1, "table", "deep"): 20,
+        ("provenance",): 21,
+        ("provenance", "date"): 22,
+    }
+    assert {key: line for key, line in lines.items() if key} == expected
+
+
+def test_a_key_inside_a_line_is_placed_on_its_table() -> None:
+    lines = key_lines("a = 1\nincrement = { linear = 1, rotary = 2 }\n")
+    assert line_of(("increment", "rotary"), lines) == 2
+    assert line_of(("nowhere", 3, "at all"), lines) == 1
