@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ncfix.diagnostics import Code
+from ncfix.program.trace_codes import TRACE_CODES
 
 CODES: dict[str, Code] = {
     "NCF101": Code(
@@ -80,4 +81,4 @@ CODES: dict[str, Code] = {
         "After an O-word stands no keyword that the control knows, or more than belongs to it.",
         "One of sub, endsub, call, return, if, elseif, else, endif, while, do, repeat, break, continue.",
     ),
-}
+} | TRACE_CODES

@@ -34,6 +34,7 @@ CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 SKIPPED_BLOCKS = "NCF235"
+UNREADABLE = "NCF236"
 
 
 class Interpreter:
@@ -168,6 +169,8 @@ class Interpreter:
     def execute_words(self, plan: Plan, index: int) -> bool:
         """Execute a block of words and assignments."""
         control = self.control
+        if plan.unread:
+            raise Fault(UNREADABLE, "this line cannot be read, and the control gets to it")
         if plan.fault is not None:
             raise plan.fault
         block = self.evaluate(plan, index)
@@ -232,7 +235,7 @@ class Interpreter:
     def motion_of(self, plan: Plan, codes: Codes) -> int | None:
         """The motion code that a block executes; raises `Fault` where its axis words have no code."""
         modal, strict = self.control.modal.motion, self.control.rules.strict
-        has_axes = bool(plan.axes) or bool(plan.letters & {"@", "^"})
+        has_axes = plan.axes != 0
         if codes.motion is not None:
             return self.explicit_motion(codes, has_axes, strict)
         if codes.takes or (has_axes and codes.g.get(LENGTH) in (431, 432)):

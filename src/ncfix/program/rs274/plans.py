@@ -32,6 +32,9 @@ from ncfix.program.tree import (
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
+POLAR = frozenset("@^")
+"""Addresses that together stand for X and Y."""
+
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
 CONFLICT = "NCF208"
 UNKNOWN_M = "NCF229"
@@ -97,6 +100,7 @@ class Plan:
     code_words   G and M words whose code is computed; else `codes` are the codes
     flow         the flow-control line that the block is
     skip, tape   the block begins with `/`; it is a `%`
+    unread       the block could not be read
     command      where a command to the control itself stands (`$H` of Grbl)
     axes         bit mask of the axis words
     fault        what is wrong with the codes, raised when the block runs
@@ -114,6 +118,7 @@ class Plan:
     skip: bool = False
     tape: bool = False
     command: Span | None = None
+    unread: bool = False
     axes: int = 0
     letters: frozenset[str] = frozenset()
     fault: Fault | None = None
@@ -130,11 +135,14 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     plan.literals = tuple((w.address, w.value.slot) for w in values if isinstance(w.value, Literal))
     plan.computed = tuple((w.address, compiled(w.value), w.span) for w in values if not isinstance(w.value, Literal))
     plan.letters = frozenset(word.address for word in values)
-    plan.axes = sum(1 << INDEX[word.address] for word in values if word.address in INDEX)
+    plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
+    if plan.letters & POLAR:
+        plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
     plan.assignments = tuple(assignment(item) for item in template.items if isinstance(item, Assignment))
     plan.flow = next((flow_line(item) for item in template.items if isinstance(item, Flow)), None)
     plan.skip = any(isinstance(item, Skip) for item in template.items)
     plan.tape = any(isinstance(item, Tape) for item in template.items)
+    plan.unread = any(isinstance(item, Opaque) and item.kind == "unread" for item in template.items)
     plan.command = next((i.span for i in template.items if isinstance(i, Opaque) and i.kind == "command"), None)
     if all(isinstance(word.value, Constant) for word in code_words):
         pairs = [(word, round(10 * word.value.value)) for word in code_words if isinstance(word.value, Constant)]
@@ -210,7 +218,7 @@ def lane_of(plan: Plan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
     codes = plan.codes
     plain = all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
-    if not plain or plan.command or codes is None or plan.computed or not plan.letters <= LANE_LETTERS:
+    if not plain or plan.unread or plan.command or codes is None or plan.computed or not plan.letters <= LANE_LETTERS:
         return None
     if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or codes.motion not in (None, 0, 10):
         return None

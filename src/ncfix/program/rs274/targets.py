@@ -87,7 +87,7 @@ def cartesian(control: Control, block: Block) -> Block:
     """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
     if control.modal.plane.code != 170:
         raise Fault(POLAR, "polar coordinates are for the plane G17 only")
-    if block.axes & 3:
+    if block.values.keys() & {"X", "Y"}:
         raise Fault(POLAR, "a block has either polar coordinates or X and Y")
     program = [control.coordinate(index) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)]
     radius, angle = math.hypot(program[X], program[Y]), math.degrees(math.atan2(program[Y], program[X]))
@@ -101,7 +101,8 @@ def cartesian(control: Control, block: Block) -> Block:
     else:
         radius, angle = block.get("@", radius), block.get("^", angle)
     ends = {"X": radius * math.cos(math.radians(angle)), "Y": radius * math.sin(math.radians(angle))}
-    return Block(block.index, others | ends, block.runtime, block.axes | 3)
+    runtime = block.runtime | {"X", "Y"} if block.runtime & {"@", "^"} else block.runtime
+    return Block(block.index, others | ends, runtime, block.axes)
 
 
 def machine_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:

@@ -1,0 +1,192 @@
+"""The setup file (TOML): work offsets, tool lengths, start position and the rest that a program cannot know."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+from ncfix.diagnostics import ConfigError, Message, Place
+from ncfix.files import read_bytes
+from ncfix.program.setup import Setup, Tool
+from ncfix.program.tool_table import load_tool_table
+
+__all__ = ["load", "load_tool_table", "loads"]
+
+OFFSET_AXES = "XYZABCUVW"
+"""The order of the numbers of a work offset, and the axis letters."""
+
+NOT_TOML = "NCF381"
+UNKNOWN_KEY = "NCF382"
+WRONG_VALUE = "NCF383"
+
+SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+
+
+def load(path: str) -> Setup:
+    """The setup in a file. Raises SourceError NCF002, ConfigError NCF38x with all that is wrong in it."""
+    return loads(read_bytes(path).decode("utf-8", "replace"), path)
+
+
+def loads(text: str, path: str = "<setup>") -> Setup:
+    """The setup in a text; raises ConfigError NCF38x with all that is wrong in it."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError.of(
+            NOT_TOML, f"not TOML: {error}", Place(path), "docs/formats.md shows a setup file"
+        ) from None
+    reading = Reading(path)
+    values = {key: reading.entry(key, value) for key, value in content.items()}
+    if reading.faults:
+        raise ConfigError.collected(reading.faults)
+    return Setup(**{key: value for key, value in values.items() if key != "ncfix"})
+
+
+@dataclass(slots=True)
+class Reading:
+    """A setup file while it is read; faults are collected."""
+
+    path: str
+    faults: list[Message] = field(default_factory=list)
+
+    def fault(self, code: str, key: str, text: str, hint: str = "") -> None:
+        """Note what is wrong with a key."""
+        self.faults.append(Message(code, f"{key}: {text}", Place(self.path), hint))
+
+    def entry(self, key: str, value: Any) -> Any:
+        """The value of a top-level key as `Setup` wants it."""
+        readers: dict[str, Callable[[str, Any], Any]] = {
+            "ncfix": self.schema,
+            "work_offsets": lambda name, table: self.each(name, table, self.offset),
+            "tools": self.tools,
+            "initial": self.position,
+            "references": lambda name, table: self.each(name, table, self.reference),
+            "variables": lambda name, table: self.each(name, table, self.variable),
+            "workpiece_offset": self.triple,
+            "tcp": self.flag,
+            "assume_zero": self.flag,
+            "block_skip": self.flag,
+        }
+        if key not in readers:
+            close = get_close_matches(key, readers, 1)
+            hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(readers)}"
+            self.fault(UNKNOWN_KEY, key, "unknown key", hint)
+            return None
+        return readers[key](key, value)
+
+    def each(self, key: str, table: Any, reader: Callable[[str, Any], Any]) -> dict[str, Any]:
+        """A table whose values are all of one kind."""
+        if not isinstance(table, Mapping):
+            self.fault(WRONG_VALUE, key, "expected a table")
+            return {}
+        return {name: reader(f"{key}.{name}", value) for name, value in flattened(table).items()}
+
+    # -- single values ------------------------------------------------------------------------------------------------
+
+    def schema(self, key: str, value: Any) -> None:
+        """The version of the schema."""
+        if value != 1:
+            self.fault(WRONG_VALUE, key, f"schema version {value!r}, this ncfix reads 1")
+
+    def number(self, key: str, value: Any) -> float:
+        """A finite number."""
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            self.fault(WRONG_VALUE, key, f"expected a number, found {value!r}")
+            return 0.0
+        return float(value)
+
+    def flag(self, key: str, value: Any) -> bool:
+        """True or false."""
+        if not isinstance(value, bool):
+            self.fault(WRONG_VALUE, key, f"expected true or false, found {value!r}")
+        return value is True
+
+    def triple(self, key: str, value: Any) -> tuple[float, float, float]:
+        """Three numbers."""
+        if not isinstance(value, list) or len(value) != 3:
+            self.fault(WRONG_VALUE, key, "expected three numbers [x, y, z], mm")
+            return 0.0, 0.0, 0.0
+        x, y, z = (self.number(key, part) for part in value)
+        return x, y, z
+
+    def position(self, key: str, value: Any) -> dict[str, float]:
+        """A table from axis letter to position."""
+        if not isinstance(value, Mapping):
+            self.fault(WRONG_VALUE, key, "expected a table like { X = 0.0, Z = 300.0 }")
+            return {}
+        for letter in value:
+            if str(letter).upper() not in tuple(OFFSET_AXES):
+                self.fault(UNKNOWN_KEY, f"{key}.{letter}", "no axis letter", f"they are {' '.join(OFFSET_AXES)}")
+        return {str(letter).upper(): self.number(f"{key}.{letter}", part) for letter, part in value.items()}
+
+    def offset(self, key: str, value: Any) -> dict[str, float]:
+        """A work offset: numbers in the order X Y Z A B C, or a table by axis letter."""
+        name = key.partition(".")[2]
+        if name not in SYSTEMS and not name.startswith("G54.1P"):
+            close = get_close_matches(name, SYSTEMS, 1)
+            self.fault(UNKNOWN_KEY, key, "no work offset", f"did you mean {close[0]}?" if close else "G54 ... G59.3")
+        if isinstance(value, list):
+            if not 1 <= len(value) <= len(OFFSET_AXES):
+                self.fault(WRONG_VALUE, key, f"expected 1 to {len(OFFSET_AXES)} numbers, found {len(value)}")
+            return {letter: self.number(key, part) for letter, part in zip(OFFSET_AXES, value, strict=False)}
+        return self.position(key, value)
+
+    def reference(self, key: str, value: Any) -> dict[str, float]:
+        """The position of a reference point."""
+        if key.partition(".")[2] not in ("G28", "G30"):
+            self.fault(UNKNOWN_KEY, key, "no reference point", "they are G28 and G30")
+        return self.position(key, value)
+
+    def variable(self, key: str, value: Any) -> float:
+        """The value of a parameter, `"#100"` or `"#<name>"`."""
+        name = key.partition(".")[2]
+        if not name.startswith("#") or not (name[1:].isdigit() or (name.startswith("#<") and name.endswith(">"))):
+            self.fault(UNKNOWN_KEY, key, "no parameter", 'they are written "#100" or "#<name>"')
+        return self.number(key, value)
+
+    def tools(self, key: str, value: Any) -> dict[int, Tool]:
+        """Tools by number."""
+        if not isinstance(value, Mapping):
+            self.fault(WRONG_VALUE, key, "expected a table like 12 = { length = 120.0 }")
+            return {}
+        return {
+            int(name): self.tool(f"{key}.{name}", part) for name, part in value.items() if self.is_number(key, name)
+        }
+
+    def is_number(self, key: str, name: str) -> bool:
+        """Whether a key is a tool number."""
+        if not name.isdigit():
+            self.fault(UNKNOWN_KEY, f"{key}.{name}", "no tool number")
+        return name.isdigit()
+
+    def tool(self, key: str, value: Any) -> Tool:
+        """Length and radius of a tool; a plain number is the length."""
+        if not isinstance(value, Mapping):
+            return Tool(self.number(key, value))
+        for name in value:
+            if name not in ("length", "radius"):
+                close = get_close_matches(name, ("length", "radius"), 1)
+                self.fault(UNKNOWN_KEY, f"{key}.{name}", "unknown key", f"did you mean {close[0]}?" if close else "")
+        length, radius = (
+            self.number(f"{key}.{name}", value[name]) if name in value else None for name in ("length", "radius")
+        )
+        return Tool(length, radius)
+
+
+def flattened(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table in which `G59.1 = ..`, which TOML takes for a table in a table, has its key back.
+
+    `work_offsets.G59.1 = [0, 0, 0]` is {"G59": {"1": [0, 0, 0]}} to TOML.
+    """
+    flat: dict[str, Any] = {}
+    for key, value in table.items():
+        inner = value if isinstance(value, Mapping) else {}
+        flat |= {f"{key}.{name}": part for name, part in inner.items() if str(name).isdigit()}
+        rest = {name: part for name, part in inner.items() if not str(name).isdigit()}
+        if rest or not inner:
+            flat[key] = rest or value
+    return flat

@@ -1,0 +1,181 @@
+"""The codes of following a program (2xx) and of the files that say what is on the machine (38x)."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+TRACE_CODES: dict[str, Code] = {
+    "NCF201": Code(
+        "Work offset not given",
+        "The program moves in a coordinate system (G54 ... G59.3) whose offset is set on the control. A correction "
+        "depends on where the axes stand, so it has to be known.",
+        "--offset G54=x,y,z, or work_offsets in the setup file; --assume-zero takes what is missing as zero.",
+    ),
+    "NCF202": Code(
+        "Tool length not given",
+        "A tool length offset (G43) takes a length from the control's tool table, and it is not given.",
+        "--tool 12=LENGTH, --tool-table FILE, or tools in the setup file; --assume-zero takes it as zero.",
+    ),
+    "NCF203": Code(
+        "Start position not given",
+        "The first motions do not name all axes, so that where they lead depends on where the axes stand at the start.",
+        "--initial Z=300, or initial in the setup file; --assume-zero takes it as zero.",
+    ),
+    "NCF204": Code(
+        "Reference point not given",
+        "The program computes with the position of a reference point (G28, G30), which is set on the control.",
+        "references in the setup file; --assume-zero takes it as zero.",
+    ),
+    "NCF205": Code(
+        "Taken as zero",
+        "Something that the program uses was not given, and --assume-zero says that it is zero. The correction is "
+        "right only if it really is.",
+        "Give its value.",
+    ),
+    "NCF206": Code(
+        "Axis that the machine lacks",
+        "The program has a word for an axis that is not in the machine file.",
+        "Check that it is the file of the machine that the program was written for.",
+    ),
+    "NCF207": Code(
+        "Axis without a letter",
+        "An axis of the machine file has a name that no word of the language can move.",
+        "Axes are called X Y Z A B C U V W.",
+    ),
+    "NCF208": Code(
+        "Codes exclude one another",
+        "Two codes of one modal group stand in the block, as G0 and G1: only one of them can be in force.",
+        "Take one of them out.",
+    ),
+    "NCF209": Code(
+        "Word without use",
+        "No code of the block uses this word. LinuxCNC refuses such a block: often a code is missing or mistyped.",
+        "Take the word out, or put its code in.",
+    ),
+    "NCF210": Code(
+        "Impossible arithmetic",
+        "An expression cannot be computed, as a division by zero, or its value cannot be used where it stands.",
+        "Check the expression and the parameters in it.",
+    ),
+    "NCF211": Code(
+        "Parameter not defined",
+        "A named parameter is read before anything was assigned to it.",
+        'Assign to it first; what the control has of its own goes into variables."#<name>" of the setup file.',
+    ),
+    "NCF212": Code(
+        "Parameter is read-only",
+        "The control keeps this parameter itself; a program can only read it.",
+        "Assign to another parameter.",
+    ),
+    "NCF213": Code(
+        "No such parameter",
+        "Numbered parameters are #1 to #5602.",
+        "Check the number, or the expression that computes it.",
+    ),
+    "NCF220": Code(
+        "Impossible arc",
+        "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",
+        "Check end point, centre or radius, the plane, and whether centres are incremental (G91.1) or not (G90.1).",
+    ),
+    "NCF221": Code(
+        "Impossible command",
+        "The control would refuse the block: its codes and words do not go together, or not with what is in force.",
+        "The message says what is missing or in the way.",
+    ),
+    "NCF222": Code(
+        "Impossible G10",
+        "G10 sets a coordinate system (L2, L20) or a tool (L1, L10, L11); its words do not say which, or how.",
+        "Check L and P.",
+    ),
+    "NCF223": Code(
+        "Impossible polar coordinate",
+        "Polar coordinates (@ and ^) give X and Y in the plane G17, and need both radius and angle at the origin.",
+        "Give X and Y instead.",
+    ),
+    "NCF224": Code(
+        "Impossible tool or length offset",
+        "G43.2 needs H or axis words, H and T whole numbers that are not negative, and M61 its Q.",
+        "Check the words.",
+    ),
+    "NCF225": Code(
+        "No feed",
+        "A motion at feed needs F; after G94 and G95 it has to be given anew, in G93 in every block.",
+        "Put F into the block.",
+    ),
+    "NCF226": Code(
+        "Impossible canned cycle",
+        "A canned cycle lacks a word that it cannot begin with, or has one that it cannot use.",
+        "The message says which.",
+    ),
+    "NCF227": Code(
+        "Unknown G code",
+        "LinuxCNC has no such code.",
+        "Correct it. If it is remapped on the machine, ncfix cannot know what it does.",
+    ),
+    "NCF228": Code(
+        "Unknown G code, motions refused",
+        "The code is not one that ncfix knows for ISO controls. It may move axes or change coordinates, so nothing "
+        "after it is corrected.",
+        "Name the dialect with --dialect, if there is one for the control.",
+    ),
+    "NCF229": Code(
+        "Unknown M code",
+        "LinuxCNC has no such code.",
+        "Correct it. If it is remapped on the machine, ncfix cannot know what it does.",
+    ),
+    "NCF230": Code(
+        "Flow control broken",
+        "O-words do not fit together: an end is missing, a label is used twice, or a line stands where it cannot.",
+        "The message names the label.",
+    ),
+    "NCF231": Code(
+        "Subprogram not found",
+        "A subprogram is called that is neither in the program nor in a file of its name beside it.",
+        "Put its file beside the program.",
+    ),
+    "NCF232": Code(
+        "Subprograms nested too deep",
+        "A control keeps only so many calls at a time; often a subprogram calls itself without end.",
+        "Check where the recursion ends.",
+    ),
+    "NCF233": Code(
+        "Endless program",
+        "More blocks were executed than ncfix follows: a loop does not end.",
+        "Check the condition of the loop.",
+    ),
+    "NCF234": Code(
+        "No program end",
+        "The program does not end with M2 or M30, nor between two `%`.",
+        "It may be cut off; check that it was transferred completely.",
+    ),
+    "NCF235": Code(
+        "Block skip",
+        "Blocks that begin with `/` are executed or passed over as the operator chooses; what follows depends on it.",
+        "block_skip = true in the setup file passes over them.",
+    ),
+    "NCF236": Code(
+        "Line cannot be read",
+        "The control gets to a line that is not written in its language.",
+        "Correct the line.",
+    ),
+    "NCF381": Code(
+        "The setup file is no TOML",
+        "The file cannot be read as TOML; the message says where.",
+        "docs/formats.md shows a setup file.",
+    ),
+    "NCF382": Code(
+        "Unknown key in the setup file",
+        "A key is not one that ncfix knows; nothing is passed over in silence.",
+        "Check its spelling.",
+    ),
+    "NCF383": Code(
+        "Wrong value in the setup file",
+        "A value is not of the kind that its key needs.",
+        "docs/formats.md shows a setup file.",
+    ),
+    "NCF385": Code(
+        "Wrong line in a tool table",
+        "A line of the tool table cannot be understood, or a tool stands twice.",
+        "LinuxCNC: `T1 P1 Z120.5 D10`; CSV: a header `tool,length,radius`, decimal points.",
+    ),
+}
