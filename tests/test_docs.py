@@ -14,7 +14,14 @@ import pytest
 from ncfix import plugins
 from ncfix.cli.main import VERBS, cli
 
-DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/plugins.md", "docs/formats.md")
+DOCUMENTS = (
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "docs/plugins.md",
+    "docs/formats.md",
+    "docs/conventions.md",
+)
 
 LINK = re.compile(r"\[[^]]*\]\(([^)#\s]+)(#[^)\s]*)?\)")
 
