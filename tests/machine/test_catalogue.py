@@ -55,5 +55,15 @@ def test_the_stated_sense_of_squareness_is_what_the_machine_does() -> None:
     assert stated == 6
 
 
+def test_components_that_are_said_to_do_nothing_do_nothing() -> None:
+    machine = chains.four_kinds()["w X F Y Z C A t"]
+    q = chains.random_positions(np.random.default_rng(0), machine, 5)
+    for name in catalogue.names("XYZAC"):
+        if len(name) == 4:
+            idle = catalogue.IDLE in catalogue.title(name)
+            error = machine.replace(effects=(Effect(name, (1e-4,)),)).error(q)
+            assert idle == bool(np.abs(error).max() < 1e-10), name
+
+
 def test_every_code_is_explained() -> None:
     assert all(code.title and len(code.text) > 30 and code.hint for code in CODES.values())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -355,6 +356,53 @@ def test_a_message_shows_the_line() -> None:
         "      ^",
         "  hint: did you mean 'pitch'?",
     ]
+
+
+JUNK = [
+    "5",
+    "-1",
+    "nan",
+    "true",
+    '"x"',
+    "[]",
+    "[1]",
+    "[[1]]",
+    "[1, 2, 3]",
+    "{}",
+    "2026-01-01",
+    "[[0, 0], [0]]",
+    "",
+    "=",
+]
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data())
+def test_whatever_is_in_the_file_the_answer_is_a_machine_or_messages(data: st.DataObject) -> None:
+    """Lines dropped, doubled or with junk for a value: never another exception."""
+    lines = GOOD.splitlines()
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(lines) - 1))
+        kind = data.draw(st.sampled_from(["drop", "double", "junk", "junk", "junk"]))
+        if kind == "junk" and "=" in lines[at]:
+            lines[at] = lines[at].split("=")[0] + "= " + data.draw(st.sampled_from(JUNK))
+        elif kind == "double":
+            lines.insert(at, lines[at])
+        else:
+            lines[at] = ""
+    machine = None
+    with suppress(ConfigError):
+        machine = loads("\n".join(lines))
+    assert machine is None or loads(dumps(machine)) == machine
+
+
+def test_values_where_tables_should_be() -> None:
+    found = faults('topology = "w F X t"\naxis = 3\neffect = 5\ntool = []\nleast_increment = 1\n')
+    assert [fault.code for fault in found] == ["NCF304"] * 4
+    found = faults('topology = "w F X t"\naxis.X = 3\n')
+    assert [fault.text for fault in found] == ["axis.X: expected a table [axis.X], found 3"]
+    found = faults('topology = "w F X t"\neffect = [5]\n[axis.X]\ntype = "linear"\ndirection = [1, 0, 0]\n')
+    assert "expected tables [[effect]], found a list of 1" in found[0].text
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

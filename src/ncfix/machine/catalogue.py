@@ -7,6 +7,8 @@ from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
 LINEAR = "XYZ"
 TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
 """Rotation letter -> the direction that it turns about."""
+IDLE = "no effect unless carried"
+"""Said of what leaves an axis line in itself."""
 
 
 def title(name: str, rotary: bool | None = None) -> str:
@@ -71,7 +73,13 @@ def _location(component: str, joint: str, rotary: bool) -> str:
     if component == joint:
         return f"zero offset of {joint}"
     if component in LINEAR:
-        return f"offset of the {'axis line' if rotary else 'line'} of {joint} in {component}"
+        if not rotary:
+            return f"offset of the line of {joint} in {component}; {IDLE}"
+        if component == TURNS_ABOUT.get(joint):
+            return f"offset of {joint} along its axis line, {component}; {IDLE}"
+        return f"offset of the axis line of {joint} in {component}"
+    if not rotary and TURNS_ABOUT[component] == joint:
+        return f"roll of {joint} as a whole; {IDLE}"
     what = "tilt of the axis line" if rotary else "direction"
     return f"{what} of {joint}, turned about {TURNS_ABOUT[component]}"
 

@@ -30,7 +30,7 @@ def read_effect(section: Section, letters: tuple[str, ...], axes: Mapping[str, A
     size = len(coefficients) if coefficients is not None else 0
     options = _options(section, letters, size)
     if name is not None and basis is not None:
-        _fits(section, name, basis, axes)
+        _fits(section, Effect(name, coefficients or (), basis, **options), axes)
     if kind is not None:
         section.close()
     if name is None or basis is None or coefficients is None or len(section.report.messages) > before:
@@ -161,21 +161,20 @@ def _covariance(section: Section, size: int) -> Matrix | None:
     return rows
 
 
-def _fits(section: Section, name: str, basis: Basis, axes: Mapping[str, Axis]) -> None:
+def _fits(section: Section, effect: Effect, axes: Mapping[str, Axis]) -> None:
     """Note what this basis and these options cannot do for this component."""
-    probe = Effect(name, (), basis)
-    source = section.values.get("input")
-    own = None if probe.location or probe.joint == SPINDLE else probe.joint
+    name, basis, source = effect.name, effect.basis, effect.input
+    own = None if effect.location or effect.joint == SPINDLE else effect.joint
     if basis.needs_signal and source is None and own is None:
         _misfit(section, "basis", f"{name} has no position for {basis.name} to depend on", "give `input`")
     if basis.needs_direction and source not in axes and own is None:
         _misfit(section, "basis", f"{name} has no direction of motion", "give an axis as `input`")
-    axis = axes.get(source if source is not None else probe.joint)
+    axis = axes.get(source or effect.joint)
     if basis.rotary_only and (axis is None or not axis.rotary) and (axis is not None or source is not None):
         _misfit(section, "basis", f"{basis.name} needs the angle of a rotary axis", "use `periodic` with a `period`")
-    if section.values.get("carried") is True and not probe.location:
+    if effect.carried and not effect.location:
         _misfit(section, "carried", f"{name} is not a location error", "`carried` is for names like EC0Y")
-    if "time_constant_s" in section.values and source is None:
+    if effect.time_constant_s is not None and source is None:
         _misfit(section, "time_constant_s", "a lag acts on an `input`, and there is none")
 
 

@@ -66,9 +66,8 @@ class Group:
         if self.signal is None:
             return np.zeros(1), np.zeros(1)
         u = self.signal.u(poses, self.basis.domain)
-        if not self.basis.needs_direction:
-            return u, u
-        return u, np.broadcast_to(poses.direction[self.direction_axis], u.shape)
+        way = poses.direction[self.direction_axis] if self.basis.needs_direction else 0.0
+        return u, np.broadcast_to(way, u.shape)
 
 
 @dataclass(frozen=True, slots=True)

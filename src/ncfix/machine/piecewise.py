@@ -1,5 +1,8 @@
 """Bases that are given piece by piece: table, spline, step. Outside the first and last place the end values hold."""
 
+# What the methods mean is said once, in `Basis`.
+# ruff: noqa: D102
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -21,36 +24,36 @@ class Table(Basis):
     title: ClassVar[str] = "values at `positions`, linear between them"
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return tuple(f"at {position}" for position in self.positions)
 
     @property
-    def domain(self) -> tuple[float, float]:  # noqa: D102
+    def domain(self) -> tuple[float, float]:
         return self.positions[0], self.positions[-1]
 
     @property
-    def kinks(self) -> tuple[float, ...]:  # noqa: D102
+    def kinks(self) -> tuple[float, ...]:
         return self.positions
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         return float(np.diff(self.positions).min())
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         if len(self.positions) < 2:
             return [("positions", "a table needs at least two positions")]
         return ascending("positions", self.positions)
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         index, fraction = self._cell(u)
         return _at(index, 1 - fraction, self.size) + _at(index + 1, fraction, self.size)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         index, _ = self._cell(u)
         inside = (u >= self.positions[0]) & (u < self.positions[-1])
         rate = np.where(inside, 1 / np.diff(self.positions)[index], 0.0)
         return _at(index + 1, rate, self.size) - _at(index, rate, self.size)
 
-    def combine(self, gains: Array, u: Array, direction: Array) -> Array:  # noqa: D102
+    def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         index, fraction = self._cell(u)
         low: Array = gains[:, index]
         return low + fraction * (gains[:, index + 1] - low)
@@ -72,25 +75,25 @@ class Spline(Basis):
     title: ClassVar[str] = "B-splines of `degree` on `knots`; len(knots) - degree - 1 coefficients"
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return tuple(f"B{i}" for i in range(len(self.knots) - self.degree - 1))
 
     @property
-    def domain(self) -> tuple[float, float]:  # noqa: D102
+    def domain(self) -> tuple[float, float]:
         return self.knots[self.degree], self.knots[-self.degree - 1]
 
     @property
-    def kinks(self) -> tuple[float, ...]:  # noqa: D102
+    def kinks(self) -> tuple[float, ...]:
         places, counts = np.unique(self.knots, return_counts=True)
         inside = (places > self.domain[0]) & (places < self.domain[1])
         return tuple(float(place) for place in places[inside & (counts >= self.degree)])
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         low, high = self.domain
         steps = np.diff(np.clip(self.knots, low, high))
         return float(steps[steps > 0].min())
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         if self.degree < 1:
             return [("degree", "a spline has degree 1 or more; `step` is piecewise constant")]
         if len(self.knots) < 2 * self.degree + 2:
@@ -99,15 +102,15 @@ class Spline(Basis):
             return [("knots", "the knots leave no range")]
         return ascending("knots", self.knots, strictly=False)
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return self._sum(np.eye(self.size), u)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         low, high = self.domain
         inside = (u >= low) & (u < high)
         return np.where(inside, self._sum(np.eye(self.size), u, order=1), 0.0)
 
-    def combine(self, gains: Array, u: Array, direction: Array) -> Array:  # noqa: D102
+    def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         return self._sum(gains, u)
 
     def _sum(self, gains: Array, u: Array, order: int = 0) -> Array:
@@ -127,33 +130,33 @@ class Step(Basis):
     title: ClassVar[str] = "constant pieces, one coefficient more than `positions`; for one `direction` if wanted"
 
     @property
-    def needs_direction(self) -> bool:  # noqa: D102
+    def needs_direction(self) -> bool:
         return self.direction != BOTH
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return "below", *(f"from {position}" for position in self.positions)
 
     @property
-    def kinks(self) -> tuple[float, ...]:  # noqa: D102
+    def kinks(self) -> tuple[float, ...]:
         return self.positions
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         return float(np.diff(self.positions).min()) if len(self.positions) > 1 else np.inf
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         wrong = ascending("positions", self.positions)
         if self.direction not in (BOTH, POSITIVE, NEGATIVE):
             wrong.append(("direction", f"{self.direction!r} is none of both, positive, negative"))
         return wrong
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return _at(np.searchsorted(np.asarray(self.positions), u, side="right"), self._share(direction), self.size)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         return np.zeros((self.size, *np.shape(u)))
 
-    def combine(self, gains: Array, u: Array, direction: Array) -> Array:  # noqa: D102
+    def combine(self, gains: Array, u: Array, direction: Array) -> Array:
         index = np.searchsorted(np.asarray(self.positions), u, side="right")
         result: Array = gains[:, index] * self._share(direction)
         return result

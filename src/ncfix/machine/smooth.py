@@ -1,5 +1,8 @@
 """Smooth bases: constant, powers, harmonics; and the play of a reversing axis."""
 
+# What the methods mean is said once, in `Basis`.
+# ruff: noqa: D102
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
@@ -19,16 +22,16 @@ class Constant(Basis):
     needs_signal: ClassVar[bool] = False
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return ("1",)
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return np.ones((1, *np.shape(u)))
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         return np.zeros((1, *np.shape(u)))
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         return np.inf
 
 
@@ -41,26 +44,26 @@ class Polynomial(Basis):
     title: ClassVar[str] = "powers of u = (x - center) / scale"
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return tuple(f"u^{power}" for power in self.degree)
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return powers(u, self.degree)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         return _columns(self.degree, u) * powers(u, tuple(max(power - 1, 0) for power in self.degree))
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         return span / (4 * max(self.degree)) if max(self.degree) else np.inf
 
     @property
-    def family(self) -> tuple[object, ...]:  # noqa: D102
+    def family(self) -> tuple[object, ...]:
         return (self.name,)
 
-    def merged(self, other: Self) -> Self:  # noqa: D102
+    def merged(self, other: Self) -> Self:
         return replace(self, degree=tuple(sorted({*self.degree, *other.degree})))
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         return distinct("degree", self.degree, lowest=0)
 
 
@@ -73,13 +76,13 @@ class Backlash(Polynomial):
     title: ClassVar[str] = "direction of motion (-1, 0 unknown, 1) times half the powers of u"
 
     @property
-    def needs_direction(self) -> bool:  # noqa: D102
+    def needs_direction(self) -> bool:
         return True
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return 0.5 * direction * powers(u, self.degree)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         return 0.5 * direction * _columns(self.degree, u) * powers(u, tuple(max(p - 1, 0) for p in self.degree))
 
 
@@ -98,30 +101,30 @@ class Fourier(Basis):
         return 360.0
 
     @property
-    def labels(self) -> tuple[str, ...]:  # noqa: D102
+    def labels(self) -> tuple[str, ...]:
         return tuple(f"{function} {k}" for k in self.order for function in ("cos", "sin"))
 
-    def rows(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def rows(self, u: Array, direction: Array) -> Array:
         return _waves(u, self.order, self.turn)
 
-    def slopes(self, u: Array, direction: Array) -> Array:  # noqa: D102
+    def slopes(self, u: Array, direction: Array) -> Array:
         waves = _waves(u, self.order, self.turn)
         rate = 2 * np.pi / self.turn * _columns(self.order, u)
         slopes = np.empty_like(waves)
         slopes[0::2], slopes[1::2] = -rate * waves[1::2], rate * waves[0::2]
         return slopes
 
-    def feature(self, span: float) -> float:  # noqa: D102
+    def feature(self, span: float) -> float:
         return self.turn / (8 * max(self.order))
 
     @property
-    def family(self) -> tuple[object, ...]:  # noqa: D102
+    def family(self) -> tuple[object, ...]:
         return self.name, self.turn
 
-    def merged(self, other: Self) -> Self:  # noqa: D102
+    def merged(self, other: Self) -> Self:
         return replace(self, order=tuple(sorted({*self.order, *other.order})))
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         return distinct("order", self.order, lowest=1)
 
 
@@ -139,7 +142,7 @@ class Periodic(Fourier):
         """The u of one period."""
         return self.period
 
-    def complaints(self) -> list[tuple[str, str]]:  # noqa: D102
+    def complaints(self) -> list[tuple[str, str]]:
         wrong = [] if self.period > 0 else [("period", f"{self.period:g} is not a positive length")]
         return wrong + distinct("order", self.order, lowest=1)
 
