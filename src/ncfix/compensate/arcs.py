@@ -1,0 +1,148 @@
+"""Arcs that stay arcs: where the corrected ends allow it, the circle that follows the corrected path best.
+
+The centre lies on the perpendicular bisector of the corrected ends, so that the radii at both ends agree to rounding
+whatever the ends are. Where along the bisector is found by least squares over the corrected path, starting from the
+centre moved by the mean correction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.compensate.budget import Closure
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.segments import Segments, sweep_between
+
+LOOKS = 12
+"""Places on each arc, ends left out, at which the corrected path is looked at to find the centre."""
+NUDGE = 1e-3
+"""mm by which the centre is moved to see what that does."""
+CLOSED = 1e-6
+"""mm; ends closer to each other than this are one point."""
+APART = 4.0
+"""So many rounding errors must lie between the ends of an arc that is not a full circle: rounded onto each other they
+would make it one."""
+
+
+Pair = tuple[Array, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """Corrected arcs.
+
+    centre  (k, 3) mm
+    sweep   (k,) rad
+    sound   (k,) a control will accept it and understand the same arc
+    """
+
+    centre: Array
+    sweep: Array
+    sound: Mask
+
+
+def fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, rounding: float) -> Fitted:
+    """Arcs `rows` (k,) between the ends at which they really start and end (`standing`, all motions).
+
+    closure   what the control accepts; half of it is used
+    rounding  how far a point may move when it is rounded to the control's digits, mm
+    """
+    arcs = standing.rows(rows)
+    ends = arcs.start[:, intent.columns], arcs.end[:, intent.columns]
+    wanted, fraction = _corrected_path(intent, standing, rows)
+    centre = _in_plane(arcs.centre, arcs.normal, _mean_centre(intent, arcs, rows, wanted, fraction))
+    closed = full_circles(intent, rows) & (np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1) < CLOSED)
+    centre = np.where(closed[:, None], centre, _onto_bisector(*ends, arcs.normal, centre))
+    best = _best_on_bisector(arcs, ends, centre, wanted, fraction)
+    centre = np.where(closed[:, None], centre, best)
+    sweep = np.where(closed, arcs.sweep, sweep_between(*ends, centre, arcs.normal, arcs.sweep))
+    return Fitted(centre, sweep, _sound(arcs, ends, centre, sweep, closed, closure, rounding))
+
+
+def full_circles(intent: Intent, rows: Index) -> Mask:
+    """Arcs that end where they started in their plane, after whole turns, (k,)."""
+    moves = intent.moves
+    turns = moves.sweep[rows] / (2 * np.pi)
+    whole = (np.abs(turns) > 0.5) & (np.abs(turns - np.round(turns)) < 1e-6)
+    chord = (moves.end - moves.start)[rows[:, None], intent.columns]
+    result: Mask = whole & (np.linalg.norm(across(chord, moves.normal[rows]), axis=1) < CLOSED)
+    return result
+
+
+def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
+    """X Y Z that the corrected path wants at `LOOKS` fractions of each arc, (k, LOOKS, 3), and the fractions."""
+    fraction = np.arange(1, LOOKS + 1) / (LOOKS + 1)
+    wanted = intent.guessed(real, np.repeat(rows, LOOKS), np.tile(fraction, len(rows)))
+    return wanted[:, intent.columns].reshape(len(rows), LOOKS, 3), fraction
+
+
+def _mean_centre(intent: Intent, arcs: Segments, rows: Index, wanted: Array, fraction: Array) -> Array:
+    each, at = np.repeat(np.arange(len(rows)), LOOKS), np.tile(fraction, len(rows))
+    intended = intent.segments.at(rows[each], at)[:, intent.columns].reshape(wanted.shape)
+    mean: Array = intent.moves.centre[rows] + (wanted - intended).mean(axis=1)
+    return mean
+
+
+def across(vectors: Array, normal: Array) -> Array:
+    """The part of vectors (k, 3) across the normals."""
+    result: Array = vectors - np.einsum("ij,ij->i", vectors, normal)[:, None] * normal
+    return result
+
+
+def _in_plane(origin: Array, normal: Array, points: Array) -> Array:
+    """Points moved along the normals to the height of `origin`: the height of a centre means nothing."""
+    return origin + across(points - origin, normal)
+
+
+def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Array:
+    """Centres moved within the plane to be equally far from both ends."""
+    chord = across(end - start, normal)
+    length = np.linalg.norm(chord, axis=1, keepdims=True)
+    along = chord / np.where(length > 0, length, 1.0)
+    off = np.einsum("ij,ij->i", centre - (start + end) / 2, along)[:, None]
+    result: Array = centre - off * along
+    return result
+
+
+def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array, fraction: Array) -> Array:
+    """Centres moved along the bisector so that the arcs come closest to the wanted points, by least squares."""
+    chord = across(ends[1] - ends[0], arcs.normal)
+    way = np.cross(arcs.normal, chord)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+    here = _points(arcs, ends, centre, fraction)
+    slope = (_points(arcs, ends, centre + NUDGE * way, fraction) - here) / NUDGE
+    squares = np.einsum("kij,kij->k", slope, slope)
+    amount = np.einsum("kij,kij->k", slope, wanted - here) / np.maximum(squares, 1e-12)
+    limit = 10 * np.linalg.norm(wanted - here, axis=2).max(axis=1) + NUDGE
+    result: Array = centre + np.clip(amount, -limit, limit)[:, None] * way
+    return result
+
+
+def _points(arcs: Segments, ends: Pair, centre: Array, fraction: Array) -> Array:
+    sweep = sweep_between(*ends, centre, arcs.normal, arcs.sweep)
+    moved = replace(arcs, centre=centre, sweep=sweep)
+    each, at = np.repeat(np.arange(len(centre)), len(fraction)), np.tile(fraction, len(centre))
+    return moved.at(each, at)[:, arcs.columns].reshape(len(centre), len(fraction), 3)
+
+
+def _sound(
+    arcs: Segments,
+    ends: Pair,
+    centre: Array,
+    sweep: Array,
+    closed: Mask,
+    closure: Closure,
+    rounding: float,
+) -> Mask:
+    """Whether radii agree to half of what the control accepts, after rounding, and the arc cannot be mistaken."""
+    radii = [np.linalg.norm(across(point - centre, arcs.normal), axis=1) for point in ends]
+    allowed = np.maximum(closure.mm, closure.relative * np.minimum(*radii)) / 2
+    agree = np.abs(radii[0] - radii[1]) + 4 * rounding <= allowed
+    chord = np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1)
+    clear = closed | (chord > APART * rounding + CLOSED)
+    same = np.abs(sweep - arcs.sweep) < 0.1 + 0.1 * np.abs(arcs.sweep)
+    result: Mask = agree & clear & same & np.isfinite(sweep)
+    return result

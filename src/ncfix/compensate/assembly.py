@@ -1,0 +1,89 @@
+"""The plan: pieces of all motions in one list, and what goes with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.grids import INSTANT
+from ncfix.compensate.ragged import offsets, owners, places, sums
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.pieces import Pieces
+
+if TYPE_CHECKING:
+    from ncfix.compensate.grids import Split
+    from ncfix.compensate.segments import Segments
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What to write, and what there is to say about it.
+
+    pieces     the corrected path, one row or more per motion
+    start      (n, n_axes) the command at which each motion really starts, NaN where not known
+    share      (m,) each piece's share of its motion's time, for inverse-time feed; the shares of a motion add up to 1
+    deviation  (n,) mm: how far the tip was found to leave the intended path, before rounding; 0 where not looked at
+    oriented   (n,) the tool direction is corrected too, without damping or limits
+    findings   what is wrong, by motion; `pieces.kept` tells what was left as it was
+    """
+
+    pieces: Pieces
+    start: Array
+    share: Array
+    deviation: Array
+    oriented: Mask
+    findings: tuple[Finding, ...]
+
+
+def untouched(moves: Moves, kept: Mask) -> Plan:
+    """The plan that changes nothing."""
+    n = len(moves)
+    pieces = Pieces(np.arange(n), np.ones(n), moves.end.copy(), moves.kind == Kind.ARC, moves.centre.copy(), kept)
+    return Plan(pieces, moves.start.copy(), np.ones(n), np.zeros(n), np.ones(n, dtype=bool), ())
+
+
+def assembled(
+    moves: Moves,
+    real: Segments,
+    kept: Mask,
+    rows: Index,
+    parts: Split | None,
+    deviation: Array,
+    oriented: Mask,
+    findings: tuple[Finding, ...],
+) -> Plan:
+    """The plan of motions done as `real` has them, but for motions `rows`, which are done in `parts`."""
+    counts = np.ones(len(moves), dtype=np.intp)
+    if parts is not None:
+        counts[rows] = parts.counts
+    move = owners(counts)
+    fraction, end, arc = np.ones(len(move)), real.end[move], real.arc[move]
+    if parts is not None:
+        at = np.repeat(offsets(counts)[:-1][rows], parts.counts) + places(parts.counts)
+        fraction[at], end[at], arc[at] = parts.fraction, parts.end, False
+    centre = np.where(arc[:, None], real.centre[move], np.nan)
+    pieces = Pieces(move, fraction, end, arc, centre, kept[move])
+    return Plan(pieces, real.start, _shares(pieces, real, counts), deviation, oriented, findings)
+
+
+def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
+    """Shares of time: those of the fraction; a piece that only takes up a jump has the share of its way."""
+    before = np.zeros(len(pieces))
+    before[1:] = pieces.fraction[:-1]
+    first = offsets(counts)[:-1]
+    before[first] = 0.0
+    span = pieces.fraction - before
+    jumps = span < 2 * INSTANT
+    if not jumps.any():
+        return span
+    start = np.empty_like(pieces.end)
+    start[1:] = pieces.end[:-1]
+    start[first] = real.start
+    way = np.linalg.norm(pieces.end - start, axis=1)
+    whole = np.repeat(sums(way, counts), counts)
+    share = np.where(jumps, way / np.maximum(whole, 1e-300), span)
+    result: Array = share / np.repeat(sums(share, counts), counts)
+    return result

@@ -1,0 +1,102 @@
+"""The codes of the compensation floor: 40x and 41x poses and paths, 42x comparing programs."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+CODES = {
+    "NCF401": Code(
+        "the machine has no three linear axes X, Y and Z",
+        "Strategies move the tool tip with X, Y and Z. Without one of them (a lathe, say) the tip cannot be brought to "
+        "every point, and nothing is corrected.",
+        "Check the `topology` of the machine file.",
+    ),
+    "NCF402": Code(
+        "the linear axes cannot reach the point",
+        "With the rotary axes where they are, two of the linear axes move the tool along the same line in the "
+        "workpiece, so some displacements of the tip are not possible.",
+        "Such a pose exists on machines with a linear axis on each side of a rotary one. Change the pose.",
+    ),
+    "NCF403": Code(
+        "no correction found",
+        "The corrected command is sought until the tool tip of the erroneous machine is within 1 nm of where it should "
+        "be. Here the search did not end. The error model probably has a jump there, larger than the tip can avoid.",
+        "Look at the effects with basis `step` near that position.",
+    ),
+    "NCF404": Code(
+        "the corrected motion leaves the range of an axis",
+        "The motion as programmed is within the travel of the machine, the corrected one is not. Corrections are never "
+        "cut short: the part would be wrong.",
+        "Move the workpiece away from the end of the travel.",
+    ),
+    "NCF405": Code(
+        "the pose is outside the calibrated range",
+        "The errors are known within the `range` of each axis; beyond it the last value would be held, which is a "
+        "guess.",
+        "Calibrate the machine over the range that is used, or correct the `range` in the machine file.",
+    ),
+    "NCF406": Code(
+        "the correction is too large",
+        "A correction above `max_correction` of the machine file is refused: more likely the machine file or the "
+        "units are wrong than the machine is that bad. It is never cut short.",
+        "Check the machine file; set `max_correction` if the machine really needs more.",
+    ),
+    "NCF407": Code(
+        "the correction changes too fast",
+        "From one motion to the next the correction changes by more than the way between them accounts for. The "
+        "machine would jerk, and the surface would show it.",
+        "Look for jumps in the error model: coarse tables, steps, a large play.",
+    ),
+    "NCF408": Code(
+        "not a number",
+        "A position or a correction is not a finite number: the start position is not known, or the error model gives "
+        "NaN or infinity there.",
+        "Give the start position (`initial` in the setup), or check the machine file.",
+    ),
+    "NCF409": Code(
+        "the control's digits are too coarse for the tolerance",
+        "Commands are rounded to what the control resolves. That alone may move the tool tip by more than half of the "
+        "tolerance, so the tolerance cannot be promised.",
+        "Ask for a larger tolerance, or set `least_increment` in the machine file if the control resolves more.",
+    ),
+    "NCF410": Code(
+        "the tool direction is not fully corrected",
+        "Near a pose in which a rotary axis turns the tool about itself, a small tilt would need a large turn. The "
+        "correction of the rotary axes is damped there, and limited in size and rate; the tool tip is held exactly.",
+        "Nothing to do if the tool is a ball; else avoid the pose.",
+    ),
+    "NCF411": Code(
+        "there is no such strategy",
+        "The name given with `--strategy` is none of those that ncfix has.",
+        "`ncfix fix --help` lists them.",
+    ),
+    "NCF412": Code(
+        "the thesis' procedure does not fit the machine",
+        "It is printed for linear axes on the tool side and rotary axes under the workpiece, and kept as it is.",
+        "`--strategy rotary-then-linear` is the same idea for any machine.",
+    ),
+    "NCF413": Code(
+        "the path cannot be kept within the tolerance without splitting",
+        "The motion would have to be split, and must not be: cutter radius compensation is on, and the control works "
+        "out the contour from the motions as they are.",
+        "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
+    ),
+    "NCF414": Code(
+        "the length of the tool is not known",
+        "Where the tool tip is depends on it, and so does the correction.",
+        "Give it with `--tool NUMBER=LENGTH` or in the setup file.",
+    ),
+    "NCF415": Code(
+        "an arc cannot stay an arc, and must not be split",
+        "The corrected path is not round enough for an arc, or the control would refuse or misunderstand it, and "
+        "straight pieces may not be put in its place here (cutter radius compensation).",
+        "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
+    ),
+    "NCF420": Code(
+        "the corrected program does not follow the original",
+        "The motions of the two programs cannot be put side by side: somewhere the second does not come to where the "
+        "first wants to be.",
+        "Check that both files belong together, and that the machine, its setup and the tool are those of the "
+        "correction.",
+    ),
+}

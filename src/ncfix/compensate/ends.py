@@ -1,0 +1,125 @@
+"""The corrected ends of motions, in bulk, with what cannot be corrected and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate import arcs
+from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.compensate.rates import Path
+from ncfix.compensate.standing import standing
+from ncfix.compensate.strategies import Strategy
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """Where motions shall end.
+
+    wanted    (n, n_axes) commands; those of the program where nothing is corrected
+    failed    (n,) motions that should be corrected and cannot
+    oriented  (n,) the tool direction is corrected too, without damping or limits
+    findings  why they cannot
+    """
+
+    wanted: Array
+    failed: Mask
+    oriented: Mask
+    findings: tuple[Finding, ...]
+
+
+def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
+    """Correct the ends of motions `rows`."""
+    moves = intent.moves
+    ones = np.ones(len(rows))
+    q = intent.joints_at(rows, ones)
+    lengths = np.broadcast_to(intent.lengths(rows), len(rows))
+    named = np.isfinite(moves.end[rows]).all(axis=1)
+    fit = np.isfinite(q).all(axis=1) & np.isfinite(lengths)
+    good = rows[fit]
+    path = along(intent, good, ones[fit]) if strategy.corrects_orientation else None
+    result = strategy.solve(intent.machine, q[fit], intent.states(good, ones[fit]), path)
+    wanted = moves.end.copy()
+    wanted[good] = as_commands(intent, good, moves.end[good], q[fit], result.q)
+    failed, oriented = np.zeros(len(moves), dtype=bool), np.zeros(len(moves), dtype=bool)
+    failed[rows[~fit]] = failed[good[~result.converged]] = True
+    oriented[good] = result.oriented
+    wanted[failed] = moves.end[failed]
+    troubles = (
+        _finding("NCF408", rows[~named], "the end of this motion is not known in all axes"),
+        _finding("NCF414", rows[named & ~np.isfinite(lengths)], "the length of the tool is not known here"),
+        _finding(
+            "NCF402",
+            rows[named & np.isfinite(lengths) & ~fit],
+            "the linear axes cannot bring the tool tip there with the rotary axes where they are",
+        ),
+        _finding("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
+    )
+    return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)))
+
+
+def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, corrected: Array) -> Array:
+    """Commands of corrected axis positions (k, n_axes); where nothing is corrected exactly those of the program.
+
+    programmed  (k, n_axes) commands of the program
+    nominal     (k, n_axes) axis positions of the program
+    """
+    tcp, lengths = intent.moves.tcp[rows], intent.moves.tool_length[rows]
+    if not tcp.any():
+        return corrected
+    here = commands_from_joints(intent.machine, nominal, tcp, lengths)
+    there = commands_from_joints(intent.machine, corrected, tcp, lengths)
+    still = (nominal == corrected).all(axis=1)[:, None]
+    result: Array = programmed + np.where(still, 0.0, there - here)
+    return result
+
+
+def along(intent: Intent, rows: Index, fraction: Array) -> Path:
+    """How the ends of motions follow each other, for limits on rates; a motion that is kept begins a new stretch."""
+    q = intent.joints_at(rows, fraction)
+    tips = intent.machine.tip(q, intent.lengths(rows))
+    begins = np.ones(len(rows), dtype=bool)
+    begins[1:] = np.diff(rows) != 1
+    return path_of(intent, q, tips, begins, np.zeros(len(rows), dtype=bool), q)
+
+
+def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, decided: Array) -> Path:
+    """The `Path` of poses q (k, n_axes) with tips (k, 3); `decided` (k, n_axes) corrections of pinned poses."""
+    rotary = intent.machine.rotary
+    travel_mm, travel_rad = np.zeros(len(q)), np.zeros(len(q))
+    travel_mm[1:] = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    travel_rad[1:] = np.abs(np.diff(q[:, rotary], axis=0)).sum(axis=1)
+    return Path(travel_mm, travel_rad, begins, pinned, decided[:, rotary])
+
+
+def with_closed_circles(intent: Intent, wanted: Array, kept: Mask, within: float) -> Array:
+    """Full circles made to end, within their plane, exactly where they really start.
+
+    Only where that moves their end by no more than `within` mm. Of circles one after another all end where the first
+    one starts.
+    """
+    moves, columns = intent.moves, intent.columns
+    rows = np.flatnonzero(intent.segments.arc & ~kept)
+    rows = rows[arcs.full_circles(intent, rows)]
+    if not rows.size:
+        return wanted
+    chained = np.zeros(len(rows), dtype=bool)
+    same = (moves.normal[rows[1:]] == moves.normal[rows[:-1]]).all(axis=1)
+    joined = (moves.start[rows[1:]] == moves.end[rows[:-1]]).all(axis=1)
+    chained[1:] = (np.diff(rows) == 1) & same & joined
+    first = rows[np.maximum.accumulate(np.where(chained, 0, np.arange(len(rows))))]
+    where = standing(intent.machine, moves, wanted, kept)
+    shift = (where.start - moves.start)[first[:, None], columns]
+    own = (wanted - moves.end)[rows[:, None], columns]
+    off = arcs.across(shift - own, moves.normal[rows])
+    near = np.linalg.norm(off, axis=1) <= within
+    result = wanted.copy()
+    result[rows[near, None], columns] += off[near]
+    return result
+
+
+def _finding(code: str, moves: Index, text: str) -> Finding:
+    return Finding(code, moves, np.zeros(len(moves)), text)

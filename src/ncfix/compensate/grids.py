@@ -1,0 +1,157 @@
+"""Splitting motions: fine grids of exactly corrected commands, made finer where the pieces come out short."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.ends import as_commands, path_of
+from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.ragged import batches, offsets, owners, places, sums
+from ncfix.compensate.sampling import MOST, bends, even, kinked, merged, passed, reversals
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.split import Grid, fewest
+from ncfix.compensate.strategies import Strategy
+
+PER_BEND = 8
+"""Nodes for each time that the error may bend."""
+PER_PIECE = 32
+"""Nodes to each piece expected; a piece is longest to one part in so many."""
+FEW = 20
+"""Pieces with fewer nodes on average are worth a finer grid."""
+REFINEMENTS = 3
+INSTANT = 1e-7
+"""Fraction of a motion from one side of a jump or reversal to the other."""
+BATCH = 100_000
+"""Nodes worked on at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """Motions made of straight pieces, flat, the pieces of a motion next to each other.
+
+    counts    (g,) pieces of each motion
+    fraction  (p,) where each ends on its motion
+    end       (p, n_axes) commands
+    worst     (g,) largest deviation of the tip found, mm
+    """
+
+    counts: Index
+    fraction: Array
+    end: Array
+    worst: Array
+
+
+def split(intent: Intent, real: Segments, rows: Index, pieces: Array, strategy: Strategy, tolerance: float) -> Split:
+    """Split motions `rows` (g,) at the fewest places.
+
+    real    where all motions really start and end
+    pieces  (g,) about how many pieces to expect
+    """
+    if not rows.size:
+        empty = np.empty(0)
+        return Split(rows, empty, np.empty((0, intent.moves.end.shape[1])), empty)
+    wished = np.maximum(PER_BEND * bends(intent, rows), PER_PIECE * pieces)
+    nodes = np.clip(np.ceil(wished), 2 * PER_PIECE, MOST).astype(np.intp)
+    parts = [_split(intent, real, rows[part], nodes[part], strategy, tolerance) for part in batches(nodes, BATCH)]
+    for _ in range(REFINEMENTS):
+        result = joined(parts)
+        short = np.flatnonzero((nodes < FEW * result.counts) & (nodes < MOST))
+        if not short.size:
+            break
+        nodes[short] = np.minimum(2 * PER_PIECE * result.counts[short], MOST)
+        chosen = [short[part] for part in batches(nodes[short], BATCH)]
+        finer = [_split(intent, real, rows[each], nodes[each], strategy, tolerance) for each in chosen]
+        parts = [_replaced(result, short, joined(finer))]
+    return joined(parts)
+
+
+def joined(parts: list[Split]) -> Split:
+    """Splits of different motions as one."""
+    return (
+        parts[0]
+        if len(parts) == 1
+        else Split(
+            np.concatenate([part.counts for part in parts]),
+            np.concatenate([part.fraction for part in parts]),
+            np.concatenate([part.end for part in parts]),
+            np.concatenate([part.worst for part in parts]),
+        )
+    )
+
+
+def _replaced(result: Split, which: Index, finer: Split) -> Split:
+    """`result` with the motions `which` taken from `finer`."""
+    order = np.arange(len(result.counts))
+    order[which] = len(result.counts) + np.arange(len(which))
+    both = joined([result, finer])
+    first = offsets(both.counts)[order]
+    counts = both.counts[order]
+    take = np.repeat(first, counts) + places(counts)
+    return Split(counts, both.fraction[take], both.end[take], both.worst[order])
+
+
+def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy, tolerance: float) -> Split:
+    grid = _grid(intent, real, rows, nodes, strategy)
+    ends, worst = fewest(grid, tolerance)
+    counts = sums(ends.astype(np.intp), grid.counts).astype(np.intp)
+    return Split(counts, grid.fraction[ends], grid.command[ends], worst)
+
+
+def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> Grid:
+    """Exactly corrected commands of motions at nodes; at both ends where the machine really stands."""
+    counts, fraction = _fractions(intent, real, rows, nodes)
+    move = rows[owners(counts)]
+    ends = offsets(counts)
+    first, last = ends[:-1], ends[1:] - 1
+    bounds = np.zeros(len(move), dtype=bool)
+    bounds[first] = bounds[last] = True
+    programmed, q = intent.segments.at(move, fraction), intent.joints_at(move, fraction)
+    path = None
+    if strategy.corrects_orientation:
+        decided = np.where(bounds[:, None], real.at(move, fraction) - programmed, 0.0)
+        path = path_of(intent, q, intent.machine.tip(q, intent.lengths(move)), fraction == 0, bounds, decided)
+    result = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
+    command = as_commands(intent, move, programmed, q, result.q)
+    command[first], command[last] = real.start[rows], real.end[rows]
+    use = result.converged | bounds
+    counts = sums(use.astype(np.intp), counts).astype(np.intp)
+    return Grid(counts, fraction[use], command[use], _follow(intent, move[use], command[use], strategy))
+
+
+def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tuple[Index, Array]:
+    """Fractions of the nodes of motions, both ends included: counts and flat fractions.
+
+    Nodes stand evenly, behind the start, and on both sides of wherever the corrected axes pass a kink or a jump, or
+    reverse if that matters.
+    """
+    each, inner = np.arange(len(rows)), even(nodes)
+    bounds = [(each, np.full(len(rows), place)) for place in (0.0, INSTANT, 1.0)]
+    counts, fraction = merged(len(rows), (owners(nodes), inner), *bounds)
+    found = [reversals(intent, rows, counts, fraction)]
+    if kinked(intent.machine):
+        owner = owners(counts)
+        q = intent.joints(rows[owner], intent.guessed(real, rows[owner], fraction))
+        stretch, share = passed(intent.machine, q[:-1], q[1:])
+        inside = owner[stretch] == owner[stretch + 1]
+        stretch, share = stretch[inside], share[inside]
+        found.append((owner[stretch], (1 - share) * fraction[stretch] + share * fraction[stretch + 1]))
+    sides = [(owner, np.clip(at + side, INSTANT, 1.0)) for owner, at in found for side in (-INSTANT / 2, INSTANT / 2)]
+    return merged(len(rows), (owners(counts), fraction), *sides)
+
+
+def _follow(intent: Intent, rows: Index, commands: Array, strategy: Strategy) -> Array:
+    """How the tip follows commands (k, n_axes) of motions `rows`, (k, 3, n_axes) mm per mm and mm per rad.
+
+    With tool-centre-point control the tip stays where it is when only rotary commands change.
+    """
+    follow = np.zeros((len(rows), 3, commands.shape[1]))
+    follow[:, :, intent.columns] = intent.follows(rows, commands)
+    plain = np.flatnonzero(~intent.moves.tcp[rows])
+    if strategy.corrects_orientation and plain.size:
+        turning = np.flatnonzero(intent.machine.rotary)
+        jacobian = intent.machine.jacobians(commands[plain], intent.moves.tool_length[rows[plain]]).axes
+        follow[plain[:, None, None], np.arange(3)[:, None], turning] = jacobian[:, :3, turning]
+    return follow

@@ -1,0 +1,143 @@
+"""The intended path: what a perfect machine does with the program, and how far a real one is from it.
+
+A control interpolates commands: X Y Z and the rotary axes linearly with the fraction of the block, arcs on their
+circles; with tool-centre-point control the linear axes follow from that at every instant. The intended path is where
+the tool tip of a perfect machine is in the workpiece meanwhile.
+
+Actual and intended tip are compared at the same fraction of the block: the tool has a certain direction and feed
+there, which belong to that point of the workpiece and no other. The distance so found is never less than that to the
+nearest point of the intended path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ncfix.compensate.direction import Signs, carried, matters, signs
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.kinematics import affine_tip, common, linear_columns, reached_joints, regular, solve
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.steer import rows_of
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Kind, Moves
+
+INSTANT = 1e-4
+"""Fraction of a motion over which the direction of its axes is looked at."""
+
+
+@dataclass(frozen=True)
+class Intent:
+    """A program on a machine.
+
+    state  what else the errors depend on; `inputs` are numbers or one number per motion. Tool length and direction of
+           motion are taken from the motions.
+    """
+
+    machine: Machine
+    moves: Moves
+    state: State
+
+    def __post_init__(self) -> None:
+        if tuple(self.moves.axes) != tuple(self.machine.axis_names):
+            raise ValueError(f"motions of axes {self.moves.axes} on a machine with axes {self.machine.axis_names}")
+
+    @cached_property
+    def columns(self) -> Index:
+        """The columns of X, Y, Z."""
+        return linear_columns(self.machine)
+
+    @cached_property
+    def segments(self) -> Segments:
+        """The motions as geometry in command space."""
+        return Segments.of_moves(self.moves, self.columns)
+
+    @cached_property
+    def curved(self) -> Mask:
+        """Motions whose axes do not move linearly with the fraction, (n,)."""
+        return np.asarray((self.moves.kind == Kind.ARC) | self.moves.tcp, dtype=bool)
+
+    def joints(self, rows: Index, commands: Array) -> Array:
+        """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""
+        moves = self.moves
+        q, reached = reached_joints(self.machine, commands, moves.tcp[rows], moves.tool_length[rows])
+        return q if reached.all() else np.where(reached[:, None], q, np.nan)
+
+    def joints_at(self, rows: Index, fraction: Array) -> Array:
+        """Axis positions of a perfect control at fractions of motions."""
+        return self.joints(rows, self.segments.at(rows, fraction))
+
+    def tip(self, rows: Index, fraction: Array) -> Array:
+        """The intended tool tip in the workpiece, (k, 3) mm."""
+        tip: Array = self.machine.tip(self.joints_at(rows, fraction), self.lengths(rows))
+        return tip
+
+    def lengths(self, rows: Index) -> Array:
+        """Tool lengths of motions: (k,) or () mm."""
+        return common(self.moves.tool_length[rows])
+
+    # -- the rest of the state ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def arrival(self) -> Signs | None:
+        """The direction in which each axis ends each motion, (n, n_axes); None if no error depends on it."""
+        if not matters(self.machine):
+            return None
+        rows = np.arange(len(self.moves))
+        motion = self.moves.end - self.moves.start
+        bent = np.flatnonzero(self.curved)
+        if bent.size:
+            motion = motion.copy()
+            motion[bent] = self.velocity(rows[bent], np.ones(bent.size))
+        return carried(signs(motion))
+
+    def velocity(self, rows: Index, fraction: Array) -> Array:
+        """How the axes move at an instant, (k, n_axes) per `INSTANT` of the motion."""
+        before, after = np.maximum(fraction - INSTANT / 2, 0.0), np.minimum(fraction + INSTANT / 2, 1.0)
+        return self.joints_at(rows, after) - self.joints_at(rows, before)
+
+    def direction(self, rows: Index, fraction: Array) -> Signs:
+        """The direction of each axis at fractions of motions, (k, n_axes); zeros (n_axes,) if it does not matter."""
+        if self.arrival is None:
+            return np.zeros(len(self.machine.axes), dtype=np.int8)
+        result = self.arrival[rows]
+        inside = np.flatnonzero(self.curved[rows] & (fraction < 1))
+        if inside.size:
+            now = signs(self.velocity(rows[inside], fraction[inside]))
+            at_start = np.where(rows[inside, None] > 0, self.arrival[rows[inside] - 1], 0)
+            result[inside] = np.where(now != 0, now, at_start)
+        return result
+
+    def states(self, rows: Index, fraction: Array) -> State:
+        """The state at fractions (k,) of motions `rows` (k,)."""
+        inputs = rows_of(State(inputs=self.state.inputs), rows).inputs
+        return State(self.lengths(rows), self.direction(rows, fraction), inputs)
+
+    # -- a real machine -----------------------------------------------------------------------------------------------
+
+    def gap(self, rows: Index, fraction: Array, commands: Array) -> Array:
+        """Actual tip of the real machine under `commands` minus intended tip at the fractions, (k, 3) mm."""
+        actual = self.machine.actual_tip(self.joints(rows, commands), self.states(rows, fraction))
+        gap: Array = actual - self.tip(rows, fraction)
+        return gap
+
+    def follows(self, rows: Index, commands: Array) -> Array:
+        """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""
+        tcp = self.moves.tcp[rows]
+        programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands)
+        maps = regular(affine_tip(self.machine, programmed)[0])[0]
+        return np.broadcast_to(maps, (len(rows), 3, 3))
+
+    def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
+        """Nearly the corrected commands at fractions of motions, (k, n_axes).
+
+        X Y Z by one Newton step from those of the program, with the rotary axes where `real` has them: good to the
+        errors times their gradient, some tens of nanometres.
+        """
+        commands = real.at(rows, fraction)
+        commands[:, self.columns] = self.segments.at(rows, fraction)[:, self.columns]
+        gap = self.gap(rows, fraction, commands)
+        commands[:, self.columns] -= solve(self.follows(rows, commands), gap)
+        return commands

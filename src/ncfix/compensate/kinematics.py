@@ -1,0 +1,139 @@
+"""Commands and axis positions: what the control makes of X Y Z, with tool-centre-point control and without.
+
+Without it a command is the axis positions. With it, X Y Z of a command are where the tool tip shall be in the
+workpiece, in the sense that with all rotary axes at zero the program means what it means without: the tip goes where
+it would go if the linear axes had the commanded numbers, the rotary axes stood at zero and the tool had no length.
+The control then finds the linear axis positions that bring the tip there with the rotary axes at their commanded
+places. The tip moves by a linear map of X Y Z as long as nothing else moves, so three equations are solved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ncfix.compensate.findings import Array, Index, Mask, pose_error
+from ncfix.diagnostics import RefusedError
+from ncfix.machine import Machine
+
+SPATIAL = ("X", "Y", "Z")
+PROBE = 256.0
+"""mm; a power of two, so that dividing by it rounds nothing."""
+FLAT = 1e-6
+"""The volume spanned by the tip's motions per mm of X, Y and Z below which they do not reach every point."""
+
+
+def linear_columns(machine: Machine) -> Index:
+    """The columns of X, Y and Z, in this order. Raises `RefusedError` NCF401 if one of them is not a linear axis."""
+    names, rotary = machine.axis_names, machine.rotary
+    columns = [names.index(name) for name in SPATIAL if name in names and not rotary[names.index(name)]]
+    if len(columns) != len(SPATIAL):
+        raise RefusedError.of(
+            "NCF401",
+            f"machine {machine.name!r} has no three linear axes X, Y and Z, so its tool tip cannot be corrected",
+            hint=f"its axes are {', '.join(names)}",
+        )
+    return np.array(columns, dtype=np.intp)
+
+
+def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tuple[Array, Array]:
+    """The tip as a function of X Y Z with everything else as in `q` (n, n_axes): tip = map @ xyz + offset.
+
+    Returns map (n or 1, 3, 3) [mm per mm, workpiece frame] and offset (n or 1, 3) [mm]. One row stands for all where
+    all poses agree in everything but X Y Z.
+    """
+    columns = linear_columns(machine)
+    still = q.copy()
+    still[:, columns] = 0.0
+    length = np.asarray(tool_length, dtype=np.float64)
+    if len(q) > 1 and length.ndim == 0 and (still == still[0]).all():
+        still = still[:1]
+    probes = np.repeat(still[None], 4, axis=0)
+    for k, column in enumerate(columns):
+        probes[k + 1, :, column] = PROBE
+    tips = machine.tip(probes, length)
+    maps: Array = np.moveaxis(tips[1:] - tips[0], 0, -1) / PROBE
+    return maps, tips[0]
+
+
+def solve(maps: Array, tips: Array) -> Array:
+    """The linear motion that moves the tip by `tips` (n, 3): maps (n or 1, 3, 3) -> (n, 3) mm of X, Y, Z."""
+    return np.asarray(np.linalg.solve(maps, tips[..., None])[..., 0], dtype=np.float64)
+
+
+def regular(maps: Array) -> tuple[Array, Mask]:
+    """The maps with those that cannot be inverted replaced by the identity, and which can (n or 1,)."""
+    fine = np.asarray(~(np.abs(np.linalg.det(maps)) < FLAT))
+    usable: Array = maps if fine.all() else np.where(fine[:, None, None], maps, np.eye(3))
+    return usable, fine
+
+
+def joints_from_commands(machine: Machine, commands: Array, tcp: Mask, tool_length: ArrayLike) -> Array:
+    """The axis positions that a perfect control of this machine makes of commands.
+
+    commands     (n, n_axes) mm and rad
+    tcp          (n,) whether X Y Z are tool-tip coordinates in the workpiece
+    tool_length  (n,) or () mm, spindle reference to tip
+
+    Returns (n, n_axes). Raises `PoseError` NCF402 where the linear axes cannot bring the tip there.
+    """
+    q, reached = reached_joints(machine, commands, tcp, tool_length)
+    if not reached.all():
+        text = "the linear axes cannot bring the tool tip to the commanded point with the rotary axes where they are"
+        raise pose_error("NCF402", text, ~reached, "two linear axes are parallel in the workpiece there")
+    return q
+
+
+def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: ArrayLike) -> tuple[Array, Mask]:
+    """As `joints_from_commands`, with a mask (n,) of the rows that can be reached instead of an error."""
+    reached = np.ones(len(commands), dtype=bool)
+    if not tcp.any():
+        return commands, reached
+    q = commands.copy()
+    rows = np.flatnonzero(tcp)
+    columns = linear_columns(machine)
+    maps, offset = affine_tip(machine, commands[rows], _of_rows(tool_length, rows))
+    maps, fine = regular(maps)
+    q[rows[:, None], columns] = solve(maps, _programmed_tip(machine, commands[rows]) - offset)
+    reached[rows] = fine
+    return q, reached
+
+
+def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: ArrayLike) -> Array:
+    """The commands that make a perfect control take these axis positions: the inverse of `joints_from_commands`.
+
+    q, tcp and tool_length as there; returns (n, n_axes).
+    """
+    if not tcp.any():
+        return q
+    commands = q.copy()
+    rows = np.flatnonzero(tcp)
+    columns = linear_columns(machine)
+    maps, offset = affine_tip(machine, _rotary_at_zero(machine, q[rows]))
+    tip = machine.tip(q[rows], _of_rows(tool_length, rows))
+    commands[rows[:, None], columns] = solve(regular(maps)[0], tip - offset)
+    return commands
+
+
+def _programmed_tip(machine: Machine, commands: Array) -> Array:
+    """Where in the workpiece a command wants the tip, (n, 3) mm."""
+    tip: Array = machine.tip(_rotary_at_zero(machine, commands), 0.0)
+    return tip
+
+
+def _rotary_at_zero(machine: Machine, q: Array) -> Array:
+    return np.where(machine.rotary, 0.0, q)
+
+
+def _of_rows(tool_length: ArrayLike, rows: Index) -> Array:
+    length = np.asarray(tool_length, dtype=np.float64)
+    if length.ndim == 0:
+        return length
+    return common(length[rows])
+
+
+def common(values: Array) -> Array:
+    """One number, shape (), for values (k,) that are all the same, so that things are done once; else as they are."""
+    if len(values) and (values == values[0]).all():
+        return np.asarray(values[0])
+    return values

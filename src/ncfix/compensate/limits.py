@@ -1,0 +1,171 @@
+"""What a corrected program must not do: leave the travel, correct too much or too fast, go where nothing is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.written import Written
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Moves
+from ncfix.program.pieces import Pieces
+
+FUZZ = 1e-9
+"""mm or rad beyond a limit that count as on it: rounding of the arithmetic, a thousandth of any control's digit."""
+RATE = 0.02
+"""How much a correction may change per mm of way, mm/mm: ten times what 100 um per 50 mm makes."""
+JUMP = 0.05
+"""mm that a correction may change at one place: a large play."""
+RATE_TURNING = 1.0
+"""The same per rad of a rotary axis, mm/rad: 100 um in a tenth of a radian."""
+LOOKS = 64
+"""Places at which a curved motion is looked at for where an axis turns back."""
+NEAR = 8
+"""An axis whose highest look is less than an eighth of its travel below a limit may pass it in between (14 turns)."""
+THIRDS = 60
+"""Steps of the search between them: the bracket falls by a third each."""
+
+Joints = Callable[[Index, Array], Array]
+
+
+def findings(
+    machine: Machine, moves: Moves, pieces: Pieces, start: Array | None = None, state: State | None = None
+) -> tuple[Finding, ...]:
+    """Everything that is against correcting motions as `pieces` have them; only corrected motions are looked at.
+
+    start  (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
+    """
+    written = Written(Intent(machine, moves, state or State()), pieces, moves.start if start is None else start)
+    found = [
+        not_a_number(written),
+        outside_calibrated(written),
+        over_travel(written),
+        too_large(written),
+        too_fast(written),
+    ]
+    return tuple(finding for finding in found if len(finding))
+
+
+def not_a_number(written: Written) -> Finding:
+    """NCF408: motions with a corrected end that is not finite."""
+    pieces = written.pieces
+    bad = ~np.isfinite(pieces.end).all(axis=1) | (pieces.arc & ~np.isfinite(pieces.centre).all(axis=1))
+    rows = np.unique(pieces.move[bad & ~pieces.kept])
+    return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
+
+
+def outside_calibrated(written: Written) -> Finding:
+    """NCF405: motions that leave the range of an axis as they are programmed."""
+    text = "axis {axis} goes {value:.4f} (mm or degree) beyond the range over which its errors are known"
+    return _of_axes(written, "NCF405", text, _programmed_excess(written))
+
+
+def over_travel(written: Written) -> Finding:
+    """NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected.
+
+    On the limit is within.
+    """
+    pieces = written.pieces
+    corrected = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
+    each = np.arange(len(pieces))
+    curved = written.segments.arc | written.intent.moves.tcp[pieces.move]
+    np.maximum.at(corrected, pieces.move, excess(written.intent.machine, written.joints, each, curved))
+    beyond = np.where(_programmed_excess(written) > FUZZ, -np.inf, corrected)
+    return _of_axes(written, "NCF404", "the correction takes axis {axis} {value:.4f} beyond its range", beyond)
+
+
+def too_large(written: Written) -> Finding:
+    """NCF406: corrections above the machine's `max_correction`: the linear axes together, each rotary axis alone."""
+    machine = written.intent.machine
+    shift = written.correction()
+    linear = np.linalg.norm(shift[:, ~machine.rotary], axis=1) / machine.max_correction[0]
+    rotary = np.abs(shift[:, machine.rotary]).max(axis=1, initial=0.0) / machine.max_correction[1]
+    share = np.maximum(linear, rotary)
+    over = (share > 1 + FUZZ) & ~written.pieces.kept
+    rows, values = _worst(written.pieces.move[over], share[over])
+    text = "the correction is {value:.3g} times as large as the machine file allows"
+    return Finding("NCF406", rows, values, text)
+
+
+def too_fast(written: Written) -> Finding:
+    """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
+    machine, pieces = written.intent.machine, written.pieces
+    shift = written.correction()[:, ~machine.rotary]
+    where = written.intent.joints_at(pieces.move, pieces.fraction)
+    change = np.linalg.norm(np.diff(shift, axis=0), axis=1)
+    way = np.abs(np.diff(where, axis=0))
+    allowed = JUMP + RATE * way[:, ~machine.rotary].sum(axis=1) + RATE_TURNING * way[:, machine.rotary].sum(axis=1)
+    over = (change > allowed) & ~pieces.kept[1:] & ~pieces.kept[:-1]
+    rows, values = _worst(pieces.move[1:][over], change[over])
+    return Finding("NCF407", rows, values, "the correction changes by {value:.4f} mm at once")
+
+
+def excess(machine: Machine, joints: Joints, each: Index, curved: Mask) -> Array:
+    """How far axes go beyond their ranges along motions, (k, n_axes) mm and rad; negative while within.
+
+    joints  gives axis positions (j, n_axes) at fractions (j,) of motions (j,)
+    each    (k,) motions
+    curved  (k,) axes do not move linearly along it: looked at inside too, not only at the end
+    """
+    result = _beyond(machine, joints(each, np.ones(len(each))))
+    rows = np.flatnonzero(curved)
+    if not rows.size:
+        return result
+    looks = np.arange(LOOKS + 1) / LOOKS
+    q = joints(np.repeat(each[rows], LOOKS + 1), np.tile(looks, len(rows)))
+    inside = _beyond(machine, q).reshape(len(rows), LOOKS + 1, -1)
+    travel = np.ptp(q.reshape(inside.shape), axis=1)
+    best = inside.max(axis=1)
+    near, axis = np.nonzero(best > -travel / NEAR)
+    place = inside[near, :, axis].argmax(axis=1)
+    low, high = looks[np.maximum(place - 1, 0)], looks[np.minimum(place + 1, LOOKS)]
+    found = _highest(lambda f: _beyond(machine, joints(each[rows[near]], f))[np.arange(len(near)), axis], low, high)
+    best[near, axis] = np.maximum(best[near, axis], found)
+    result[rows] = np.maximum(result[rows], best)
+    return result
+
+
+def _highest(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """The largest value of functions with one maximum between `low` and `high`, by thirds; vectorised."""
+    for _ in range(THIRDS if len(low) else 0):
+        first, second = low + (high - low) / 3, high - (high - low) / 3
+        rising = function(first) < function(second)
+        low, high = np.where(rising, first, low), np.where(rising, high, second)
+    return function((low + high) / 2) if len(low) else low
+
+
+def _beyond(machine: Machine, q: Array) -> Array:
+    """How far beyond the nearer end of its range each axis is, negative if within; -inf where there is no range."""
+    low, high = machine.ranges.T
+    result: Array = np.maximum(low - q, q - high)
+    return result
+
+
+def _programmed_excess(written: Written) -> Array:
+    """As `excess`, of the program as it is; (n, n_axes)."""
+    intent = written.intent
+    each = np.arange(len(intent.moves))
+    return excess(intent.machine, intent.joints_at, each, intent.curved)
+
+
+def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
+    """A finding for each corrected motion with an axis beyond its range; values in mm or degrees."""
+    machine, pieces = written.intent.machine, written.pieces
+    kept = np.zeros(len(beyond), dtype=bool)
+    kept[pieces.move] = pieces.kept
+    axis = np.where(np.isnan(beyond), -np.inf, beyond).argmax(axis=1)
+    most = beyond[np.arange(len(beyond)), axis]
+    rows = np.flatnonzero((most > FUZZ) & ~kept)
+    units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
+    return Finding(code, rows, most[rows] * units, text, tuple(machine.axis_names[j] for j in axis[rows]))
+
+
+def _worst(moves: Index, values: Array) -> tuple[Index, Array]:
+    """Each motion once, with its largest value."""
+    rows, place = np.unique(moves, return_inverse=True)
+    most = np.zeros(len(rows))
+    np.maximum.at(most, place, values)
+    return rows, most

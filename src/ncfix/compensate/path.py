@@ -1,0 +1,163 @@
+"""The plan of a corrected program: which commands to write so that the whole path stays within the tolerance.
+
+Ends of motions are corrected first. Then every motion is judged along its path: the real machine following the
+corrected piece, straight or arc, against the intended path at the same fraction. Most motions pass after one look or
+two; an arc that does not is made of straight pieces, and what needs it is split at the fewest places.
+
+Rapids are corrected at their ends. How a control goes from one end to the other in a rapid is its own affair, so they
+are split only if asked. Canned cycles are corrected at their end. Nothing is split under cutter radius compensation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.compensate.arcs import fitted
+from ncfix.compensate.assembly import Plan, assembled, untouched
+from ncfix.compensate.budget import Budget, Closure
+from ncfix.compensate.ends import corrected, with_closed_circles
+from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.grids import split
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.judge import deviations, uneasy_starts
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.standing import standing
+from ncfix.compensate.strategies import Strategy
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Kind, Moves, Rule
+
+
+@dataclass(frozen=True, slots=True)
+class Demands:
+    """What the corrected program has to meet.
+
+    budget        the tolerance, and what rounding takes of it
+    closure       what the control accepts as an arc
+    split_rapids  the tolerance holds along rapids too
+    """
+
+    budget: Budget
+    closure: Closure
+    split_rapids: bool
+
+
+def plan(
+    machine: Machine,
+    moves: Moves,
+    strategy: Strategy,
+    tolerance_mm: float,
+    closure: Closure = Closure(),  # noqa: B008
+    keep: Mask | None = None,
+    *,
+    state: State = State(),  # noqa: B008
+    rounding_mm: float = 0.0,
+    split_rapids: bool = False,
+) -> Plan:
+    """Correct the motions of a program.
+
+    tolerance_mm  how far the tool tip may leave the intended path, at the emitted points and between them
+    closure       what the control accepts as an arc; half of it is used
+    keep          (n,) motions to leave as they are, besides those that the tracer does not allow to correct
+    state         what else the errors depend on: `inputs`, numbers or one number per motion
+    rounding_mm   how far the tip may be off because of the control's digits: the norm of half output steps
+    split_rapids  hold the tolerance along rapids too, not only at their ends
+
+    Motions that cannot be corrected are kept and named in the findings. Raises `RefusedError` NCF401 if the machine
+    has no X, Y and Z.
+    """
+    kept = (moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)
+    kept |= keep if keep is not None else False
+    if machine.is_perfect or kept.all():
+        return untouched(moves, kept)
+    demands = Demands(Budget(tolerance_mm, rounding_mm), closure, split_rapids)
+    return _plan(Intent(machine, moves, state), strategy, demands, kept)
+
+
+def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:
+    ends = corrected(intent, strategy, np.flatnonzero(~kept))
+    kept = kept | ends.failed
+    real, broken = _real(intent, ends.wanted, kept, demands)
+    bound = intent.moves.compensated if strategy.follows_path else np.ones(len(kept), dtype=bool)
+    if (broken & bound).any():
+        again = _plan(intent, strategy, demands, kept | (broken & bound))
+        return replace(again, findings=(*ends.findings, _stuck(np.flatnonzero(broken & bound)), *again.findings))
+    deviation = _judged(intent, real, kept, broken, strategy, demands)
+    limit = demands.budget.path
+    over = np.flatnonzero((deviation > limit) & ~bound)
+    parts = split(intent, real, over, _pieces(intent, real, over, deviation[over], limit), strategy, limit)
+    deviation[over] = parts.worst
+    findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
+    return assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
+
+
+def _real(intent: Intent, wanted: Array, kept: Mask, demands: Demands) -> tuple[Segments, Mask]:
+    """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
+    moves, programmed = intent.moves, intent.segments
+    wanted = with_closed_circles(intent, wanted, kept, demands.budget.path / 2)
+    where = standing(intent.machine, moves, wanted, kept)
+    real = replace(programmed, start=where.start, end=where.end)
+    broken = np.zeros(len(moves), dtype=bool)
+    rows = np.flatnonzero(programmed.arc & ~kept)
+    if not rows.size:
+        return real, broken
+    fit = fitted(intent, real, rows, demands.closure, demands.budget.rounding)
+    centre, sweep = programmed.centre.copy(), programmed.sweep.copy()
+    centre[rows], sweep[rows] = fit.centre, fit.sweep
+    broken[rows] = ~fit.sound
+    return replace(real, centre=centre, sweep=sweep, arc=programmed.arc & ~broken), broken
+
+
+def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, strategy: Strategy, demands: Demands) -> Array:
+    """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
+    deviation = np.zeros(len(kept))
+    if not strategy.follows_path:
+        return deviation
+    kind = intent.moves.kind
+    followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
+    followed &= ~kept & np.isfinite(real.start).all(axis=1)
+    rows = np.flatnonzero(followed & ~broken)
+    deviation[rows] = deviations(intent, real, rows, uneasy_starts(intent, kept), demands.budget.path)
+    deviation[followed & broken] = np.inf
+    return deviation
+
+
+def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, tolerance: float) -> Array:
+    """About how many straight pieces motions will need: one per bow of the deviation, and those of the arc itself."""
+    moves = intent.moves
+    count = np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance)
+    arcs = np.flatnonzero(intent.segments.arc[rows])
+    if arcs.size:
+        on = rows[arcs]
+        spoke = real.start[on[:, None], intent.columns] - moves.centre[on]
+        radius = np.linalg.norm(np.cross(moves.normal[on], spoke), axis=1)
+        angle = 2 * np.arccos(np.clip(1 - tolerance / np.maximum(radius, tolerance), 0.0, 1.0))
+        count[arcs] += np.abs(moves.sweep[on]) / angle
+    return count + 1
+
+
+def _stuck(rows: Index) -> Finding:
+    text = "this arc would have to be made of straight pieces, and must not be split"
+    return Finding("NCF415", rows, np.zeros(len(rows)), text)
+
+
+def _remarks(
+    intent: Intent, deviation: Array, oriented: Mask, kept: Mask, strategy: Strategy, demands: Demands
+) -> list[Finding]:
+    """What is not as it was asked for, though nothing is kept for it."""
+    remarks = []
+    budget = demands.budget
+    over = np.flatnonzero((deviation > budget.path) & intent.moves.compensated)
+    if over.size:
+        text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
+        remarks.append(Finding("NCF413", over, deviation[over] * 1e3, text))
+    done = np.flatnonzero(~kept)
+    if not budget.met and done.size:
+        text = "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um"
+        remarks.append(Finding("NCF409", done[:1], np.array([budget.rounding * 1e3]), text))
+    held = done[~oriented[done]]
+    if strategy.corrects_orientation and held.size:
+        text = "the tool direction is not, or not fully, corrected here"
+        remarks.append(Finding("NCF410", held, np.zeros(len(held)), text))
+    return remarks

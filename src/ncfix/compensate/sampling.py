@@ -1,0 +1,167 @@
+"""Where a motion must be looked at: as densely as the error model may bend, and at its kinks and jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ncfix.compensate.direction import signs
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.ragged import offsets, owners, places
+from ncfix.compensate.segments import Segments
+from ncfix.machine import Machine
+
+TURN = 2 * np.pi
+EIGHTH = TURN / 8
+"""rad; whatever the errors do, turning an axis bends their effect in the workpiece over an eighth of a turn."""
+MOST = 1 << 14
+"""Samples on one motion."""
+BISECTIONS = 40
+
+
+def features(machine: Machine) -> Array:
+    """The way of each axis (n_axes,) over which the tip's error in the workpiece may bend, mm and rad."""
+    return np.where(machine.rotary, np.minimum(machine.feature_lengths(), EIGHTH), machine.feature_lengths())
+
+
+def bends(intent: Intent, rows: Index) -> Array:
+    """About how many times the error may bend along each motion, (k,).
+
+    The ways of all axes, each in the lengths over which it bends the error, added up. Without tool-centre-point
+    control the ways are those of the commands, on arcs those of the full arc. With it the linear axes also make the way
+    that swinging the tip round takes: up to the distance of the tip from the rotary axes times the angle, and for small
+    angles, beyond the way from start to end, its square.
+    """
+    moves = intent.moves
+    length = features(intent.machine)
+    zero, one = np.zeros(len(rows)), np.ones(len(rows))
+    way = np.abs(intent.joints_at(rows, one) - intent.joints_at(rows, zero))
+    swung = np.flatnonzero(moves.tcp[rows])
+    if swung.size:
+        angle = way[swung][:, intent.machine.rotary].sum(axis=1)
+        extra = _reach(intent, rows[swung]) * angle * np.minimum(1.0, angle)
+        way[swung[:, None], intent.columns] += extra[:, None]
+    arcs = np.flatnonzero(intent.segments.arc[rows])
+    if arcs.size:
+        way[arcs[:, None], intent.columns] += _arc_ways(intent, rows[arcs])
+    count: Array = (way / length).sum(axis=1)
+    count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
+    return count
+
+
+def _reach(intent: Intent, rows: Index) -> Array:
+    """The distance of the tip from the rotary axes, roughly and from above, mm."""
+    machine = intent.machine
+    points = [np.linalg.norm(axis.point) for axis in machine.axes if axis.rotary]
+    tip = machine.tip(intent.joints_at(rows, np.ones(len(rows))), intent.lengths(rows))
+    reach: Array = np.linalg.norm(tip, axis=1) + max(points, default=0.0) + np.linalg.norm(machine.tool.point)
+    return reach
+
+
+def _arc_ways(intent: Intent, rows: Index) -> Array:
+    """What X Y Z move along arcs, (k, 3) mm, from above."""
+    moves, segments = intent.moves, intent.segments
+    start = segments.start[rows[:, None], intent.columns] - moves.centre[rows]
+    across = np.cross(moves.normal[rows], start)
+    radius = np.linalg.norm(across, axis=1)
+    in_plane = np.sqrt(np.maximum(1 - moves.normal[rows] ** 2, 0.0))
+    ways: Array = (radius * np.abs(moves.sweep[rows]))[:, None] * in_plane
+    return ways
+
+
+def even(counts: Index) -> Array:
+    """Fractions that divide motions evenly, ends left out: `counts` (n,) of them each, flat."""
+    return (places(counts) + 1) / np.repeat(counts + 1, counts)
+
+
+def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least: int) -> tuple[Index, Array]:
+    """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
+
+    `per_bend` samples for each time that the error may bend, at least `least`, and one wherever an axis passes a kink
+    or a jump of the error model, done as `real` has the motions.
+    """
+    counts = np.clip(np.ceil(per_bend * bends(intent, rows)), least, MOST).astype(np.intp)
+    fraction = even(counts)
+    if not kinked(intent.machine):
+        return counts, fraction
+    owner, low, high = _stretches(intent.curved[rows], counts, fraction)
+    before, after = (intent.joints(rows[owner], real.at(rows[owner], each)) for each in (low, high))
+    stretch, share = passed(intent.machine, before, after)
+    at = low[stretch] + share * (high[stretch] - low[stretch])
+    return merged(len(rows), (owners(counts), fraction), (owner[stretch], at))
+
+
+def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:
+    """Several flat lists of (owner, fraction) as one with counts (n,), ascending within each owner, none twice."""
+    owner = np.concatenate([each[0] for each in lists])
+    fraction = np.concatenate([each[1] for each in lists])
+    order = np.lexsort((fraction, owner))
+    owner, fraction = owner[order], fraction[order]
+    new = np.ones(len(owner), dtype=bool)
+    new[1:] = (np.diff(owner) != 0) | (np.diff(fraction) > 0)
+    return np.bincount(owner[new], minlength=n).astype(np.intp), fraction[new]
+
+
+def kinked(machine: Machine) -> list[tuple[int, Array]]:
+    """The axes with kinks or jumps of the error model, and where they are, ascending, mm and rad."""
+    places = [(j, machine.breakpoints(name)) for j, name in enumerate(machine.axis_names)]
+    return [(j, points) for j, points in places if len(points)]
+
+
+def passed(machine: Machine, before: Array, after: Array) -> tuple[Index, Array]:
+    """Where axes going from `before` to `after` (k, n_axes) pass a kink or a jump: which motion, share of its way."""
+    found = [(np.zeros(0, dtype=np.intp), np.zeros(0))]
+    for j, points in kinked(machine):
+        everywhere = _unrolled(points, before[:, j], after[:, j]) if machine.axes[j].endless else points
+        found.append(_crossings(before[:, j], after[:, j], everywhere))
+    return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
+
+
+def _stretches(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array, Array]:
+    """Stretches of motions over which axes move nearly linearly: owner, first and last fraction.
+
+    Between samples; motions that are not curved are taken in one.
+    """
+    pieces = np.where(curved, counts + 1, 1)
+    owner, place = owners(pieces), places(pieces)
+    at = offsets(counts)[:-1][owner] + place
+    low = np.where(place == 0, 0.0, fraction[np.maximum(at - 1, 0)])
+    high = np.where(place == pieces[owner] - 1, 1.0, fraction[np.minimum(at, len(fraction) - 1)])
+    return owner, low, high
+
+
+def _unrolled(points: Array, before: Array, after: Array) -> Array:
+    """Places of kinks of an endless axis over the range that is passed: they come again with every turn."""
+    ends = np.concatenate([before, after])
+    low, high = np.nanmin(ends, initial=0.0), np.nanmax(ends, initial=0.0)
+    turns = np.arange(np.floor((low - points[-1]) / TURN), np.ceil((high - points[0]) / TURN) + 1)
+    return np.unique(points[None] + TURN * turns[:, None])
+
+
+def _crossings(before: Array, after: Array, points: Array) -> tuple[Index, Array]:
+    """Where values that go from `before` to `after` (k,) pass `points`: index and share of the way, ends left out."""
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    first = np.searchsorted(points, low, side="right")
+    counts = np.maximum(np.searchsorted(points, high, side="left") - first, 0)
+    counts = np.where(np.isfinite(before + after), counts, 0)
+    owner = owners(counts)
+    passed = points[first[owner] + places(counts)]
+    return owner, (passed - before[owner]) / (after[owner] - before[owner])
+
+
+def reversals(intent: Intent, rows: Index, counts: Index, fraction: Array) -> tuple[Index, Array]:
+    """Where axes of curved motions change direction, if that matters: owner and fraction, flat."""
+    bent = np.flatnonzero(intent.curved[rows])
+    if intent.arrival is None or not bent.size:
+        return np.zeros(0, dtype=np.intp), np.zeros(0)
+    member = np.isin(owners(counts), bent)
+    owner, at = owners(counts)[member], fraction[member]
+    way = signs(intent.velocity(rows[owner], at))
+    turns = (way[1:] * way[:-1] < 0) & (owner[1:] == owner[:-1])[:, None]
+    place, axis = np.nonzero(turns)
+    low, high, before = at[place], at[place + 1], way[place, axis]
+    for _ in range(BISECTIONS if place.size else 0):
+        middle = (low + high) / 2
+        now = signs(intent.velocity(rows[owner[place]], middle))[np.arange(len(place)), axis]
+        low, high = np.where(now == before, middle, low), np.where(now == before, high, middle)
+    return owner[place], (low + high) / 2

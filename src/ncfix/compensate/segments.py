@@ -1,0 +1,93 @@
+"""Lines and arcs in the space of commands: where the command is at a fraction of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.program.moves import Kind, Moves
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """Motions as the control interpolates them: every axis linear in the fraction; X Y Z of an arc on a circle.
+
+    start, end  (n, n_axes) commands, mm and rad
+    arc         (n,) X Y Z go on an arc
+    centre      (n, 3) mm; any point of the arc's axis
+    normal      (n, 3) unit vector along it
+    sweep       (n,) signed angle about it, full turns included, rad
+    columns     (3,) the columns of X, Y and Z; -1 for an axis that the machine lacks
+
+    Where start and end are not equally far from the axis, the radius changes linearly with the fraction; so does the
+    height along the axis (helix).
+    """
+
+    start: Array
+    end: Array
+    arc: Mask
+    centre: Array
+    normal: Array
+    sweep: Array
+    columns: Index
+
+    @classmethod
+    def of_moves(cls, moves: Moves, columns: Index) -> Segments:
+        """The motions as programmed."""
+        return cls(moves.start, moves.end, moves.kind == Kind.ARC, moves.centre, moves.normal, moves.sweep, columns)
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def rows(self, rows: Index) -> Segments:
+        """Some of the motions."""
+        ends, centre, normal = (self.start[rows], self.end[rows]), self.centre[rows], self.normal[rows]
+        return Segments(*ends, self.arc[rows], centre, normal, self.sweep[rows], self.columns)
+
+    def at(self, rows: Index, fraction: Array) -> Array:
+        """The commands at fractions (k,) of motions `rows` (k,), shape (k, n_axes)."""
+        f = fraction[:, None]
+        command = (1 - f) * self.start[rows] + f * self.end[rows]
+        if self.arc.any():
+            on_arc = np.flatnonzero(self.arc[rows])
+            if on_arc.size:
+                command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
+        return command
+
+    def _on_arc(self, rows: Index, fraction: Array) -> Array:
+        """X Y Z at fractions of arcs, (k, 3)."""
+        start, end = (points[rows[:, None], self.columns] - self.centre[rows] for points in (self.start, self.end))
+        normal, sweep, f = self.normal[rows], self.sweep[rows], fraction[:, None]
+        low, high = _height(start, normal), _height(end, normal)
+        from_start = _turned(start - low * normal, normal, fraction * sweep)
+        from_end = _turned(end - high * normal, normal, (fraction - 1) * sweep)
+        height = (1 - f) * low + f * high
+        result: Array = self.centre[rows] + height * normal + (1 - f) * from_start + f * from_end
+        return result
+
+
+def _height(points: Array, normal: Array) -> Array:
+    height: Array = np.einsum("ij,ij->i", points, normal)[:, None]
+    return height
+
+
+def _turned(radius: Array, normal: Array, angle: Array) -> Array:
+    """Radius vectors turned about the normal that they are perpendicular to."""
+    across = np.cross(normal, radius)
+    result: Array = np.cos(angle)[:, None] * radius + np.sin(angle)[:, None] * across
+    return result
+
+
+def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: Array) -> Array:
+    """The signed angle from start to end (k, 3) about the axis, with as many turns as `like` (k,) has, rad.
+
+    For where the ends of an arc were moved a little: of all angles that fit, the one next to `like`.
+    """
+    first, last = start - centre, end - centre
+    sine = np.einsum("ij,ij->i", np.cross(first, last), normal)
+    cosine = np.einsum("ij,ij->i", first, last) - _height(first, normal)[:, 0] * _height(last, normal)[:, 0]
+    change = np.arctan2(sine, cosine) - like
+    result: Array = like + change - 2 * np.pi * np.round(change / (2 * np.pi))
+    return result

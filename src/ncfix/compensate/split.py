@@ -1,0 +1,78 @@
+"""Splitting motions at the fewest places: from each emitted point as far as a straight piece stays within tolerance.
+
+Each motion has a fine grid of nodes with the exactly corrected command of each. A straight piece from node a to node b
+is judged at the nodes between them: there the tip is off by the difference between the command on the piece and the
+exact command, times how the tip follows commands; the error model need not be evaluated again. Differences are of the
+order of the tolerance, so what is left out is smaller by the gradient of the errors (under a thousandth).
+
+Going as far as possible from each point gives the fewest pieces that can be had with ends on the exact path. All
+motions are worked on at once: a round tries one end for each of them, doubling the reach until it is too far, then
+halving the gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.ragged import largest, offsets, owners, places
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Nodes of motions, flat, all nodes of a motion next to each other.
+
+    counts    (g,) nodes of each motion, its start and end included; at least 2
+    fraction  (k,) ascending from 0 to 1 in each motion
+    command   (k, n_axes) exactly corrected command; at the start where the machine really stands
+    follow    (k, 3, n_axes) how the tip follows the command there, mm per mm and mm per rad
+    """
+
+    counts: Index
+    fraction: Array
+    command: Array
+    follow: Array
+
+    def deviations(self, first: Index, last: Index) -> Array:
+        """The largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+        inner = last - first - 1
+        piece = owners(inner)
+        node = first[piece] + 1 + places(inner)
+        a, b = first[piece], last[piece]
+        share = (self.fraction[node] - self.fraction[a]) / (self.fraction[b] - self.fraction[a])
+        command = self.command[a] + share[:, None] * (self.command[b] - self.command[a])
+        off = np.einsum("kij,kj->ki", self.follow[node], command - self.command[node])
+        return largest(np.sqrt(np.einsum("ki,ki->k", off, off)), inner)
+
+
+def fewest(grid: Grid, tolerance: float) -> tuple[Mask, Array]:
+    """Which nodes end a piece (k,), and the largest deviation of each motion's pieces (g,) mm.
+
+    A piece from one node to the next is always allowed: it has no nodes between.
+    """
+    first = offsets(grid.counts)
+    ends = np.zeros(int(first[-1]), dtype=bool)
+    worst = np.zeros(len(grid.counts))
+    at, stop = first[:-1].copy(), first[1:] - 1
+    reach, reached_by = at + 1, np.zeros(len(at))
+    beyond = stop + 1
+    active = np.arange(len(at))
+    while active.size:
+        a, near, far, end = at[active], reach[active], beyond[active], stop[active]
+        unbounded = far > end
+        trial = np.where(unbounded, np.minimum(near + 2 * (near - a), end), (near + far) // 2)
+        settled = (trial <= near) | (near >= end)
+        trying = active[~settled]
+        off = grid.deviations(at[trying], trial[~settled])
+        good = off <= tolerance
+        reach[trying[good]], reached_by[trying[good]] = trial[~settled][good], off[good]
+        beyond[trying[~good]] = trial[~settled][~good]
+        done = active[settled]
+        ends[reach[done]] = True
+        worst[done] = np.maximum(worst[done], reached_by[done])
+        at[done], reached_by[done], beyond[done] = reach[done], 0.0, stop[done] + 1
+        reach[done] = np.minimum(reach[done] + 1, stop[done])
+        active = active[at[active] < stop[active]]
+    return ends, worst

@@ -1,0 +1,216 @@
+"""The proof: how far a real machine leaves the intended path, with the program as it was and as it is now.
+
+Actual and intended tip are compared at the same fraction of a motion (see `intent`). Motions of canned cycles and
+rapids are looked at where they end, all others along the way: as densely as the error model may bend, and at its kinks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.grids import INSTANT
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.judge import uneasy_starts
+from ncfix.compensate.ragged import batches, owners
+from ncfix.compensate.sampling import MOST, bends, even, kinked, merged, passed
+from ncfix.compensate.steer import rows_of
+from ncfix.compensate.written import Written
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.pieces import Pieces
+
+BATCH = 50_000
+"""Samples worked on at a time."""
+START = 1e-6
+"""Fraction of a motion at which its start is looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Tip errors along a path.
+
+    max       mm
+    rms       mm, by length of way
+    move      the motion in which the largest is, -1 if there is none
+    fraction  where on it
+    tilt      largest angle between the actual and the intended tool direction at the ends of pieces, rad
+    """
+
+    max: float
+    rms: float
+    move: int
+    fraction: float
+    tilt: float
+
+
+@dataclass(frozen=True, slots=True)
+class PathError:
+    """Before and after a correction.
+
+    before, after             figures over all motions looked at
+    move_before, move_after   (n,) mm: largest error on each motion, 0 where not looked at
+    samples                   how many places were looked at
+    """
+
+    before: Figures
+    after: Figures
+    move_before: Array
+    move_after: Array
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Places on a path, flat: motion, fraction, tip error before and after (mm), share of the way (mm); tilts (rad)."""
+
+    move: Index
+    fraction: Array
+    before: Array
+    after: Array
+    weight: Array
+    tilt_before: float
+    tilt_after: float
+
+
+def path_error(
+    machine: Machine,
+    moves: Moves,
+    pieces: Pieces,
+    start: Array | None = None,
+    *,
+    state: State = State(),  # noqa: B008
+    rows: Mask | None = None,
+    density: float = DENSITY,
+    least: int = 2,
+) -> PathError:
+    """Tip errors of the real machine along the whole path, by simulation.
+
+    pieces   what is written, with the ends as the control will understand them (`Emission.end`, `.centre`)
+    start    (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
+    rows     (n,) motions to look at; all that are not kept if not given
+    density  samples for each time that the error model may bend
+    least    fewest samples inside a piece
+    """
+    written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
+    chosen = ~pieces.kept if rows is None else rows[pieces.move]
+    tally = _Tally(len(moves))
+    for part in samples(written, np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move]), density, least):
+        tally.add(part)
+    return tally.result()
+
+
+def samples(written: Written, which: Index, density: float = DENSITY, least: int = 2) -> Iterator[Samples]:
+    """Look at pieces `which`, in batches."""
+    counts = _counts(written, which, density, least)
+    uneasy = uneasy_starts(written.intent, _kept_motions(written))
+    for batch in batches(counts + 1, BATCH):
+        piece, fraction = _places(written, which[batch], counts[batch], uneasy)
+        yield _looked_at(written, piece, fraction)
+
+
+def _counts(written: Written, which: Index, density: float, least: int) -> Index:
+    """Samples inside each piece, ends left out; none where only the end is looked at."""
+    move = written.pieces.move[which]
+    motions, place = np.unique(move, return_inverse=True)
+    wished = np.ceil(density * bends(written.intent, motions)[place] * written.span[which])
+    kind = written.intent.moves.kind[move]
+    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
+    along &= np.isfinite(written.segments.start[which]).all(axis=1) & np.isfinite(written.start[move]).all(axis=1)
+    along &= np.isfinite(written.intent.moves.start[move]).all(axis=1)
+    return np.where(along, np.clip(np.nan_to_num(wished), least, MOST), 0).astype(np.intp)
+
+
+def _places(written: Written, which: Index, counts: Index, uneasy: Mask) -> tuple[Index, Array]:
+    """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
+    each, inner = np.arange(len(which)), even(counts)
+    lists = [(owners(counts), inner), (each, np.ones(len(which)))]
+    begun = np.flatnonzero(written.opens[which] & uneasy[written.pieces.move[which]] & (counts > 0))
+    lists.append((begun, np.full(len(begun), START)))
+    if kinked(written.intent.machine):
+        long = np.flatnonzero(counts)
+        ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
+        on, share = passed(written.intent.machine, *ends)
+        lists.append((long[on], share))
+    many, fraction = merged(len(which), *lists)
+    return which[owners(many)], fraction
+
+
+def _looked_at(written: Written, piece: Index, fraction: Array) -> Samples:
+    intent = written.intent
+    move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
+    lengths, states = intent.lengths(move), intent.states(move, at)
+    intended, done = intent.joints_at(move, at), written.joints(piece, fraction)
+    tip = intent.machine.tip(intended, lengths)
+    before = np.linalg.norm(intent.machine.actual_tip(intended, states) - tip, axis=1)
+    after = np.linalg.norm(intent.machine.actual_tip(done, states) - tip, axis=1)
+    ends = np.flatnonzero(fraction == 1.0)
+    meant = intent.machine.nominal(intended[ends], lengths if np.ndim(lengths) == 0 else lengths[ends])
+    tilts = [_tilt(intent.machine, q[ends], rows_of(states, ends), meant) for q in (intended, done)]
+    return Samples(move, at, before, after, _way(written, piece), *tilts)
+
+
+def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
+    """The largest angle between the actual tool direction and the meant one, rad."""
+    tool = np.asarray(machine.tool.direction)
+    actual = machine.actual(q, state)[:, :3, :3] @ tool
+    sine = np.linalg.norm(np.cross(actual, meant[:, :3, :3] @ tool), axis=1)
+    return float(np.nanmax(np.arcsin(np.minimum(sine, 1.0)), initial=0.0))
+
+
+def _way(written: Written, piece: Index) -> Array:
+    """The part of the way that each sample stands for, mm: its piece's chord shared out, or arc length."""
+    segments = written.segments
+    _, place, counts = np.unique(piece, return_inverse=True, return_counts=True)
+    chord = (segments.end - segments.start)[piece][:, ~written.intent.machine.rotary]
+    way = np.linalg.norm(np.nan_to_num(chord), axis=1)
+    on_arc = np.flatnonzero(segments.arc[piece])
+    if on_arc.size:
+        arc = piece[on_arc]
+        spoke = segments.start[arc[:, None], segments.columns] - segments.centre[arc]
+        radius = np.linalg.norm(np.cross(segments.normal[arc], spoke), axis=1)
+        way[on_arc] = np.hypot(way[on_arc], radius * np.abs(segments.sweep[arc]))
+    share: Array = way / counts[place]
+    return share
+
+
+def _kept_motions(written: Written) -> Mask:
+    kept = np.ones(len(written.intent.moves), dtype=bool)
+    kept[written.pieces.move] = written.pieces.kept
+    return kept
+
+
+class _Tally:
+    """Figures gathered batch by batch."""
+
+    def __init__(self, n: int) -> None:
+        self.most = [np.zeros(n), np.zeros(n)]
+        self.squares = [0.0, 0.0]
+        self.tilts = [0.0, 0.0]
+        self.at: list[tuple[float, int, float]] = [(0.0, -1, 0.0), (0.0, -1, 0.0)]
+        self.way = 0.0
+        self.samples = 0
+
+    def add(self, part: Samples) -> None:
+        """Take in a batch; places at which an error is not known do not count."""
+        self.way += float(part.weight.sum())
+        self.samples += len(part.move)
+        for side, error in enumerate((part.before, part.after)):
+            known = np.nan_to_num(error)
+            np.maximum.at(self.most[side], part.move, known)
+            self.squares[side] += float((part.weight * known**2).sum())
+            self.tilts[side] = max(self.tilts[side], (part.tilt_before, part.tilt_after)[side])
+            best = int(known.argmax())
+            self.at[side] = max(self.at[side], (float(known[best]), int(part.move[best]), float(part.fraction[best])))
+
+    def result(self) -> PathError:
+        """The figures of all batches."""
+        before, after = (
+            Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction, tilt)
+            for (value, move, fraction), squares, tilt in zip(self.at, self.squares, self.tilts, strict=True)
+        )
+        return PathError(before, after, self.most[0], self.most[1], self.samples)
