@@ -15,7 +15,7 @@ from ncfix.machine.symbolic.derivation import Derivation  # noqa: E402
 from ncfix.machine.symbolic.from_machine import from_machine  # noqa: E402
 from ncfix.machine.symbolic.identify import Identifiable, identifiable  # noqa: E402
 from ncfix.machine.symbolic.inverse import Inverse, inverse_nominal  # noqa: E402
-from ncfix.machine.symbolic.protocol import Equation, Test, equations, protocol  # noqa: E402
+from ncfix.machine.symbolic.protocol import Equation, Identification, equations, protocol  # noqa: E402
 from ncfix.machine.symbolic.variables import Size, Variable  # noqa: E402
 
 __all__ = [
@@ -23,9 +23,9 @@ __all__ = [
     "Derivation",
     "Equation",
     "Identifiable",
+    "Identification",
     "Inverse",
     "Size",
-    "Test",
     "Variable",
     "derive",
     "equations",

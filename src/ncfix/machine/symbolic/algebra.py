@@ -16,6 +16,13 @@ from sympy.polys.matrices import DomainMatrix
 from sympy.polys.orderings import lex
 from sympy.polys.rings import PolyRing
 
+SIMPLE = 10**9
+"""A fraction with a larger denominator is a measured number, not an exact constant."""
+FINENESS = 2**90
+"""Measured numbers are computed with to one part in this many."""
+ROUNDING = 2**46
+"""Factors below one part in this many are the rounding of the measured numbers, doubles of order one."""
+
 Poly = Any
 """An element of the ring."""
 
@@ -25,6 +32,9 @@ class Algebra:
 
     def __init__(self, expressions: Iterable[sp.Expr]) -> None:
         """The ring that holds sums and products of the expressions."""
+        expressions = list(expressions)
+        numbers = {number for expression in expressions for number in expression.atoms(sp.Rational)}
+        self.measured = any(number.q > SIMPLE for number in numbers)
         found = set().union(*(generators(expression) for expression in expressions))
         angles = {generator.args[0] for generator in found if isinstance(generator, (sp.sin, sp.cos))}
         self.angles = sorted(angles, key=sp.default_sort_key)
@@ -55,7 +65,8 @@ class Algebra:
 
     def reduced(self, poly: Poly) -> Poly:
         """The polynomial with the relations applied."""
-        return poly.rem(self.relations) if self.relations and poly else poly
+        poly = poly.rem(self.relations) if self.relations and poly else poly
+        return _rounded(poly) if self.measured else poly
 
     def matrix(self, matrix: sp.Matrix) -> DomainMatrix:
         """A matrix over the ring."""
@@ -79,12 +90,14 @@ class Algebra:
         """The shortest way to write the polynomial that is found: sines or cosines squared away, factored or not."""
         if not poly:
             return sp.Integer(0)
+        if self.measured:
+            return self._collected(poly).replace(_is_measured, sp.Float)
         return min(self._collected(poly), self._best(poly), key=sp.count_ops)
 
     def _written(self, poly: Poly) -> list[sp.Expr]:
         other, relations = self._swapped
         swapped = poly.set_ring(other).rem(relations) if relations else poly
-        forms = [poly, swapped, self._merged(poly)]
+        forms = [self._merged(poly), poly, swapped]
         return [way(form) for form in forms if len(form) <= len(poly) for way in (_as_sum, _as_product)]
 
     def _collected(self, poly: Poly) -> sp.Expr:
@@ -101,10 +114,13 @@ class Algebra:
             brackets = poly.new({lengths: leading})
             same = function.quo_ground(leading)
             groups[same] = groups[same] + brackets if same in groups else brackets
-        return sp.Add(*(sp.Mul(*_factors(b), *sp.Mul.make_args(self._best(same))) for same, b in groups.items()))
+        return sp.Add(*(sp.Mul(*self._brackets(b), *sp.Mul.make_args(self._best(same))) for same, b in groups.items()))
+
+    def _brackets(self, poly: Poly) -> list[sp.Expr]:
+        return [poly.as_expr()] if self.measured else _factors(poly)
 
     def _best(self, poly: Poly) -> sp.Expr:
-        return min(self._written(poly), key=sp.count_ops)
+        return poly.as_expr() if self.measured else min(self._written(poly), key=sp.count_ops)
 
     def _merged(self, poly: Poly) -> Poly:
         """Pairs a m - a m cos^2 become a m sin^2."""
@@ -154,3 +170,15 @@ def generators(expression: sp.Expr) -> set[sp.Expr]:
 
 def _is_root(expression: sp.Expr) -> bool:
     return bool(expression.is_Pow and expression.exp == sp.Rational(1, 2) and expression.base.is_Integer)
+
+
+def _rounded(poly: Poly) -> Poly:
+    field = poly.ring.domain
+    limit = field(1, ROUNDING)
+    kept = {powers: factor for powers, factor in poly.items() if abs(factor) > limit}
+    fine = {powers: factor.numerator * FINENESS // factor.denominator for powers, factor in kept.items()}
+    return poly.new({powers: field(factor, FINENESS) for powers, factor in fine.items()})
+
+
+def _is_measured(expression: sp.Expr) -> bool:
+    return bool(expression.is_Rational and expression.q > SIMPLE)

@@ -70,24 +70,30 @@ def _nothing(item: str, names: Sequence[str]) -> NcfixError:
 
 
 def _symbol(machine: Machine, name: str) -> ErrorSymbol:
-    same = [effect for effect in machine.effects if effect.name == name and effect.active]
-    if len({(effect.reference, effect.carried) for effect in same}) > 1:
+    same = [effect for effect in machine.effects if effect.name == name and effect.active] or [Effect(name, (0.0,))]
+    effect = same[0]
+    if len({(_reference(it), it.carried) for it in same}) > 1:
         text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
         raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
-    effect = same[0] if same else Effect(name, (0.0,))
     turns = {axis.name: axis.rotary for axis in machine.axes}
     title = catalogue.title(name, turns.get(effect.joint))
     return ErrorSymbol(
-        variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(effect, same)),
+        variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(same)),
         joint=effect.joint,
         component=effect.component,
         location=effect.location,
-        reference=effect.reference,
+        reference=_reference(effect),
         carried=effect.carried or (effect.location and effect.joint == SPINDLE),
     )
 
 
-def _arguments(effect: Effect, same: Sequence[Effect]) -> tuple[str, ...]:
+def _reference(effect: Effect) -> Vector | None:
+    """Only a rotation needs one."""
+    return effect.reference if effect.rotational else None
+
+
+def _arguments(same: Sequence[Effect]) -> tuple[str, ...]:
+    effect = same[0]
     own = () if effect.location or effect.joint == SPINDLE else (effect.joint,)
     signals = (signal for it in same for signal in (it.signal, it.times) if signal is not None)
     return tuple(dict.fromkeys((*own, *signals)))

@@ -53,11 +53,7 @@ class Constants:
             return tuple(sp.Integer(round(value)) for value in values)
         if len(inside) == 2:
             return self._in_plane(values, inside, suffix, definition)
-        found = [None if self.lettered else _root(value) for value in values]
-        if None in found:
-            named = zip("xyz", values, strict=True)
-            found = [self._variable(f"u{suffix}{c}", value, f"{c} of {definition}") for c, value in named]
-        x, y, z = found
+        x, y, z = (_root(value) or sp.Rational(value) for value in values)
         return x, y, z
 
     def _in_plane(self, values: Sequence[float], inside: list[int], suffix: str, definition: str) -> Vector:

@@ -7,7 +7,7 @@ linear axes then follow from a linear system. Every axis is turned or shifted by
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import sympy as sp
@@ -29,6 +29,11 @@ class Inverse:
 
     formulas: Mapping[str, sp.Expr]
     notes: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """As text."""
+        yield from (f"{axis} = {formula}" for axis, formula in self.formulas.items())
+        yield from self.notes
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +110,11 @@ def _to_level(outer: _Turn, inner: _Turn, tool: sp.Matrix) -> Expr:
     even, odd, level = _shortest([even, odd, level])
     if even == 0 and odd == 0:
         raise _UnreachableError(f"rotary axes: {inner.name} does not change the tool's angle to {outer.name}")
-    size = sp.Abs(even) if odd == 0 else sp.Abs(odd) if even == 0 else sp.sqrt(even**2 + odd**2)
-    return sp.atan2(odd, even) + BRANCH * sp.acos(sp.expand(level / size))
+    if odd == 0:
+        return BRANCH * sp.acos(level / even)
+    if even == 0:
+        return sp.pi / 2 + BRANCH * sp.acos(level / odd)
+    return sp.atan2(odd, even) + BRANCH * sp.acos(level / sp.sqrt(even**2 + odd**2))
 
 
 def _about(turn: _Turn, start: sp.Matrix) -> Expr:

@@ -128,7 +128,7 @@ def shortest(candidates: Sequence[Equation]) -> Equation:
 
 
 @dataclass(frozen=True, slots=True)
-class Test:
+class Identification:
     """A step of the protocol: measure, and find an error from those found before.
 
     identifies  the error; or the errors that only show up together, as one expression
@@ -148,7 +148,7 @@ def simplest(found: Iterable[Equation], wanted: sp.Expr | None = None, known: It
     return [equation for rest, equation in useful if len(rest) == fewest]
 
 
-def protocol(found: Sequence[Equation], choose: Choose = shortest) -> tuple[Test, ...]:
+def protocol(found: Sequence[Equation], choose: Choose = shortest) -> tuple[Identification, ...]:
     """Identify one error after the other, each from the simplest equation that is left.
 
     Errors that all these equations only have together are identified as one combination. Where no equation has a
@@ -160,10 +160,10 @@ def protocol(found: Sequence[Equation], choose: Choose = shortest) -> tuple[Test
     columns = _columns(found, unknowns)
     titles = {unknowns[pivot]: combination for pivot, combination in columns.combinations(unknowns).items()}
     known = set(unknowns) - titles.keys()
-    tests: list[Test] = []
+    tests: list[Identification] = []
     while candidates := simplest(found, known=known):
         solved, used = _solvable(found, choose(candidates), known)
-        tests += [Test(titles[unknown], used) for unknown in solved]
+        tests += [Identification(titles[unknown], used) for unknown in solved]
         known |= set(solved)
     return tuple(tests)
 
@@ -195,11 +195,10 @@ def _solvable(
         unknowns = sorted({*unknowns, *more}, key=sp.default_sort_key)
 
 
-def report(tests: Iterable[Test]) -> str:
-    """The protocol as text: a line per test, with a line per equation."""
+def report(tests: Iterable[Identification]) -> str:
+    """The protocol as text: what each test identifies, and its equations."""
     lines = []
     for number, test in enumerate(tests, 1):
-        heads = [f"{number:3}  {test.identifies}:", *[""] * (len(test.equations) - 1)]
-        for head, equation in zip(heads, test.equations, strict=True):
-            lines.append(f"{head:<30} {equation.measurement} = {equation.expression}")
+        lines.append(f"{number:3}. {test.identifies}")
+        lines += [f"       {equation.measurement} = {equation.expression}" for equation in test.equations]
     return "\n".join(lines) + "\n"

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import sympy as sp
 
 from ncfix.machine.symbolic.derivation import COMPONENTS, DIRECTION, POSITION, Derivation
+from ncfix.machine.symbolic.inverse import inverse_nominal
 from ncfix.machine.symbolic.variables import Variable
 
 ORDINALS = {1: "first", 2: "second", 3: "third"}
@@ -28,6 +29,8 @@ def _lines(derivation: Derivation) -> Iterator[str]:
     yield from variable_table(chain.variables)
     yield from ("", "Nominal", f"  {MEANINGS[0]}")
     yield from (f"  {name} = {derivation.nominal[name]}" for name in (*POSITION, *DIRECTION))
+    yield from ("", "Inverse nominal", "  axis positions, rad and mm")
+    yield from (f"  {line}" for line in inverse_nominal(derivation).lines())
     yield from ("", "Error", f"  {MEANINGS[1]}")
     for component in COMPONENTS:
         yield from _component(derivation, component)
