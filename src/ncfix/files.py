@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -76,7 +75,7 @@ def _coded(path: str) -> Iterator[None]:
 @contextmanager
 def _written_beside(path: str, data: bytes, like: str | None) -> Iterator[str]:
     """A file with this content, on the disk, in the same folder; gone afterwards if it still has its own name."""
-    temporary = os.path.join(os.path.dirname(path), f".ncfix-{secrets.token_hex(8)}.tmp")
+    temporary = os.path.join(os.path.dirname(path), f".ncfix-{os.urandom(8).hex()}.tmp")
     handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         try:

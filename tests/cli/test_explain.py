@@ -15,7 +15,7 @@ from ncfix.diagnostics import ExitCode
 def used_codes(root: Path) -> set[str]:
     """The codes that stand in the sources, the tables of codes left out."""
     sources = [path for folder in ("src", "plugins") for path in (root / folder).rglob("*.py")]
-    texts = [path.read_text() for path in sources if path.name != "codes.py"]
+    texts = [path.read_text() for path in sources if not path.name.endswith("codes.py")]
     return {code for text in texts for code in re.findall(r"[\"'](NCF\d{3})[\"']", text)}
 
 
@@ -30,8 +30,8 @@ def test_every_explained_code_is_used(root: Path) -> None:
 @pytest.mark.parametrize(("code", "entry"), all_codes().items())
 def test_an_explanation_says_something(code: str, entry: Any) -> None:
     assert re.fullmatch(r"NCF[0-6]\d\d", code)
-    assert 10 <= len(entry.title) <= 90
-    assert len(entry.text) > 30
+    assert 5 <= len(entry.title) <= 90
+    assert len(entry.text) >= 20
 
 
 def test_explain_prints_title_text_and_hint(ncfix: Any) -> None:

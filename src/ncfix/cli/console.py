@@ -69,6 +69,12 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def error_figures(error: Mapping[str, Any]) -> str:
+    """The figures of an error along a path, for people."""
+    where = f", worst at line {error['where']}" if error.get("where") else ""
+    return f"max {error['max']:.2f} um, rms {error['rms']:.2f} um{where}"
+
+
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table on standard output: plain columns, or a drawn table on a terminal."""
     if sys.stdout.isatty():

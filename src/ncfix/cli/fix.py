@@ -108,6 +108,8 @@ class Job:
 def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> Job:
     from ncfix.compensate.fix import FixOptions
 
+    if choices.pop("thesis"):
+        choices["strategy"] = "thesis"
     return Job(load_machine(machine_path), setup.load(), dialect, FixOptions(**choices))
 
 
@@ -144,13 +146,8 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
         f"  largest correction  {entry['max_correction_um']:.1f} um",
     ]
     if entry["error_before_um"]:
-        lines.append(f"  tip error before    {_figures(entry['error_before_um'])}")
-        lines.append(f"  tip error after     {_figures(entry['error_after_um'])}")
+        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}")
+        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}")
     if entry["leaves"]:
         lines.append(f"  {entry['strategy']}: {entry['leaves']}")
     return lines
-
-
-def _figures(error: dict[str, float]) -> str:
-    where = f", worst at line {error['where']}" if error.get("where") else ""
-    return f"max {error['max']:.2f} um, rms {error['rms']:.2f} um{where}"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ncfix.cli.options import read_program, subprograms
+from ncfix.cli.options import load_machine, read_program, subprograms
+from ncfix.cli.setup_options import SetupOptions
 
 if TYPE_CHECKING:
+    from ncfix.compensate.checking import Checked
+    from ncfix.compensate.simulation import PathError
     from ncfix.machine import Machine
-    from ncfix.program.moves import Trace
+    from ncfix.program.moves import Moves, Trace
     from ncfix.program.setup import Setup
     from ncfix.program.tree import Program
 
@@ -18,31 +21,78 @@ ROTARY = ("A", "B", "C")
 PARALLEL = ("U", "V", "W")
 
 
-def followed(program: Program, path: str, setup: Setup, machine: Machine | None) -> Trace:
-    """The motions of a program, on the axes of the machine, or without one on those that the program names."""
-    from ncfix.program.trace import trace
+@dataclass(frozen=True, slots=True)
+class Following:
+    """What is needed to follow programs. Without a machine nothing is cut, so what is not given may be zero."""
 
-    if machine is None:
-        axes = named_axes(program)
-        rotary = frozenset(ROTARY)
-    else:
-        axes = machine.axis_names
-        rotary = frozenset(axis.name for axis in machine.axes if axis.rotary)
-    return trace(program, setup, axes, rotary, subprograms(path))
+    machine: Machine | None
+    setup: Setup
+    dialect: str | None
+
+    @classmethod
+    def of(cls, machine_path: str | None, dialect: str | None, given: SetupOptions) -> Following:
+        """Load what the options name."""
+        machine = load_machine(machine_path) if machine_path else None
+        setup = given.load()
+        return cls(machine, setup if machine else replace(setup, assume_zero=True), dialect)
+
+    def read(self, path: str) -> Program:
+        """Read a program."""
+        return read_program(path, self.dialect, self.machine)
+
+    def trace(self, program: Program, path: str) -> Trace:
+        """The motions of a program."""
+        from ncfix.program.trace import trace
+
+        return trace(program, self.setup, *self._axes(program), subprograms(path))
+
+    def checked(self, program: Program, path: str) -> Checked:
+        """What is found in a program."""
+        from ncfix.compensate.checking import check_alone, check_on
+
+        if self.machine is None:
+            return check_alone(program, self.setup, *self._axes(program), subprograms(path))
+        return check_on(program, self.machine, self.setup, subprograms(path))
+
+    def _axes(self, program: Program) -> tuple[tuple[str, ...], frozenset[str]]:
+        """The axes of the machine, or without one those that the program names; and which of them turn."""
+        from ncfix.compensate.following import rotary_names
+
+        if self.machine is None:
+            return named_axes(program), frozenset(ROTARY)
+        return self.machine.axis_names, rotary_names(self.machine)
+
+    def simulated(self, path: str) -> tuple[Program, Moves, PathError]:
+        """A program, its motions, and the error of the tool tip along them."""
+        from ncfix.compensate.simulation import path_error
+
+        program, machine, moves = self._on_machine(path)
+        return program, moves, path_error(machine, moves)
+
+    def compared(self, original: str, fixed: str) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """Figures: of the original on this machine, of the other along its path, and along the original's path."""
+        from ncfix.compensate.comparison import compare
+        from ncfix.compensate.simulation import path_error
+
+        program, machine, meant = self._on_machine(original)
+        other, _, done = self._on_machine(fixed)
+        there, back = compare(machine, meant, done)
+        lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
+        return figures(path_error(machine, meant), lines), figures(there, other_lines), figures(back, lines)
+
+    def _on_machine(self, path: str) -> tuple[Program, Machine, Moves]:
+        from ncfix.compensate.following import follow
+
+        assert self.machine is not None
+        program = self.read(path)
+        found = follow(program, self.machine, self.setup, subprograms(path))
+        return program, found.machine, found.trace.moves
 
 
 def named_axes(program: Program) -> tuple[str, ...]:
     """X Y Z, and what other axes the program has words for."""
     words = {word.address for template in program.templates for word in template.words}
     return LINEAR + tuple(letter for letter in ROTARY + PARALLEL if letter in words)
-
-
-def read_and_follow(path: str, dialect: str | None, setup: Setup, machine: Machine | None) -> tuple[Program, Trace]:
-    """Read a program and follow it. Without a machine nothing is cut, so what is not given may be zero."""
-    program = read_program(path, dialect, machine)
-    if machine is None:
-        setup = replace(setup, assume_zero=True)
-    return program, followed(program, path, setup, machine)
 
 
 def lines_of(program: Program, blocks: Any) -> list[int]:
@@ -53,3 +103,9 @@ def lines_of(program: Program, blocks: Any) -> list[int]:
     ends = np.flatnonzero(text == ord("\n" if b"\n" in program.source else "\r"))
     lines: list[int] = (np.searchsorted(ends, program.blocks[blocks, 0]) + 1).tolist()
     return lines
+
+
+def figures(error: PathError, lines: list[int]) -> dict[str, Any]:
+    """The error along a path in two figures, um, and the line of the worst."""
+    row = error.worst_row
+    return {"max": 1e3 * error.max_mm, "rms": 1e3 * error.rms_mm, "where": None if row is None else lines[row]}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -83,6 +82,8 @@ def run(arguments: Sequence[str]) -> int:
         return BROKEN_PIPE
     except Exception as error:
         if "--debug" in arguments or os.environ.get("NCFIX_DEBUG", "") not in ("", "0"):
+            import traceback
+
             console.say("".join(traceback.format_exception(error)))
         return failed(fault(error), as_json)
 
@@ -109,6 +110,8 @@ def failed(error: NcfixError, as_json: bool) -> int:
 
 def fault(error: Exception) -> FaultError:
     """Own up to a bug."""
+    import traceback
+
     where = traceback.extract_tb(error.__traceback__)[-1]
     at = f"{os.path.basename(where.filename)}:{where.lineno}"
     text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"

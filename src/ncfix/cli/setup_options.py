@@ -123,11 +123,12 @@ class SetupOptions:
         """The setup: the file, then the tool table, then the single options, each over the one before."""
         from ncfix.program import setup_file
         from ncfix.program.setup import Setup, Tool
+        from ncfix.program.tool_table import load_tool_table
 
         setup = setup_file.load(self.setup_file) if self.setup_file else Setup()
         tools = dict(setup.tools)
         if self.tool_table:
-            tools |= setup_file.load_tool_table(self.tool_table)
+            tools |= load_tool_table(self.tool_table)
         tools |= {int(key): Tool(*values) for key, values in self.tools}
         return replace(
             setup,

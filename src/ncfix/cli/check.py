@@ -1,0 +1,65 @@
+"""`ncfix check`: what is the matter with a program, without writing anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.following import Following
+from ncfix.cli.options import dialect_option, json_option, optional_machine_option
+from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.targets import shown
+from ncfix.diagnostics import ExitCode, Message, NcfixError
+
+
+@click.command()
+@click.argument("programs", nargs=-1, required=True, metavar="PROGRAM...")
+@optional_machine_option
+@dialect_option
+@setup_options
+@json_option
+def check(
+    programs: tuple[str, ...], machine_path: str | None, dialect: str | None, given: SetupOptions, as_json: bool
+) -> int:
+    """Read each PROGRAM and follow it as the control would; say what is found. Writes nothing.
+
+    With a machine file also: does it stay within the travel, and what would its correction refuse? Exit code 1 with
+    findings.
+    """
+    following = Following.of(machine_path, dialect, given)
+    outcomes = [_outcome(following, program) for program in programs]
+    if as_json:
+        console.put_json(files=[outcome.entry for outcome in outcomes])
+    return max(outcome.code for outcome in outcomes)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What was found in one program: its exit code and its entry in the JSON object."""
+
+    code: int
+    entry: dict[str, Any]
+
+
+def _outcome(following: Following, path: str) -> Outcome:
+    entry: dict[str, Any] = {"path": shown(path)}
+    try:
+        with console.busy(f"checking {shown(path)}"):
+            program = following.read(path)
+            checked = following.checked(program, path)
+    except NcfixError as error:
+        console.tell(*error.messages)
+        return Outcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
+    console.tell(*checked.findings)
+    count = len(checked.findings)
+    said = f"{count} finding{'s' if count != 1 else ''}" if count else "nothing found"
+    console.say(f"{shown(path)}: {len(program)} blocks, {checked.moves} motions, {program.dialect.name}: {said}")
+    entry |= {"dialect": program.dialect.name, "blocks": len(program), "moves": checked.moves}
+    return Outcome(ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)})
+
+
+def _as_dicts(messages: tuple[Message, ...]) -> list[dict[str, object]]:
+    return [message.as_dict() for message in messages]

@@ -1,0 +1,126 @@
+"""Two programs on one machine: does the second one cut what the first one means?
+
+The paths are compared as curves in the workpiece, so this knows nothing of how the second program was made: from every
+sample of the real path of the second program to the nearest point of the intended path of the first, and back, so that
+nothing may be missing. Nearest is looked for near the same length of path, so that the next pass of a cut, a hair's
+breadth beside it, is not taken for the one that is meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.simulation import PathError, actual_tip, batches, samples
+from ncfix.diagnostics import UsageError
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Kind, Moves
+
+NEIGHBOURS = 3
+"""Samples round which the nearest point is looked for."""
+STEPS = 4
+"""Newton steps towards it; each squares what is missing to it on a smooth path."""
+INSTANT = 1e-5
+"""Fraction of a motion over which its direction is taken."""
+ALONG = 0.02
+"""A point that is so much shorter or longer along the path counts as this share of that farther away."""
+UNLIKE = 0.02
+"""Paths whose lengths differ by more than this share are not the same cut."""
+
+Tip = Callable[[Index, Array], Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A path as samples, and as a function.
+
+    rows, fraction  (k,) where it was sampled
+    points          (k, 3) mm
+    length          (k,) mm of path up to there
+    tip             (rows, fraction) -> points
+    drawn           (n,) the motions of which more than the end belongs to the path
+    """
+
+    rows: Index
+    fraction: Array
+    points: Array
+    length: Array
+    tip: Tip
+    drawn: Mask
+
+    @classmethod
+    def of(cls, intent: Intent, tip: Tip) -> Curve:
+        """The path of a program, by a function that gives the tip."""
+        rows, fraction = samples(intent)
+        parts = [tip(rows[part], fraction[part]) for part in batches(len(rows))]
+        points = np.concatenate(parts) if parts else np.empty((0, 3))
+        step = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(rows) == 0)
+        length = np.concatenate([[0.0], np.cumsum(step)])[: len(rows)]
+        return cls(rows, fraction, points, length, tip, intent.moves.kind != Kind.CYCLE)
+
+    @property
+    def total(self) -> float:
+        """Its length, mm."""
+        return float(self.length[-1]) if len(self.length) else 0.0
+
+
+def compare(machine: Machine, original: Moves, other: Moves, state: State = State()) -> tuple[PathError, PathError]:  # noqa: B008
+    """How far `other` on this machine is from what `original` means: along `other`, and along `original`.
+
+    The first has motions of `other` in `rows`, the second those of `original`. Raises `UsageError` NCF420 if the two
+    are not the same cut at all.
+    """
+    meant, done = Intent(machine, original, state), Intent(machine, other, state)
+    intended = Curve.of(meant, meant.tip)
+    actual = Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
+    _check_alike(intended, actual)
+    there = PathError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
+    back = PathError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
+    return there, back
+
+
+def _check_alike(intended: Curve, actual: Curve) -> None:
+    longer = max(intended.total, actual.total)
+    if (len(intended.rows) == 0) != (len(actual.rows) == 0) or abs(intended.total - actual.total) > UNLIKE * longer:
+        text = f"the two programs do not cut the same: {intended.total:.3f} mm and {actual.total:.3f} mm of path"
+        raise UsageError.of("NCF420", text, hint="give the original program first, then the corrected one")
+
+
+def nearest(curve: Curve, other: Curve) -> Array:
+    """The points of `curve` that are nearest to the samples of `other`, (k, 3) mm."""
+    from scipy.spatial import KDTree
+
+    if not len(other.rows):
+        return np.empty((0, 3))
+    scale = curve.total / other.total if other.total else 1.0
+    tree = KDTree(np.column_stack([curve.points, ALONG * curve.length]))
+    query = np.column_stack([other.points, ALONG * scale * other.length])
+    _, found = tree.query(query, k=min(NEIGHBOURS, len(curve.rows)))
+    found = np.asarray(found).reshape(len(query), -1)
+    return np.concatenate([_closest(curve, found[part], other.points[part]) for part in batches(len(query))])
+
+
+def _closest(curve: Curve, found: Index, points: Array) -> Array:
+    """The nearest point on the motions of the samples `found` (k, c) to `points` (k, 3)."""
+    candidates = [_on_motion(curve, column, points) for column in found.T]
+    distance = np.stack([np.linalg.norm(each - points, axis=1) for each in candidates])
+    best: Array = np.stack(candidates)[np.argmin(distance, axis=0), np.arange(len(points))]
+    return best
+
+
+def _on_motion(curve: Curve, sample: Index, points: Array) -> Array:
+    """The nearest point to `points` (k, 3) on the motions of samples (k,), by Newton's method from there."""
+    rows, fraction = curve.rows[sample], curve.fraction[sample]
+    at = curve.points[sample]
+    for _ in range(STEPS):
+        low, high = np.maximum(fraction - INSTANT, 0.0), np.minimum(fraction + INSTANT, 1.0)
+        slope = (curve.tip(rows, high) - curve.tip(rows, low)) / (high - low)[:, None]
+        square = np.einsum("ij,ij->i", slope, slope)
+        ahead = np.einsum("ij,ij->i", points - at, slope) / np.where(square > 0, square, 1.0)
+        fraction = np.clip(fraction + curve.drawn[rows] * ahead, 0.0, 1.0)
+        at = curve.tip(rows, fraction)
+    return at

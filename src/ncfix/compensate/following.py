@@ -1,0 +1,82 @@
+"""A program followed on a certain machine: with the workpiece where the setup has it, and with every tool length."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.diagnostics import Message, UsageError
+from ncfix.machine import Machine
+from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.setup import Setup
+from ncfix.program.trace import trace
+from ncfix.program.tree import Program
+
+Resolve = Callable[[str], bytes | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What the machine does with a program.
+
+    machine  the machine with the workpiece in its place
+    trace    the motions, with every tool length known
+    """
+
+    machine: Machine
+    trace: Trace
+
+
+def follow(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Followed:
+    """Follow a program on a machine; `resolve` gives the text of a subprogram file by its name.
+
+    Raises SourceError for what cannot be followed, UsageError for what is used and not given: NCF431 for the lengths of
+    tools, where the errors of the machine depend on them.
+    """
+    found = trace(program, setup, machine.axis_names, rotary_names(machine), resolve)
+    return Followed(placed(machine, setup), with_tool_lengths(program, found, machine, setup))
+
+
+def placed(machine: Machine, setup: Setup) -> Machine:
+    """The machine with the workpiece where the setup has it."""
+    x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
+    return machine.replace(workpiece_offset=(x, y, z))
+
+
+def rotary_names(machine: Machine) -> frozenset[str]:
+    """The letters of the rotary axes."""
+    return frozenset(axis.name for axis in machine.axes if axis.rotary)
+
+
+def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: Setup) -> Trace:
+    """The trace with every tool length known.
+
+    Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
+    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero.
+    """
+    moves = found.moves
+    unknown = np.isnan(moves.tool_length)
+    known = replace(found, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
+    unknown &= moves.rule == Rule.CORRECT
+    if not machine.depends_on_tool_length or not unknown.any():
+        return known
+    tools, rows = np.unique(np.where(unknown, moves.tool, -1), return_index=True)
+    first = {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
+    if not setup.assume_zero:
+        raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
+    notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
+    assumed = (*found.assumed, *(f"length of tool {tool}" for tool in first))
+    return replace(known, messages=(*found.messages, *notes), assumed=assumed)
+
+
+def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message:
+    text = f"the length of tool {tool} is needed and not given: the errors of this machine depend on it"
+    hint = f"--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
+    return Message("NCF431", text, program.place(int(moves.block[row])), hint)
+
+
+def _tool_assumed(program: Program, moves: Moves, tool: int, row: int) -> Message:
+    text = f"the length of tool {tool} is not given and was taken as zero"
+    return Message("NCF437", text, program.place(int(moves.block[row])), f"--tool {tool}=LENGTH")
