@@ -47,7 +47,8 @@ def body(machine: Machine, axis: Axis, position: float) -> Array:
     for effect in location:
         shift, turn = straight[id(effect)]
         along = float((turn if axis.rotary else shift) @ axis.direction)
-        offset += along
+        against = min(np.asarray(row) @ axis.direction for row in axis.error_axes) < -1 + 1e-9
+        offset += -along if against else along
         part = along * np.asarray(axis.direction)
         straight[id(effect)] = (shift, turn - part) if axis.rotary else (shift - part, turn)
     still = [(reference_of(axis, effect), *straight[id(effect)]) for effect in location]

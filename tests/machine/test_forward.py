@@ -179,11 +179,11 @@ def test_zero_offset_is_the_component_along_or_about_the_axis_itself() -> None:
         np.testing.assert_allclose(error, machine.nominal(q + size), atol=1e-13)
 
 
-def test_zero_offset_of_a_table_axis_is_in_the_body_s_sense() -> None:
-    """C turns the table about -z: a body turned by +e about +z has come e short."""
+def test_zero_offset_is_added_to_the_position_also_where_the_axis_turns_about_minus_z() -> None:
+    """The file says M(q + offset); a body that is turned by +e about +z (ECC) has come e short."""
     q = np.array([[0.0], [0.3]])
     wrong = ROUND_TABLE.replace(effects=(Effect("EC0C", (50 * URAD,)),))
-    np.testing.assert_allclose(wrong.actual(q), ROUND_TABLE.nominal(q - 50 * URAD), atol=1e-13)
+    np.testing.assert_allclose(wrong.actual(q), ROUND_TABLE.nominal(q + 50 * URAD), atol=1e-13)
 
 
 def test_a_shifted_axis_line() -> None:

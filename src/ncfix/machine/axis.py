@@ -51,6 +51,16 @@ class Axis:
         return self.point if self.rotary else ORIGIN
 
     @property
+    def zero_sense(self) -> float:
+        """What turns a location error along or about the axis into the zero offset that is added to its position.
+
+        The file gives the offset as such, so one along an error axis that points against `direction` counts as it is
+        written; of errors that are only partly along the axis, the projection on `direction` counts.
+        """
+        against = np.asarray(self.error_axes) @ np.asarray(self.direction) < -1 + 1e-9
+        return -1.0 if against.any() else 1.0
+
+    @property
     def unit(self) -> float:
         """Internal units per unit of the machine file: rad per degree, or 1."""
         return np.pi / 180 if self.rotary else 1.0

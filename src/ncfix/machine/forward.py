@@ -70,7 +70,7 @@ class Joint:
             share = direction @ small[slot][along]
             across = small[slot].copy()
             across[along] -= direction[:, None] * share
-            offset = offset + share
+            offset = offset + self.axis.zero_sense * share
             terms.append((across, columns(slot.reference)))
         return composed(terms, any(slot in self.rotating for slot in self.location)), offset
 

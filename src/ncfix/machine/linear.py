@@ -92,7 +92,7 @@ def _joint_twist(axis: Axis, position: Array, slot: Slot, motion: Array) -> Arra
     across = motion.copy()
     across[along] -= share * direction
     line = _twist(across, columns(slot.reference))
-    own = share * np.concatenate(axis.screw)[:, None, None]
+    own = axis.zero_sense * share * np.concatenate(axis.screw)[:, None, None]
     return line - _carried(axis, position, line) + own
 
 

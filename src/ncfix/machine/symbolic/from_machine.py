@@ -150,7 +150,8 @@ class _AxisSteps:
         position = self.position
         for error in errors:
             if error.location and not error.carried and (error.component >= 3) == self.axis.rotary:
-                position += error.variable.symbol * dot(self.triad[error.component % 3], self.direction)
+                share = dot(self.triad[error.component % 3], self.direction)
+                position += error.variable.symbol * share * int(self.axis.zero_sense)
         if not self.axis.rotary:
             return [Translation(scaled(position, self.direction))]
         return [Translation(self.point), Rotation(self.direction, position), Translation(negated(self.point))]
