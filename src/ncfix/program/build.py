@@ -44,7 +44,11 @@ Node = Branch | Token
 
 
 class TooDeepError(Exception):
-    """An expression is nested deeper than `MAX_DEPTH`."""
+    """An expression is nested deeper than `MAX_DEPTH`; `position` is where, in the squeezed block."""
+
+    def __init__(self, position: int) -> None:
+        super().__init__(position)
+        self.position = position
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +172,11 @@ class Builder:
 
     def word(self, tree: Branch) -> Word:
         """An address and its value."""
-        address, value = tree.children
-        return Word(str(address).upper(), self.expression(value), self.span(tree), self.span(value))
+        address, node = tree.children
+        value = self.expression(node)
+        if isinstance(value, Literal) and kind(node) == "bracket":
+            value = Unary("+", value)
+        return Word(str(address).upper(), value, self.span(tree), self.span(node))
 
     def code(self, tree: Branch) -> Word:
         """G or M with a plain number, which is part of the shape."""
@@ -213,7 +220,7 @@ class Builder:
         if isinstance(node, Token):
             return Literal(self.slots[edges(node)])
         if depth > MAX_DEPTH:
-            raise TooDeepError
+            raise TooDeepError(edges(node)[0])
         return self.compound(node, depth + 1)
 
     def compound(self, tree: Branch, depth: int) -> Expression:

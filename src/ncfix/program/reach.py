@@ -1,12 +1,16 @@
-"""Text that a control never gets to: what follows the end of the program, and the bodies of subprograms not called.
+"""Text that a control never gets to: after the tape, after the program, in the bodies of subprograms not called.
 
-A line there may be anything, and a control does not mind. Such a line is kept as opaque text of the kind `UNREAD`;
-whoever gets to it after all, by a call or a jump, has to refuse it.
+What follows the end of the tape is not looked at. Elsewhere a line may be anything, and a control does not mind. Such a
+line is kept as opaque text of the kind `UNREAD`; whoever gets to it after all, by a call or a jump, has to refuse it.
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.program.tree import Flow, Template
 
@@ -17,6 +21,26 @@ OPENING = frozenset({"sub", "if", "while", "repeat", "do"})
 CLOSING = frozenset({"endsub", "endif", "endwhile", "endrepeat"})
 PROGRAM_ENDS = frozenset({20, 300})
 """M2 and M30, in tenths."""
+
+
+LEADER = re.compile(rb"(?:[ \t\r\n]|\([^()\r\n]*\)|;[^\r\n]*)*+")
+"""Blank lines and comments."""
+
+
+def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
+    """The block with the `%` that ends the tape; the number of blocks if there is none.
+
+    It is the first `%` alone on its line that has something before it. A `%` after nothing but blank lines and
+    comments starts the tape.
+    """
+    leader = LEADER.match(source, int(blocks[0, 0]))
+    assert leader is not None, "it matches nothing, too"
+    text = np.frombuffer(source, dtype=np.uint8)
+    for block in np.unique(np.searchsorted(blocks[:, 0], np.flatnonzero(text == ord("%")), side="right") - 1):
+        start, stop = blocks[block]
+        if start > leader.end() and source[start:stop].strip() == b"%":
+            return int(block)
+    return len(blocks)
 
 
 @dataclass(slots=True)

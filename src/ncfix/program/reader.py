@@ -20,16 +20,13 @@ from ncfix.program.build import Parsed
 from ncfix.program.content import check_content, header_length
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError
-from ncfix.program.reach import UNREAD, Reach
-from ncfix.program.shapes import COMMENT, Scan, scan, split_blocks
+from ncfix.program.reach import UNREAD, Reach, tape_end
+from ncfix.program.shapes import Scan, scan, split_blocks
 from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
 
-PART_BYTES = 1 << 20
+PART_BYTES = 1 << 19
 """How much text is scanned at once: the columns of a scan take about a hundred times as much."""
-
-SHOWN_CHARACTERS = 300
-"""How much of a line a message shows."""
 
 WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
 
@@ -73,8 +70,7 @@ def unread_error(program: Program, block: int) -> SourceError:
 
 def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
     """A fault of a block as an error with its place."""
-    shown = text[:SHOWN_CHARACTERS] if fault.place < SHOWN_CHARACTERS else ""
-    return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, shown), fault.hint)
+    return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, text), fault.hint)
 
 
 def check_length(dialect: Dialect, length: int) -> None:
@@ -82,20 +78,6 @@ def check_length(dialect: Dialect, length: int) -> None:
     if dialect.line_limit and length > dialect.line_limit:
         text = f"the line has {length} characters; {dialect.title} takes {dialect.line_limit}"
         raise BlockError("NCF105", text, dialect.line_limit, "break the line or shorten its comment")
-
-
-def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
-    """The block with the `%` that ends the tape; the number of blocks if there is none.
-
-    It is the first `%` alone on its line that has something before it. A `%` after nothing but blank lines and
-    comments starts the tape.
-    """
-    text = np.frombuffer(source, dtype=np.uint8)
-    for block in np.unique(np.searchsorted(blocks[:, 0], np.flatnonzero(text == ord("%")), side="right") - 1):
-        start, stop = blocks[block]
-        if source[start:stop].strip() == b"%" and COMMENT.sub(b"", source[blocks[0, 0] : start]).strip():
-            return int(block)
-    return len(blocks)
 
 
 class Columns(NamedTuple):
@@ -193,11 +175,14 @@ class Reading:
         start, stop = self.blocks[first + row]
         text = self.source[start:stop]
         parsed = self.parsed(first + row, text)
+        if parsed is NOT_READ:
+            exact[row] = parsed
+            return self.number(b"\n\n", parsed.template)
         if shape is not None and agrees(found, row, parsed, start - self.blocks[first, 0]):
             shapes_of(self.dialect).keep(shape, parsed.template)
             return self.number(shape, parsed.template)
         exact[row] = parsed
-        return self.number(b"\n\n" if parsed is NOT_READ else text + b"\n", parsed.template)
+        return self.number(text + b"\n", parsed.template)
 
     def number(self, key: bytes, template: Template) -> int:
         """The index of a template, which is known by `key` from now on."""

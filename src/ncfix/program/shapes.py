@@ -17,7 +17,8 @@ from ncfix.program.numbers import NUMERIC, find_numbers, table
 NUMBER_MARK = 1
 COMMENT_MARK = 2
 
-MARKS = table(bytes([NUMBER_MARK, COMMENT_MARK]))
+ODD = table(bytes([NUMBER_MARK, COMMENT_MARK]) + b"\r")
+"""What a block may not hold to have a shape: the marks themselves, and carriage returns, where a comment might end."""
 
 FIXED = table(b"GgMmOo")
 """A number after these belongs to the shape: what it selects has a meaning of its own."""
@@ -70,17 +71,27 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block."""
     text = np.frombuffer(source, dtype=np.uint8)
     starts, stops, last = comments_of(source)
-    in_comment = cover(len(text), starts, stops)
-    numbers = find_numbers(text, NUMERIC[text] & ~in_comment, FIXED)
-    block_of_number = np.searchsorted(blocks[:, 0], numbers.spans[:, 0], side="right") - 1
-    exact = np.zeros(len(blocks), dtype=np.bool_)
-    exact[block_of_number[numbers.broken]] = True
-    exact[np.searchsorted(blocks[:, 0], np.flatnonzero(MARKS[text]), side="right") - 1] = True
+    numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), starts, stops), FIXED)
+    block_of_number = block_of(blocks, numbers.spans[:, 0])
     comment = np.full(len(blocks), -1, dtype=np.int64)
-    comment[np.searchsorted(blocks[:, 0], starts[last], side="right") - 1] = starts[last]
-    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1), exact)
+    comment[block_of(blocks, starts[last])] = starts[last]
+    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1))
+    for block in {*block_of_number[numbers.broken].tolist(), *odd_blocks(text, blocks)}:
+        shapes[block] = None
     first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
     return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+
+
+def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
+    """The blocks that hold an `ODD` byte."""
+    places = np.flatnonzero(ODD[text])
+    owner = block_of(blocks, places)
+    return list(map(int, owner[places < blocks[owner, 1]]))
+
+
+def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The blocks in which some bytes of the text stand; those of a line end stand in the block before it."""
+    return np.searchsorted(blocks[:, 0], places, side="right") - 1
 
 
 def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
@@ -103,7 +114,6 @@ def shape_keys(
     blocks: NDArray[np.int64],
     numbers: NDArray[np.int64],
     comments: NDArray[np.int64],
-    exact: NDArray[np.bool_],
 ) -> list[bytes | None]:
     """The key of each block: its bytes, with one mark for each number and for the comment at its end."""
     keep = cover(len(text) + 1, blocks[:, 0], blocks[:, 1])
@@ -115,7 +125,4 @@ def shape_keys(
     marked[blocks[:, 1]] = ord("\n")
     for places in (numbers[:, 0], comments[:, 0], blocks[:, 1]):
         keep[places] = True
-    keys: list[bytes | None] = list(marked[keep].tobytes().split(b"\n")[: len(blocks)])
-    for block in np.flatnonzero(exact):
-        keys[block] = None
-    return keys
+    return list(marked[keep].tobytes().split(b"\n")[: len(blocks)])

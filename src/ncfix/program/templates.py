@@ -70,8 +70,9 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
         parsed = build(parse(dialect, squeezed.code), text, squeezed)
     except UnexpectedInput as error:
         raise explain(error, text, squeezed) from None
-    except TooDeepError:
-        raise BlockError("NCF118", "the expression is nested too deep, or too long", text.find("[")) from None
+    except TooDeepError as error:
+        place = squeezed.places[error.position]
+        raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
     check_numbers(parsed)
     check_exponents(parsed, text)
     check_repeats(parsed)

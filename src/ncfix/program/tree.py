@@ -109,7 +109,10 @@ Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only."""
+    """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only.
+
+    The value is a `Literal` or `Constant` only where a plain number is written: `X[4]` is `+4`, a `Unary`.
+    """
 
     address: str
     value: Expression

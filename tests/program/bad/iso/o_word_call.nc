@@ -1,0 +1,2 @@
+G0 X1
+O<SIDE> CALL [1]

@@ -1,0 +1,4 @@
+%_N_PART_MPF
+;$PATH=/_N_WKS_DIR
+N10 G0 X1
+M30

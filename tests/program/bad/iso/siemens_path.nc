@@ -1,0 +1,3 @@
+;$PATH=/_N_MPF_DIR
+G0 X1
+M30

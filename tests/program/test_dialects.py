@@ -1,0 +1,70 @@
+"""Which dialect a text is read with, and where grammars come from."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+
+from ncfix.program import dialects
+from ncfix.program.dialect import Dialect
+from ncfix.program.grammar import find_grammar, parser
+from ncfix.program.reader import read
+from ncfix.program.tree import Word
+from program.lanes import assert_read_right
+
+
+def test_the_built_in_dialects_are_there() -> None:
+    assert {"iso", "linuxcnc"} <= set(dialects.names())
+    assert dialects.get("iso").name == "iso"
+
+
+@pytest.mark.parametrize(
+    ("source", "path", "expected"),
+    [
+        (b"G0 X1\n", "part.ngc", "linuxcnc"),
+        (b"G0 X1\n", "PART.NGC", "linuxcnc"),
+        (b"G0 X1\n", "part.nc", "iso"),
+        (b"G0 X1\n", "part", "iso"),
+        (b"G0 X1\n", "-", "iso"),
+        (b"o<side> sub\no<side> endsub\n", "part.nc", "linuxcnc"),
+        (b"(x)\n O100 IF [#1 GT 2]\n O100 ENDIF\n", "part.nc", "linuxcnc"),
+        (b"#<depth> = 5\n", "part.tap", "linuxcnc"),
+        (b"O1000 (PART)\nG0 X1\n", "part.tap", "iso"),
+    ],
+)
+def test_detection(source: bytes, path: str, expected: str) -> None:
+    assert dialects.detect(source, path).name == expected
+    assert read(source, path).dialect.name == expected
+
+
+def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:
+    grammar = tmp_path / "upper.lark"
+    grammar.write_text("%import common (word, ADDRESS)\nblock: word*\n%override ADDRESS: /[XY]/\n", encoding="utf-8")
+    program = read(b"X1 Y-2.5\n", dialect=Dialect("upper", "Upper", str(grammar), (".up",)))
+    assert_read_right(program)
+    assert [item.address for item in program.items_of(0) if isinstance(item, Word)] == ["X", "Y"]
+
+
+def test_a_grammar_that_is_not_there_is_a_fault_of_who_names_it() -> None:
+    with pytest.raises(FileNotFoundError, match=r"no grammar 'none\.lark'"):
+        find_grammar("none.lark")
+
+
+@pytest.mark.parametrize("name", ["iso.lark", "linuxcnc.lark"])
+def test_a_parser_is_made_quickly(name: str) -> None:
+    """0.2 s is what a short program may wait for; processor time, as the machine may be busy."""
+    parser(name)
+    parser.cache_clear()
+    started = time.process_time()
+    parser(name)
+    assert time.process_time() - started < 0.2
+
+
+def test_a_parser_leaves_no_files(tmp_path: Path, root: Path) -> None:
+    for file in ("common.lark", "iso.lark"):
+        shutil.copy(root / "grammars" / file, tmp_path)
+    parser(str(tmp_path / "iso.lark")).parse("G1X1")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["common.lark", "iso.lark"]
