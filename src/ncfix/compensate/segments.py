@@ -47,9 +47,12 @@ class Segments:
         return Segments(*ends, self.arc[rows], centre, normal, self.sweep[rows], self.columns)
 
     def at(self, rows: Index, fraction: Array) -> Array:
-        """The commands at fractions (k,) of motions `rows` (k,), shape (k, n_axes)."""
+        """The commands at fractions (k,) of motions `rows` (k,), shape (k, n_axes).
+
+        The end of a motion is known even if its start is not.
+        """
         f = fraction[:, None]
-        command = (1 - f) * self.start[rows] + f * self.end[rows]
+        command = np.where(f == 1, self.end[rows], (1 - f) * self.start[rows] + f * self.end[rows])
         if self.arc.any():
             on_arc = np.flatnonzero(self.arc[rows])
             if on_arc.size:
