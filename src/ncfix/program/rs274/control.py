@@ -91,7 +91,7 @@ class Control:
         self.machine = tuple(INDEX[axis] for axis in axes)
         self.rotary = tuple((letter in rotary) if letter in axes else letter in ROTARY_LETTERS for letter in LETTERS)
         self.builder = Builder(axes, rotary)
-        self.modal = Modal()
+        self.modal = Modal(retract_to_r=self.rules.strict)
         self.offsets = Offsets()
         self.parameters = Parameters()
         self.knowledge = Knowledge(setup, self.place)
@@ -168,11 +168,15 @@ class Control:
         return rotated(self.inverse, inner) if self.is_rotated else inner
 
     def coordinate(self, index: int) -> float:
-        """Where an axis stands in program units; marks the value where it is known only at run time."""
+        """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
         self.settle((index,))
         if index in self.unknown or index in self.shaky:
             self.parameters.touched = True
-        return self.program_position()[index] / self.scale[index]
+        return self.program_position()[index] / self.unit_of(index)
+
+    def unit_of(self, index: int) -> float:
+        """mm or rad per program unit of an axis, X not as a diameter."""
+        return DEGREE if self.rotary[index] else self.modal.unit
 
     # -- what is known ------------------------------------------------------------------------------------------------
 

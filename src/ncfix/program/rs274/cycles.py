@@ -68,16 +68,16 @@ def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
     if not in_force:
         sticky.runtime = False
     if "R" in block.values:
-        sticky.r = control.modal.unit * block.values["R"]
+        sticky.r = block.values["R"]
     if depth_letter in block.values:
-        sticky.depth = control.scale[plane.across] * block.values[depth_letter]
+        sticky.depth = block.values[depth_letter]
     sticky.runtime |= bool(block.runtime & {"R", depth_letter})
 
 
 def levels(control: Control, initial: float) -> tuple[float, float]:
     """R and the depth in the program's frame."""
     sticky = control.modal.cycle
-    r, depth = sticky.r, sticky.depth
+    r, depth = control.modal.unit * sticky.r, control.scale[control.modal.plane.across] * sticky.depth
     if control.modal.incremental:
         r += initial
         depth += r

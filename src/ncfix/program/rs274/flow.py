@@ -15,6 +15,7 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.labels import BAD_FLOW, Label, Labels, short
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine
 from ncfix.program.rs274.settings import restore
@@ -23,22 +24,11 @@ from ncfix.program.rs274.unit import Unit
 MAX_CALLS = 10
 """How deep subprograms may be nested, the main program included (LinuxCNC)."""
 
-BAD_FLOW = "NCF230"
 NO_SUBPROGRAM = "NCF231"
 TOO_DEEP = "NCF232"
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
-
-
-@dataclass(slots=True)
-class Label:
-    """Where an o-word was first met, as what, and how many times a `repeat` is still to run."""
-
-    unit: Unit
-    block: int
-    keyword: str
-    repeats: int = -1
 
 
 @dataclass(slots=True)
@@ -77,7 +67,7 @@ class FlowControl:
         self.skipping_to_sub = False
         self.skipping_from: tuple[Unit, int] = (main, 0)
         self.defining: str | None = None
-        self.labels: dict[str, Label] = {}
+        self.labels = Labels()
         self.executed_if = False
         self.breaking = False
         self.continuing = False
@@ -121,22 +111,7 @@ class FlowControl:
 
     def enter_label(self, flow: FlowLine, name: str) -> Label:
         """Note where a label stands; raises `Fault` if it stands elsewhere too."""
-        known = self.labels.get(name)
-        here = self.block - 1
-        if known is None:
-            known = self.labels[name] = Label(self.unit, here, flow.keyword)
-        elif known.block != here or known.unit is not self.unit:
-            line = known.unit.program.line(known.block)
-            raise Fault(BAD_FLOW, f"the label o{short(name)} is used already, in line {line}")
-        return known
-
-    def known_label(self, flow: FlowLine, name: str, *keywords: str) -> Label:
-        """The label that a line belongs to; raises `Fault` if it has not been met as one of these."""
-        known = self.labels.get(name)
-        if known is None or known.keyword not in keywords:
-            wanted = " or ".join(keywords)
-            raise Fault(BAD_FLOW, f"o{short(name)} {flow.keyword} has no {wanted} before it")
-        return known
+        return self.labels.enter(name, flow.keyword, self.unit, self.block - 1)
 
     def skip_to(self, name: str) -> None:
         """Pass over what follows, up to o-words with this label."""
@@ -235,7 +210,7 @@ class FlowControl:
         self.calls.append(call)
         self.control.parameters.scopes.append(Store())
         self.control.saved.append(None)
-        known = self.labels.get(call.label)
+        known = self.labels.find(call.label)
         if known is not None:
             self.go_to(known)
             return
@@ -268,7 +243,7 @@ class FlowControl:
         self.skipping = None
         if call.remaining:
             call.remaining -= 1
-            self.go_to(self.labels[call.label])
+            self.go_to(self.labels.entries[call.label])
             return
         self.calls.pop()
         self.control.parameters.scopes.pop()
@@ -295,7 +270,7 @@ class FlowControl:
 
     def otherwise_if(self, flow: FlowLine, name: str) -> None:
         """`elseif [..]`."""
-        self.known_label(flow, name, "if")
+        self.labels.known(name, flow.keyword, "if")
         if self.executed_if:
             self.skip_to(name)
         elif self.argument(flow) != 0.0:
@@ -304,7 +279,7 @@ class FlowControl:
 
     def otherwise(self, flow: FlowLine, name: str) -> None:
         """`else`."""
-        self.known_label(flow, name, "if")
+        self.labels.known(name, flow.keyword, "if")
         if self.executed_if:
             self.skip_to(name)
         elif self.skipping is not None:
@@ -313,7 +288,7 @@ class FlowControl:
 
     def end_branch(self, flow: FlowLine, name: str) -> None:
         """`endif`."""
-        self.known_label(flow, name, "if")
+        self.labels.known(name, flow.keyword, "if")
         self.skipping = None
         self.executed_if = True
 
@@ -322,11 +297,11 @@ class FlowControl:
     def do(self, flow: FlowLine, name: str) -> None:
         """`do`: a loop whose condition stands at its end."""
         self.skipping = None
-        self.labels.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
+        self.labels.entries.setdefault(name, Label(self.unit, self.block - 1, flow.keyword))
 
     def loop(self, flow: FlowLine, name: str) -> None:
         """`while [..]`: the begin of a loop, or the end of a `do`."""
-        known = self.labels.get(name)
+        known = self.labels.find(name)
         self.skipping = None
         value = self.argument(flow)
         if known is not None and known.keyword == "do":
@@ -352,28 +327,23 @@ class FlowControl:
 
     def break_loop(self, flow: FlowLine, name: str) -> None:
         """`break`."""
-        self.known_label(flow, name, "while", "do")
+        self.labels.known(name, flow.keyword, "while", "do")
         self.skip_to(name)
         self.breaking = True
 
     def continue_loop(self, flow: FlowLine, name: str) -> None:
         """`continue`."""
-        self.known_label(flow, name, "while", "do")
+        self.labels.known(name, flow.keyword, "while", "do")
         if self.skipping is None:
             self.skip_to(name)
             self.continuing = True
 
     def end_loop(self, flow: FlowLine, name: str) -> None:
         """`endwhile`, `endrepeat`."""
-        label = self.known_label(flow, name, ENDS_OF_LOOPS[flow.keyword])
+        label = self.labels.known(name, flow.keyword, ENDS_OF_LOOPS[flow.keyword])
         if self.skipping is None or self.continuing:
             self.continuing = False
             self.skipping = None
             self.go_to(label)
         else:
             self.skipping = None
-
-
-def short(name: str) -> str:
-    """A label without the subprogram that it stands in."""
-    return name.rpartition("#")[2]

@@ -9,19 +9,19 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.reader import read
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import FlowControl
-from ncfix.program.rs274.groups import CYCLES, LENGTH
+from ncfix.program.rs274.groups import CYCLES
 from ncfix.program.rs274.lane import run_lane
-from ncfix.program.rs274.modal import NO_MOTION
-from ncfix.program.rs274.motion import BAD_MOTION, NO_CODE, in_machine_coordinates
+from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import Codes, Plan, grouped_codes
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
-from ncfix.program.rs274.wordcheck import unused_word
+from ncfix.program.rs274.wordcheck import check_words
 from ncfix.program.tree import Program, Span, Word
 
 MAX_BLOCKS = 10_000_000
@@ -29,7 +29,6 @@ MAX_BLOCKS = 10_000_000
 
 ENDLESS = "NCF233"
 NO_END = "NCF234"
-UNUSED = "NCF209"
 CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
@@ -175,8 +174,8 @@ class Interpreter:
             raise plan.fault
         block = self.evaluate(plan, index)
         codes = plan.codes or self.computed_codes(plan)
-        motion = self.motion_of(plan, codes)
-        self.check_words(plan, codes, motion)
+        motion = motion_of(control, plan, codes)
+        check_words(control, plan, codes, motion)
         if plan.command is not None:
             self.command(plan.command)
         self.note_foreign(plan)
@@ -231,62 +230,6 @@ class Interpreter:
         if parameters.touched:
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
-
-    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
-        """The motion code that a block executes; raises `Fault` where its axis words have no code."""
-        modal, strict = self.control.modal.motion, self.control.rules.strict
-        has_axes = plan.axes != 0
-        if codes.motion is not None:
-            return self.explicit_motion(codes, has_axes, strict)
-        if codes.takes or (has_axes and codes.g.get(LENGTH) in (431, 432)):
-            return None
-        if has_axes:
-            if modal == NO_MOTION or modal < 0:
-                return self.without_code(codes)
-            return modal
-        if plan.letters & {"I", "J", "K"} and modal in (20, 30):
-            return modal
-        return None
-
-    def explicit_motion(self, codes: Codes, has_axes: bool, strict: bool) -> int | None:
-        """The motion code that a block names."""
-        motion = codes.motion
-        if codes.takes:
-            if motion == NO_MOTION:
-                return motion
-            if strict:
-                raise Fault(BAD_MOTION, "two G codes of the block both use its axis words")
-            self.control.modal.motion = motion if motion is not None else NO_MOTION
-            return None
-        if strict and motion == NO_MOTION and has_axes:
-            raise Fault(BAD_MOTION, "axis words cannot be used with G80")
-        needs_axes = motion not in (0, 10, 20, 30, 52, NO_MOTION) and not 700 <= (motion or 0) <= 722
-        if needs_axes and not has_axes:
-            if strict:
-                raise Fault(BAD_MOTION, f"G{(motion or 0) / 10:g} needs an axis word")
-            self.control.modal.motion = motion if motion is not None else NO_MOTION
-            return None
-        return motion
-
-    def without_code(self, codes: Codes) -> int | None:
-        """Axis words while no motion code is in force."""
-        if self.control.rules.strict:
-            raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
-        if not codes.unknown:
-            self.control.refusal = self.control.refusal or NO_CODE
-        return None
-
-    def check_words(self, plan: Plan, codes: Codes, motion: int | None) -> None:
-        """Raise `Fault` for a word that no code uses, where the control does."""
-        if not self.control.rules.strict or motion in plan.checked:
-            return
-        g_codes, m_codes = frozenset(codes.g.values()), frozenset(codes.m.values())
-        letter = unused_word(plan.letters, motion, g_codes, m_codes)
-        if letter is not None:
-            span = next(word.span for word in plan.template.words if word.address == letter)
-            raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=span)
-        if plan.codes is not None:
-            plan.checked.add(motion)
 
     def note_foreign(self, plan: Plan) -> None:
         """Note axes that the program moves and the machine lacks."""

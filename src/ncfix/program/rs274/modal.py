@@ -13,11 +13,11 @@ NO_MOTION = 800
 
 @dataclass(slots=True)
 class Cycle:
-    """What of a canned cycle stays in force, in mm of the program's frame.
+    """What of a canned cycle stays in force.
 
-    depth    the word of the axis across the plane
-    r        the R word
-    initial  where the series of holes began, across the plane; None while no cycle is in force
+    depth    the word of the axis across the plane, as written
+    r        the R word, as written
+    initial  where the series of holes began, across the plane, mm in the program's frame; None while none is in force
     runtime  one of these is known only at run time
     """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.program.moves import Kind
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Vector
+from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.feeds import PER_REVOLUTION, check_feed
 from ncfix.program.rs274.systems import REFERENCES, is_given, store, stored
@@ -84,19 +84,26 @@ def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Un
     """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
     first = REFERENCES[name]
     runtime = control.parameters.numbers.runtime
-    reference = stored(control, first)
-    target, unknown = control.position[:], dict(control.unknown)
-    for index in range(N_LETTERS):
-        if not axes >> index & 1:
-            continue
-        target[index] = reference[index]
-        unknown.pop(index, None)
-        given = is_given(control, first, index) and first + index not in runtime
-        if index in control.machine and not given and not assumed(control, name):
-            unknown[index] = AFTER_REFERENCE
+    target, unknown = along(control, stored(control, first), axes), dict(control.unknown)
+    for index in control.machine:
+        if axes >> index & 1:
+            unknown.pop(index, None)
+            given = is_given(control, first, index) and first + index not in runtime
+            if not given and not assumed(control, name):
+                unknown[index] = AFTER_REFERENCE
     if control.tcp:
         tcp.from_machine(control, target, unknown)
     return target, unknown
+
+
+def along(control: Control, point: Vector, axes: int) -> Vector:
+    """The position moved to a point along some letters of the program's frame, turned as that is (LinuxCNC)."""
+    if not control.is_rotated or axes & 3 in (0, 3):
+        return [point[i] if axes >> i & 1 else value for i, value in enumerate(control.position)]
+    here = control.program_position()
+    there = rotated(control.inverse, [p - o for p, o in zip(point, control.offset, strict=True)])
+    mixed = [there[i] if axes >> i & 1 else value for i, value in enumerate(here)]
+    return [a + b for a, b in zip(rotated(control.rotation, mixed), control.offset, strict=True)]
 
 
 def assumed(control: Control, name: str) -> bool:
@@ -133,8 +140,7 @@ def probe(control: Control, block: Block, code: int) -> None:
     control.move(Kind.FEED, block.axes, target, ends, code, passing=PROBING)
     program = control.program_position()
     for index in range(N_LETTERS):
-        value = program[index] / control.scale[index]
-        control.parameters.assign(5061 + index, value, runtime=True)
+        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
     control.parameters.assign(5070, 1.0, runtime=True)
 
 

@@ -33,6 +33,7 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 """The parameters of X of the reference points."""
 
 BAD_G10 = "NCF222"
+TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
 
@@ -101,7 +102,10 @@ def activate(control: Control, system: int) -> None:
     """Take a coordinate system's offset and rotation into force."""
     control.modal.system = system
     control.offsets.origin = stored(control, first_parameter(system))
-    control.offsets.turn = turn_of(control, system)
+    turn = turn_of(control, system)
+    if turn != control.offsets.turn and any(control.offsets.shift[:2]):
+        control.lose((X, Y), TURNED_WITH_SHIFT)
+    control.offsets.turn = turn
     control.offset_checked = False
     mark_shaky(control)
     control.refresh()

@@ -100,7 +100,8 @@ def cartesian(control: Control, block: Block) -> Block:
         radius, angle = radius + block.get("@"), angle + block.get("^")
     else:
         radius, angle = block.get("@", radius), block.get("^", angle)
-    ends = {"X": radius * math.cos(math.radians(angle)), "Y": radius * math.sin(math.radians(angle))}
+    doubled = 2.0 if control.modal.diameter else 1.0
+    ends = {"X": doubled * radius * math.cos(math.radians(angle)), "Y": radius * math.sin(math.radians(angle))}
     runtime = block.runtime | {"X", "Y"} if block.runtime & {"@", "^"} else block.runtime
     return Block(block.index, others | ends, runtime, block.axes)
 

@@ -8,7 +8,12 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import CYCLES, TURNING_CYCLES
+from ncfix.program.rs274.plans import Codes, Plan
+
+UNUSED = "NCF209"
 
 ARCS = (20, 30)
 DRILLING = tuple(code for code in CYCLES if code >= 810)
@@ -56,3 +61,15 @@ def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_code
         if letter in letters and not used:
             return letter
     return None
+
+
+def check_words(control: Control, plan: Plan, codes: Codes, motion: int | None) -> None:
+    """Raise `Fault` for a word that no code uses, where the control does."""
+    if not control.rules.strict or motion in plan.checked:
+        return
+    letter = unused_word(plan.letters, motion, frozenset(codes.g.values()), frozenset(codes.m.values()))
+    if letter is not None:
+        span = next(word.span for word in plan.template.words if word.address == letter)
+        raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=span)
+    if plan.codes is not None:
+        plan.checked.add(motion)
