@@ -10,7 +10,7 @@ from ncfix.cli.setup_options import SetupOptions
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
-    from ncfix.compensate.simulation import PathError
+    from ncfix.compensate.simulation import TipError
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves, Trace
     from ncfix.program.setup import Setup
@@ -23,7 +23,7 @@ PARALLEL = ("U", "V", "W")
 
 @dataclass(frozen=True, slots=True)
 class Following:
-    """What is needed to follow programs. Without a machine nothing is cut, so what is not given may be zero."""
+    """What is needed to follow programs. Without errors to correct, what is not given may be zero."""
 
     machine: Machine | None
     setup: Setup
@@ -34,7 +34,8 @@ class Following:
         """Load what the options name."""
         machine = load_machine(machine_path) if machine_path else None
         setup = given.load()
-        return cls(machine, setup if machine else replace(setup, assume_zero=True), dialect)
+        exacting = machine is not None and not machine.is_perfect
+        return cls(machine, setup if exacting else replace(setup, assume_zero=True), dialect)
 
     def read(self, path: str) -> Program:
         """Read a program."""
@@ -62,23 +63,23 @@ class Following:
             return named_axes(program), frozenset(ROTARY)
         return self.machine.axis_names, rotary_names(self.machine)
 
-    def simulated(self, path: str) -> tuple[Program, Moves, PathError]:
+    def simulated(self, path: str) -> tuple[Program, Moves, TipError]:
         """A program, its motions, and the error of the tool tip along them."""
-        from ncfix.compensate.simulation import path_error
+        from ncfix.compensate.simulation import tip_error
 
         program, machine, moves = self._on_machine(path)
-        return program, moves, path_error(machine, moves)
+        return program, moves, tip_error(machine, moves)
 
     def compared(self, original: str, fixed: str) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
         """Figures: of the original on this machine, of the other along its path, and along the original's path."""
         from ncfix.compensate.comparison import compare
-        from ncfix.compensate.simulation import path_error
+        from ncfix.compensate.simulation import tip_error
 
         program, machine, meant = self._on_machine(original)
         other, _, done = self._on_machine(fixed)
         there, back = compare(machine, meant, done)
         lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
-        return figures(path_error(machine, meant), lines), figures(there, other_lines), figures(back, lines)
+        return figures(tip_error(machine, meant), lines), figures(there, other_lines), figures(back, lines)
 
     def _on_machine(self, path: str) -> tuple[Program, Machine, Moves]:
         from ncfix.compensate.following import follow
@@ -105,7 +106,7 @@ def lines_of(program: Program, blocks: Any) -> list[int]:
     return lines
 
 
-def figures(error: PathError, lines: list[int]) -> dict[str, Any]:
+def figures(error: TipError, lines: list[int]) -> dict[str, Any]:
     """The error along a path in two figures, um, and the line of the worst."""
     row = error.worst_row
     return {"max": 1e3 * error.max_mm, "rms": 1e3 * error.rms_mm, "where": None if row is None else lines[row]}

@@ -14,7 +14,7 @@ from ncfix.cli.table import as_csv, known
 from ncfix.cli.targets import shown, targets
 
 if TYPE_CHECKING:
-    from ncfix.compensate.simulation import PathError
+    from ncfix.compensate.simulation import TipError
 
 
 @click.command()
@@ -48,7 +48,7 @@ def simulate(
         console.put(f"tip error: {console.error_figures(found)}\n")
 
 
-def _columns(error: PathError, lines: list[int]) -> dict[str, list[Any]]:
+def _columns(error: TipError, lines: list[int]) -> dict[str, list[Any]]:
     """The samples by columns: intended tip in mm, error in um."""
     gap_um = 1e3 * (error.actual - error.intended)
     columns: dict[str, list[Any]] = {"line": [lines[row] for row in error.rows], "fraction": known(error.fraction)}

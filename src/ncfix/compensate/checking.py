@@ -37,8 +37,7 @@ def check_alone(
     What the setup does not give is no finding. Raises what `trace` raises.
     """
     found = trace(program, setup, axes, rotary, resolve)
-    remarks = found.messages[len(found.assumed) :]
-    return Checked(len(found.moves), (*_stamped(program), *remarks, *_refused(program, found)))
+    return Checked(len(found.moves), (*_stamped(program), *_said(found), *_refused(program, found)))
 
 
 def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Checked:
@@ -48,7 +47,7 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
     """
     followed = follow(program, machine, setup, resolve)
     if machine.is_perfect:
-        remarks: tuple[Message, ...] = (*followed.trace.messages, *_refused(program, followed.trace))
+        remarks = (*_said(followed.trace), *_refused(program, followed.trace))
     else:
         report = fix_program(program, machine, setup, FixOptions(force=True, verify=False), resolve).report
         refusals = (Message(each.code, each.reason, Place(program.path, each.line)) for each in report.refused)
@@ -58,6 +57,11 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
         each for each in _travel(program, followed) if (each.code, each.place.line if each.place else 0) not in told
     )
     return Checked(len(followed.trace.moves), (*_stamped(program), *remarks, *travel))
+
+
+def _said(found: Trace) -> tuple[Message, ...]:
+    """What following the program gave rise to, but for what was assumed."""
+    return found.messages[len(found.assumed) :]
 
 
 def _stamped(program: Program) -> tuple[Message, ...]:

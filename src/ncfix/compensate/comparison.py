@@ -15,7 +15,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.simulation import PathError, actual_tip, batches, samples
+from ncfix.compensate.simulation import TipError, actual_tip, batches, samples
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
@@ -68,7 +68,7 @@ class Curve:
         return float(self.length[-1]) if len(self.length) else 0.0
 
 
-def compare(machine: Machine, original: Moves, other: Moves, state: State = State()) -> tuple[PathError, PathError]:  # noqa: B008
+def compare(machine: Machine, original: Moves, other: Moves, state: State = State()) -> tuple[TipError, TipError]:  # noqa: B008
     """How far `other` on this machine is from what `original` means: along `other`, and along `original`.
 
     The first has motions of `other` in `rows`, the second those of `original`. Raises `UsageError` NCF420 if the two
@@ -78,8 +78,8 @@ def compare(machine: Machine, original: Moves, other: Moves, state: State = Stat
     intended = Curve.of(meant, meant.tip)
     actual = Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
     _check_alike(intended, actual)
-    there = PathError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
-    back = PathError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
+    there = TipError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
+    back = TipError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
     return there, back
 
 
@@ -97,23 +97,26 @@ def nearest(curve: Curve, other: Curve) -> Array:
     if not len(other.rows):
         return np.empty((0, 3))
     scale = curve.total / other.total if other.total else 1.0
+    wanted = np.column_stack([other.points, ALONG * scale * other.length])
     tree = KDTree(np.column_stack([curve.points, ALONG * curve.length]))
-    query = np.column_stack([other.points, ALONG * scale * other.length])
-    _, found = tree.query(query, k=min(NEIGHBOURS, len(curve.rows)))
-    found = np.asarray(found).reshape(len(query), -1)
-    return np.concatenate([_closest(curve, found[part], other.points[part]) for part in batches(len(query))])
+    _, found = tree.query(wanted, k=min(NEIGHBOURS, len(curve.rows)))
+    found = np.asarray(found).reshape(len(wanted), -1)
+    return np.concatenate([_closest(curve, found[part], wanted[part]) for part in batches(len(wanted))])
 
 
-def _closest(curve: Curve, found: Index, points: Array) -> Array:
-    """The nearest point on the motions of the samples `found` (k, c) to `points` (k, 3)."""
-    candidates = [_on_motion(curve, column, points) for column in found.T]
-    distance = np.stack([np.linalg.norm(each - points, axis=1) for each in candidates])
-    best: Array = np.stack(candidates)[np.argmin(distance, axis=0), np.arange(len(points))]
+def _closest(curve: Curve, found: Index, wanted: Array) -> Array:
+    """The points nearest to `wanted` (k, 4) on the motions of the samples `found` (k, c), (k, 3)."""
+    candidates = np.stack([_on_motion(curve, column, wanted[:, :3]) for column in found.T])
+    distance = np.linalg.norm(candidates - wanted, axis=-1)
+    best: Array = candidates[np.argmin(distance, axis=0), np.arange(len(wanted)), :3]
     return best
 
 
 def _on_motion(curve: Curve, sample: Index, points: Array) -> Array:
-    """The nearest point to `points` (k, 3) on the motions of samples (k,), by Newton's method from there."""
+    """The nearest point to `points` (k, 3) on the motions of samples (k,), by Newton's method from there.
+
+    With the length of path up to it as fourth coordinate, like those of the tree: (k, 4).
+    """
     rows, fraction = curve.rows[sample], curve.fraction[sample]
     at = curve.points[sample]
     for _ in range(STEPS):
@@ -123,4 +126,5 @@ def _on_motion(curve: Curve, sample: Index, points: Array) -> Array:
         ahead = np.einsum("ij,ij->i", points - at, slope) / np.where(square > 0, square, 1.0)
         fraction = np.clip(fraction + curve.drawn[rows] * ahead, 0.0, 1.0)
         at = curve.tip(rows, fraction)
-    return at
+    way = np.linalg.norm(at - curve.points[sample], axis=1) * np.sign(fraction - curve.fraction[sample])
+    return np.column_stack([at, ALONG * (curve.length[sample] + way)])

@@ -25,7 +25,7 @@ BATCH = 200_000
 
 
 @dataclass(frozen=True, slots=True)
-class PathError:
+class TipError:
     """The tool tip along a path, k samples in order.
 
     rows      (k,) the motion that is done there
@@ -72,7 +72,7 @@ class PathError:
         return int(self.rows[np.argmax(self.size)]) if len(self.rows) else None
 
 
-def path_error(machine: Machine, moves: Moves, state: State = State()) -> PathError:  # noqa: B008
+def tip_error(machine: Machine, moves: Moves, state: State = State()) -> TipError:  # noqa: B008
     """The error of a program as this machine runs it: against what a perfect one would do at the same instant.
 
     state  what else the errors depend on: `inputs`; tool lengths (which must be known) and directions are the motions'
@@ -81,7 +81,7 @@ def path_error(machine: Machine, moves: Moves, state: State = State()) -> PathEr
     rows, fraction = samples(intent)
     tips = [_tips(intent, rows[part], fraction[part]) for part in batches(len(rows))]
     intended, actual = (np.concatenate([each[k] for each in tips]) if tips else np.empty((0, 3)) for k in (0, 1))
-    return PathError(rows, fraction, intended, actual)
+    return TipError(rows, fraction, intended, actual)
 
 
 def samples(intent: Intent) -> tuple[Index, Array]:

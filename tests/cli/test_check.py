@@ -1,0 +1,59 @@
+"""`ncfix check`: findings and nothing else."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import pytest
+
+from ncfix.diagnostics import ExitCode
+
+
+def test_a_sound_program_has_no_findings(shop: Any, ncfix: Any) -> None:
+    result = ncfix("check", shop.program)
+    assert (result.code, result.out) == (ExitCode.DONE, b"")
+    assert "6 blocks, 3 motions, " in result.err
+    assert "nothing found" in result.err
+
+
+def test_json(shop: Any, ncfix: Any) -> None:
+    (entry,) = ncfix("check", shop.program, "-m", shop.machine, "--assume-zero", "--json").json()["files"]
+    assert (entry["path"], entry["blocks"], entry["moves"]) == (str(shop.program), 6, 3)
+    assert {finding["code"] for finding in entry["findings"]} <= {"NCF205", "NCF409"}
+
+
+def test_a_stamp_is_a_finding(shop: Any, ncfix: Any) -> None:
+    ncfix("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc", "--assume-zero")
+    result = ncfix("check", shop.folder / "out.ngc")
+    assert result.code == ExitCode.FINDINGS
+    assert "out.ngc:1" in result.err
+    assert "NCF430" in result.err
+
+
+@pytest.mark.parametrize("machine", ["machine", "perfect"])
+def test_leaving_the_travel_is_a_finding(shop: Any, ncfix: Any, machine: str) -> None:
+    shop.program.write_bytes(b"G21 G90 G94\nG0 X10 Y10 Z-1\nG1 X510 F600\nM2\n")
+    result = ncfix("check", shop.program, "-m", getattr(shop, machine), "--assume-zero")
+    assert result.code == ExitCode.FINDINGS
+    assert "part.ngc:3: NCF405" in result.err
+
+
+def test_what_cannot_be_read_is_no_finding_but_an_error(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21\nG1 X1,5\nM2\n")
+    result = ncfix("check", shop.program, "--json")
+    assert result.code == ExitCode.UNREADABLE
+    assert result.json()["files"][0]["errors"][0]["line"] == 2
+
+
+def test_nothing_is_written(shop: Any, ncfix: Any) -> None:
+    before = sorted(os.listdir(shop.folder))
+    ncfix("check", shop.program, "-m", shop.machine, "--assume-zero")
+    assert sorted(os.listdir(shop.folder)) == before
+
+
+def test_over_many_files_the_worst_counts(shop: Any, ncfix: Any) -> None:
+    missing = shop.folder / "missing.ngc"
+    result = ncfix("check", shop.program, missing, "--json")
+    assert result.code == ExitCode.UNREADABLE
+    assert [("errors" in entry) for entry in result.json()["files"]] == [False, True]

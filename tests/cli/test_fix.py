@@ -1,0 +1,221 @@
+"""`ncfix fix`: what is written, what is said, and what is never touched."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.diagnostics import ExitCode
+
+NEITHER_OFFSET_NOR_START = b"G21 G90 G94 G54\nG1 X10 F100\nM2\n"
+STAMPED = b"(ncfix 0.1.0 machine 0123456789ab strategy full tolerance 1 um)\nG21 G90\nG0 X1 Y1 Z-1\nM2\n"
+OVER_THE_END = b"G21 G90 G94\nG0 X10 Y10 Z-1\nG1 X500 F600\nX500.03\nM2\n"
+
+
+def fixed(shop: Any, ncfix: Any, *options: object) -> Any:
+    return ncfix("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc", "--assume-zero", *options)
+
+
+def numbers(text: bytes, letter: str) -> list[float]:
+    return [float(value) for value in re.findall(rf"{letter}(-?[\d.]+)".encode(), text)]
+
+
+def test_a_program_is_corrected_and_the_rest_of_its_bytes_are_kept(shop: Any, ncfix: Any) -> None:
+    result = fixed(shop, ncfix)
+    assert (result.code, result.out) == (ExitCode.DONE, b"")
+    text = (shop.folder / "out.ngc").read_bytes()
+    assert numbers(text, "X") == [9.999, 109.989, 209.979]
+    without_stamp = re.sub(rb"\([^)]*ncfix[^)]*\)\r\n", b"", text)
+    assert re.sub(rb"X[\d.]+", b"X", without_stamp) == re.sub(rb"X[\d.]+", b"X", shop.program.read_bytes())
+    assert b"machine" in text
+
+
+def test_what_was_done_is_said_with_figures_before_and_after(shop: Any, ncfix: Any) -> None:
+    said = fixed(shop, ncfix).err
+    assert f"{shop.program} -> {shop.folder / 'out.ngc'}" in said
+    before = re.search(r"tip error before +max ([\d.]+) um", said)
+    after = re.search(r"tip error after +max ([\d.]+) um", said)
+    assert before
+    assert after
+    assert float(before[1]) == pytest.approx(21.0, abs=0.01)
+    assert float(after[1]) < 1.0
+
+
+def test_json_has_the_object_of_the_contract(shop: Any, ncfix: Any) -> None:
+    (entry,) = fixed(shop, ncfix, "--json").json()["files"]
+    assert entry["path"] == str(shop.program)
+    assert entry["output"] == str(shop.folder / "out.ngc")
+    assert (entry["blocks"], entry["moves"], entry["inserted_blocks"]) == (6, 3, 0)
+    assert entry["max_correction_um"] == pytest.approx(21.0, abs=0.5)
+    assert entry["error_before_um"]["max"] == pytest.approx(21.0, abs=0.01)
+    assert entry["error_before_um"]["rms"] <= entry["error_before_um"]["max"]
+    assert entry["error_after_um"]["max"] < 1.0
+    assert isinstance(entry["error_after_um"]["where"], int)
+    assert entry["refused"] == []
+    assert {warning["code"] for warning in entry["warnings"]} <= {"NCF205", "NCF409"}
+
+
+def test_the_input_is_never_changed(shop: Any, ncfix: Any) -> None:
+    before = shop.program.read_bytes(), shop.program.stat().st_mtime_ns
+    fixed(shop, ncfix)
+    assert (shop.program.read_bytes(), shop.program.stat().st_mtime_ns) == before
+
+
+def test_an_existing_output_is_kept_without_force(shop: Any, ncfix: Any) -> None:
+    (shop.folder / "out.ngc").write_bytes(b"precious")
+    result = fixed(shop, ncfix)
+    assert result.code == ExitCode.USAGE
+    assert "NCF004" in result.err
+    assert (shop.folder / "out.ngc").read_bytes() == b"precious"
+    assert fixed(shop, ncfix, "--force").code == ExitCode.DONE
+
+
+def test_a_perfect_machine_gives_every_byte_back_without_any_setup(shop: Any, ncfix: Any) -> None:
+    result = ncfix("fix", shop.program, "-m", shop.perfect, "-o", "-")
+    assert (result.code, result.out) == (ExitCode.DONE, shop.program.read_bytes())
+
+
+def test_standard_streams(shop: Any, ncfix: Any) -> None:
+    result = ncfix("fix", "-", "-m", shop.machine, "--assume-zero", stdin=shop.program.read_bytes())
+    assert numbers(result.out, "X")[-3:] == [9.999, 109.989, 209.979]
+    assert "<stdin> -> <stdout>" in result.err
+
+
+def test_the_program_and_the_json_object_do_not_share_a_stream(shop: Any, ncfix: Any) -> None:
+    result = ncfix("fix", shop.program, "-m", shop.machine, "-o", "-", "--json")
+    assert result.code == ExitCode.USAGE
+    assert result.json()["errors"][0]["code"] == "NCF010"
+
+
+def test_in_place_keeps_the_original(shop: Any, ncfix: Any) -> None:
+    before = shop.program.read_bytes()
+    call = ["fix", shop.program, "-m", shop.machine, "--in-place", "--assume-zero"]
+    assert ncfix(*call).code == ExitCode.DONE
+    assert Path(f"{shop.program}.orig").read_bytes() == before
+    assert numbers(shop.program.read_bytes(), "X")[-1] == 209.979
+    again = ncfix(*call, "--force")
+    assert again.code == ExitCode.USAGE
+    assert "NCF008" in again.err
+
+
+def test_in_place_leaves_a_program_that_needs_nothing_alone(shop: Any, ncfix: Any) -> None:
+    assert ncfix("fix", shop.program, "-m", shop.perfect, "--in-place").code == ExitCode.DONE
+    assert sorted(path.name for path in shop.folder.iterdir()) == ["machine.toml", "part.ngc", "perfect.toml"]
+
+
+def test_many_programs_and_the_worst_exit_code(shop: Any, ncfix: Any) -> None:
+    bad = shop.folder / "bad.ngc"
+    bad.write_bytes(b"G1 X1 Y..2\nM2\n")
+    out = shop.folder / "out"
+    result = ncfix("fix", bad, shop.program, "-m", shop.machine, "-o", out, "--assume-zero", "--json")
+    assert result.code == ExitCode.UNREADABLE
+    assert f"{bad}:1:" in result.err
+    first, second = result.json()["files"]
+    assert first["output"] is None
+    assert first["errors"][0]["line"] == 1
+    assert second["output"] == str(out / "part.ngc")
+    assert [path.name for path in out.iterdir()] == ["part.ngc"]
+
+
+def test_a_refusal_writes_nothing_unless_allowed(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21 G90 G94\nG0 X10 Y10 Z-1\nG1 X500 F600\nM2\n")
+    shop.machine.write_text(shop.machine.read_text().replace("1e-4", "-1e-4"))
+    result = fixed(shop, ncfix, "--json")
+    assert result.code == ExitCode.REFUSED
+    (entry,) = result.json()["files"]
+    assert entry["output"] is None
+    assert [(each["line"], each["code"]) for each in entry["refused"]] == [(3, "NCF404")]
+    assert f"{shop.program}:3: NCF404" in result.err
+    assert not (shop.folder / "out.ngc").exists()
+    allowed = fixed(shop, ncfix, "--allow-refused")
+    assert allowed.code == ExitCode.DONE
+    assert b"\nG1 X500 F600\n" in (shop.folder / "out.ngc").read_bytes()
+
+
+def test_a_stamped_program_is_refused_unless_forced(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(STAMPED)
+    result = fixed(shop, ncfix)
+    assert result.code == ExitCode.REFUSED
+    assert "NCF430" in result.err
+    assert not (shop.folder / "out.ngc").exists()
+    assert fixed(shop, ncfix, "--force").code == ExitCode.DONE
+
+
+def test_its_own_output_is_stamped(shop: Any, ncfix: Any) -> None:
+    fixed(shop, ncfix)
+    again = ncfix("fix", shop.folder / "out.ngc", "-m", shop.machine, "-o", "-", "--assume-zero")
+    assert again.code == ExitCode.REFUSED
+
+
+def test_what_is_not_given_is_named_with_the_option_that_gives_it(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(NEITHER_OFFSET_NOR_START)
+    call = ["fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc"]
+    result = ncfix(*call)
+    assert result.code == ExitCode.USAGE
+    for said in ("work offset G54", "--offset G54=", "start position of", "--initial "):
+        assert said in result.err
+    given = ncfix(*call, "--offset", "G54=100,100,-50", "--initial", "X=0,Y=100,Z=-50")
+    assert given.code == ExitCode.DONE
+    assert numbers((shop.folder / "out.ngc").read_bytes(), "X")[-1] == 9.989
+
+
+def test_zeros_that_are_assumed_are_named_in_warnings_and_in_the_stamp(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(NEITHER_OFFSET_NOR_START)
+    result = ncfix("fix", shop.program, "-m", shop.machine, "-o", "-", "--assume-zero")
+    assert result.code == ExitCode.DONE
+    assert "NCF205: work offset G54 is not given and is taken as zero" in result.err
+    assert b"G54" in result.out.splitlines()[0]
+
+
+def test_an_axis_that_the_machine_lacks(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21 G90 G94\nG1 X1 Y1 Z-1 B30 F100\nM2\n")
+    result = fixed(shop, ncfix)
+    assert result.code in (ExitCode.USAGE, ExitCode.UNREADABLE)
+    assert re.search(r"part\.ngc:2(:\d+)?: NCF\d+: .*\bB\b", result.err)
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "much"])
+def test_a_tolerance_is_a_number_above_zero(shop: Any, ncfix: Any, value: str) -> None:
+    result = fixed(shop, ncfix, "--tolerance-um", value)
+    assert result.code == ExitCode.USAGE
+    assert "above zero" in result.err
+
+
+def test_an_unknown_strategy_and_an_unknown_dialect(shop: Any, ncfix: Any) -> None:
+    assert "NCF411" in fixed(shop, ncfix, "--strategy", "best").err
+    result = fixed(shop, ncfix, "--dialect", "linuxnc")
+    assert result.code == ExitCode.USAGE
+    assert "did you mean linuxcnc?" in result.err
+
+
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "position", "full"])
+def test_strategies(shop: Any, ncfix: Any, strategy: str) -> None:
+    assert fixed(shop, ncfix, "--strategy", strategy).code == ExitCode.DONE
+    assert strategy.encode() in (shop.folder / "out.ngc").read_bytes()
+
+
+def test_subprograms_are_found_beside_the_program(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21 G90 G94\nG0 X10 Y10 Z-1\no<side> call\nM2\n")
+    (shop.folder / "side.ngc").write_bytes(b"o<side> sub\nG1 X100 F600\no<side> endsub\n")
+    checked = ncfix("trace", shop.program)
+    assert checked.code == ExitCode.DONE
+    assert b"100.0,10.0,-1.0" in checked.out
+    (shop.folder / "side.ngc").unlink()
+    missing = ncfix("trace", shop.program)
+    assert missing.code == ExitCode.UNREADABLE
+    assert "side" in missing.err
+
+
+def test_the_shipped_five_axis_example(examples: Path, ncfix: Any, tmp_path: Path) -> None:
+    program, setup = examples / "programs/blade.nc", examples / "programs/blade.setup.toml"
+    machine = examples / "machines/dmu50.toml"
+    result = ncfix("fix", program, "--setup", setup, "-m", machine, "-o", tmp_path, "--json")
+    assert result.code == ExitCode.DONE, result.err
+    (entry,) = result.json()["files"]
+    assert entry["error_before_um"]["max"] > 10
+    assert entry["error_after_um"]["max"] <= 1.0
+    verified = ncfix("verify", program, tmp_path / "blade.nc", "--setup", setup, "-m", machine, "--json")
+    assert verified.code == ExitCode.DONE
