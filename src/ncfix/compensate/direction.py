@@ -15,7 +15,7 @@ from ncfix.machine import Machine
 Signs = NDArray[np.int8]
 
 REST = 1e-9
-"""mm or rad; an axis that moves less does not move."""
+"""mm or rad; an axis that moves less in a motion does not move."""
 
 
 def matters(machine: Machine) -> bool:
@@ -23,10 +23,10 @@ def matters(machine: Machine) -> bool:
     return any(effect.active and effect.basis.needs_direction for effect in machine.effects)
 
 
-def signs(motion: Array) -> Signs:
-    """The direction of a motion (n, n_axes) mm and rad: -1, 1, or 0 where the axis rests or is not known."""
+def signs(motion: Array, rest: float = REST) -> Signs:
+    """The direction of a motion (n, n_axes) mm and rad: -1, 1, or 0 where it is below `rest` or not known."""
     known = np.where(np.isfinite(motion), motion, 0.0)
-    return np.where(np.abs(known) < REST, 0, np.sign(known)).astype(np.int8)
+    return np.where(np.abs(known) < rest, 0, np.sign(known)).astype(np.int8)
 
 
 def carried(directions: Signs) -> Signs:

@@ -9,19 +9,21 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.proof import check_reading
+from ncfix.compensate.proof import proven
 from ncfix.compensate.settle import Settled, settle
 from ncfix.compensate.strategies import get_strategy
-from ncfix.diagnostics import Message, RefusedError, SourceError
+from ncfix.compensate.verify import Figures, PathError, path_error
+from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Machine
 from ncfix.program import stamp
+from ncfix.program.emit import Reading
 from ncfix.program.moves import Moves, Rule, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
@@ -62,19 +64,20 @@ def fix_program(
     if machine.is_perfect:
         return _untouched(program)
     placed = _placed(machine, setup)
-    followed = trace(program, setup, machine.axis_names, _rotary_names(machine), resolve)
-    _require_tool_lengths(program, followed.moves, placed)
-    settled = settle(program, followed.moves, placed, options)
-    text = _written(program, settled, machine, options, followed)
-    if text != program.source:
-        check_reading(
-            program,
-            text,
-            settled,
-            lambda again: trace(again, setup, machine.axis_names, _rotary_names(machine), resolve),
-        )
-    errors = None
-    return Fixed(text, text != program.source, _report(program, followed, settled, errors, strategy.leaves, options))
+
+    def follow(source: Program) -> Trace:
+        return trace(source, setup, machine.axis_names, _rotary_names(machine), resolve)
+
+    followed = _with_tool_lengths(program, follow(program), placed, setup)
+
+    def attempt(reading: Reading | None) -> tuple[Settled, bytes]:
+        settled = settle(program, followed.moves, placed, options, reading)
+        return settled, _written(program, settled, machine, options, followed)
+
+    proof = proven(program, attempt, follow)
+    errors = _errors(placed, proof.settled) if options.verify else None
+    report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
+    return Fixed(proof.text, proof.text != program.source, report)
 
 
 def _refuse_stamped(program: Program, options: FixOptions) -> None:
@@ -94,19 +97,36 @@ def _rotary_names(machine: Machine) -> frozenset[str]:
     return frozenset(axis.name for axis in machine.axes if axis.rotary)
 
 
-def _require_tool_lengths(program: Program, moves: Moves, machine: Machine) -> None:
-    """Errors that depend on the tool length need it: raise SourceError NCF431 naming every tool that lacks it."""
-    if not machine.depends_on_tool_length:
-        return
-    unknown = np.isnan(moves.tool_length) & (moves.rule == Rule.CORRECT)
-    messages = []
-    for tool in np.unique(moves.tool[unknown]).tolist():
-        row = int(np.flatnonzero(unknown & (moves.tool == tool))[0])
-        text = f"the length of tool {tool} is needed: the errors of this machine depend on it"
-        hint = f"give it with --tool {tool}=LENGTH or in the setup file, or say --assume-zero"
-        messages.append(Message("NCF431", text, program.place(int(moves.block[row])), hint))
-    if messages:
-        raise SourceError.collected(messages)
+def _with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup: Setup) -> Trace:
+    """The trace with every tool length known.
+
+    Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
+    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero.
+    """
+    moves = followed.moves
+    unknown = np.isnan(moves.tool_length)
+    known = replace(followed, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
+    unknown &= moves.rule == Rule.CORRECT
+    if not machine.depends_on_tool_length or not unknown.any():
+        return known
+    tools, rows = np.unique(np.where(unknown, moves.tool, -1), return_index=True)
+    first = {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
+    if not setup.assume_zero:
+        raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
+    notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
+    assumed = (*followed.assumed, *(f"length of tool {tool}" for tool in first))
+    return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
+
+
+def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message:
+    text = f"the length of tool {tool} is needed and not given: the errors of this machine depend on it"
+    hint = f"--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
+    return Message("NCF431", text, program.place(int(moves.block[row])), hint)
+
+
+def _tool_assumed(program: Program, moves: Moves, tool: int, row: int) -> Message:
+    text = f"the length of tool {tool} is not given and was taken as zero"
+    return Message("NCF437", text, program.place(int(moves.block[row])), f"--tool {tool}=LENGTH")
 
 
 def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
@@ -123,13 +143,28 @@ def _written(program: Program, settled: Settled, machine: Machine, options: FixO
     return apply(program.source, edits)
 
 
+def _errors(machine: Machine, settled: Settled) -> PathError:
+    """Tip errors before and after, with the numbers as the control will understand them."""
+    emission = settled.emission
+    pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
+    return path_error(machine, settled.moves, pieces, emission.start)
+
+
+def _figures(figures: Figures) -> dict[str, float | int | None]:
+    return {"max": round(figures.max * 1e3, 4), "rms": round(figures.rms * 1e3, 4)}
+
+
+def _line_of(program: Program, moves: Moves, figures: Figures) -> int | None:
+    return program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
+
+
 def _untouched(program: Program) -> Fixed:
     report = FixReport(program.path, len(program), 0, 0, 0, False)
     return Fixed(program.source, False, report)
 
 
 def _report(
-    program: Program, followed: Trace, settled: Settled, errors: None, leaves: str, options: FixOptions
+    program: Program, followed: Trace, settled: Settled, errors: PathError | None, leaves: str, options: FixOptions
 ) -> FixReport:
     moves = followed.moves
     account = Account.of(moves, settled.kept, settled.reasons)
@@ -150,8 +185,8 @@ def _report(
         changed=bool(settled.emission.edits),
         inserted_blocks=settled.emission.added_blocks,
         max_correction_um=_largest_correction(moves, settled) * 1e3,
-        error_before_um={},
-        error_after_um={},
+        error_before_um=_figures(errors.before) if errors else {},
+        error_after_um=_figures(errors.after) | {"where": _line_of(program, moves, errors.after)} if errors else {},
         refused=tuple(refused),
         warnings=(*followed.messages, *findings),
         strategy=options.strategy,

@@ -10,7 +10,7 @@ from ncfix.compensate.ends import as_commands, path_of
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import batches, offsets, owners, places, sums
-from ncfix.compensate.sampling import MOST, bends, even, kinked, merged, passed, reversals
+from ncfix.compensate.sampling import MOST, bends, crossed, even, merged, reversals
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
 from ncfix.compensate.strategies import Strategy
@@ -131,13 +131,10 @@ def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tup
     bounds = [(each, np.full(len(rows), place)) for place in (0.0, INSTANT, 1.0)]
     counts, fraction = merged(len(rows), (owners(nodes), inner), *bounds)
     found = [reversals(intent, rows, counts, fraction)]
-    if kinked(intent.machine):
+    if intent.kinks:
         owner = owners(counts)
         q = intent.joints(rows[owner], intent.guessed(real, rows[owner], fraction))
-        stretch, share = passed(intent.machine, q[:-1], q[1:])
-        inside = owner[stretch] == owner[stretch + 1]
-        stretch, share = stretch[inside], share[inside]
-        found.append((owner[stretch], (1 - share) * fraction[stretch] + share * fraction[stretch + 1]))
+        found.append(crossed(intent, owner, fraction, q))
     sides = [(owner, np.clip(at + side, INSTANT, 1.0)) for owner, at in found for side in (-INSTANT / 2, INSTANT / 2)]
     return merged(len(rows), (owners(counts), fraction), *sides)
 

@@ -18,14 +18,24 @@ import numpy as np
 
 from ncfix.compensate.direction import Signs, carried, matters, signs
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.kinematics import affine_tip, common, linear_columns, reached_joints, regular, solve
+from ncfix.compensate.kinematics import (
+    affine_tip,
+    common,
+    linear_columns,
+    programmed_tip,
+    reached_joints,
+    regular,
+    solve,
+)
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.steer import rows_of
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 
-INSTANT = 1e-4
-"""Fraction of a motion over which the direction of its axes is looked at."""
+INSTANT, WHILE = 1e-8, 1e-3
+"""Fractions of a motion over which it is looked at which way its axes go: first the short one, then the long one."""
+NOISE = 1e-11
+"""mm or rad; what axis positions may differ by for rounding of the arithmetic."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,18 @@ class Intent:
         """Motions whose axes do not move linearly with the fraction, (n,)."""
         return np.asarray((self.moves.kind == Kind.ARC) | self.moves.tcp, dtype=bool)
 
+    @cached_property
+    def kinks(self) -> list[tuple[int, Array]]:
+        """The axes (columns) with kinks or jumps of the error model, and where these are, ascending, mm and rad."""
+        machine = self.machine
+        places = {name: set(machine.breakpoints(name).tolist()) for name in machine.axis_names}
+        for effect in machine.effects:
+            if effect.active and effect.signal in places:
+                unit = machine.axes[machine.axis_names.index(effect.signal)].unit
+                ends = [end for end in effect.basis.domain if np.isfinite(end)]
+                places[effect.signal].update((effect.center + effect.scale * end) * unit for end in ends)
+        return [(j, np.array(sorted(places[name]))) for j, name in enumerate(machine.axis_names) if places[name]]
+
     def joints(self, rows: Index, commands: Array) -> Array:
         """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""
         moves = self.moves
@@ -71,7 +93,14 @@ class Intent:
 
     def tip(self, rows: Index, fraction: Array) -> Array:
         """The intended tool tip in the workpiece, (k, 3) mm."""
-        tip: Array = self.machine.tip(self.joints_at(rows, fraction), self.lengths(rows))
+        return self.meant(rows, self.segments.at(rows, fraction))
+
+    def meant(self, rows: Index, commands: Array) -> Array:
+        """Where commands (k, n_axes) of motions `rows` (k,) take the tip of a perfect machine, (k, 3) mm."""
+        tcp = self.moves.tcp[rows]
+        tip: Array = self.machine.tip(commands, self.lengths(rows))
+        if tcp.any():
+            tip[tcp] = programmed_tip(self.machine, commands[tcp])
         return tip
 
     def lengths(self, rows: Index) -> Array:
@@ -85,18 +114,20 @@ class Intent:
         """The direction in which each axis ends each motion, (n, n_axes); None if no error depends on it."""
         if not matters(self.machine):
             return None
-        rows = np.arange(len(self.moves))
-        motion = self.moves.end - self.moves.start
+        ways = signs(self.moves.end - self.moves.start)
         bent = np.flatnonzero(self.curved)
-        if bent.size:
-            motion = motion.copy()
-            motion[bent] = self.velocity(rows[bent], np.ones(bent.size))
-        return carried(signs(motion))
+        ways[bent] = self.heading(bent, np.ones(bent.size))
+        return carried(ways)
 
-    def velocity(self, rows: Index, fraction: Array) -> Array:
-        """How the axes move at an instant, (k, n_axes) per `INSTANT` of the motion."""
-        before, after = np.maximum(fraction - INSTANT / 2, 0.0), np.minimum(fraction + INSTANT / 2, 1.0)
-        return self.joints_at(rows, after) - self.joints_at(rows, before)
+    def heading(self, rows: Index, fraction: Array) -> Signs:
+        """Which way axes of curved motions go at fractions (k,), (k, n_axes); at a turning point as before it.
+
+        0 where an axis has not moved for a thousandth of the motion.
+        """
+        q = self.joints_at(rows, fraction)
+        now = signs(q - self.joints_at(rows, np.maximum(fraction - INSTANT, 0.0)), NOISE)
+        lately = signs(q - self.joints_at(rows, np.maximum(fraction - WHILE, 0.0)), NOISE)
+        return np.where(now != 0, now, lately)
 
     def direction(self, rows: Index, fraction: Array) -> Signs:
         """The direction of each axis at fractions of motions, (k, n_axes); zeros (n_axes,) if it does not matter."""
@@ -105,7 +136,7 @@ class Intent:
         result = self.arrival[rows]
         inside = np.flatnonzero(self.curved[rows] & (fraction < 1))
         if inside.size:
-            now = signs(self.velocity(rows[inside], fraction[inside]))
+            now = self.heading(rows[inside], fraction[inside])
             at_start = np.where(rows[inside, None] > 0, self.arrival[rows[inside] - 1], 0)
             result[inside] = np.where(now != 0, now, at_start)
         return result

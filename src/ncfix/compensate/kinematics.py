@@ -91,10 +91,10 @@ def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: Ar
         return commands, reached
     q = commands.copy()
     rows = np.flatnonzero(tcp)
-    columns = linear_columns(machine)
+    wanted = programmed_tip(machine, commands[rows])
     maps, offset = affine_tip(machine, commands[rows], _of_rows(tool_length, rows))
     maps, fine = regular(maps)
-    q[rows[:, None], columns] = solve(maps, _programmed_tip(machine, commands[rows]) - offset)
+    q[rows[:, None], linear_columns(machine)] = solve(maps, wanted - offset)
     reached[rows] = fine
     return q, reached
 
@@ -115,9 +115,10 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
     return commands
 
 
-def _programmed_tip(machine: Machine, commands: Array) -> Array:
-    """Where in the workpiece a command wants the tip, (n, 3) mm."""
-    tip: Array = machine.tip(_rotary_at_zero(machine, commands), 0.0)
+def programmed_tip(machine: Machine, commands: Array) -> Array:
+    """Where in the workpiece commands (n, n_axes) with tool-centre-point control want the tip, (n, 3) mm."""
+    maps, offset = affine_tip(machine, _rotary_at_zero(machine, commands))
+    tip: Array = (maps @ commands[:, linear_columns(machine), None])[..., 0] + offset
     return tip
 
 

@@ -3,41 +3,81 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
 from ncfix.compensate.settle import Settled
-from ncfix.diagnostics import SourceError
-from ncfix.program.moves import Trace
+from ncfix.diagnostics import NcfixError
+from ncfix.program.emit import Reading
+from ncfix.program.moves import Moves, Trace
 from ncfix.program.reader import read
 from ncfix.program.tree import Program
 
 SAME = 1e-6
 """mm and rad; the emitter's book and a second reading differ by floating-point noise only."""
+ATTEMPTS = 4
+"""A second attempt knows the frames that moved with the first; the others are for frames that depend on frames."""
+
+Follow = Callable[[Program], Trace]
 
 
 class SelfCheckError(Exception):
     """The text that was written does not mean what was planned: a fault of ncfix. Nothing may be written."""
 
 
-def check_reading(program: Program, text: bytes, settled: Settled, follow: Callable[[Program], Trace]) -> None:
-    """Read and follow the new text, and compare it with the plan; raises `SelfCheckError`."""
+@dataclass(frozen=True, slots=True)
+class Proven:
+    """A text that a second reading has confirmed, and what was settled for it."""
+
+    text: bytes
+    settled: Settled
+
+
+def proven(program: Program, attempt: Callable[[Reading | None], tuple[Settled, bytes]], follow: Follow) -> Proven:
+    """Write, read what was written, and write again with what the reading taught, until both agree.
+
+    attempt  settles and writes, given what a control made of the last attempt
+    follow   traces a program
+
+    Raises `SelfCheckError` if they never agree.
+    """
+    reading = None
+    for _ in range(ATTEMPTS):
+        settled, text = attempt(reading)
+        if text == program.source:
+            return Proven(text, settled)
+        again = _followed(program, text, settled, follow)
+        wrong = _differences(settled, again)
+        if not wrong.any():
+            return Proven(text, settled)
+        reading = Reading.of(again, settled.plan.pieces)
+    piece = int(np.argmax(wrong))
+    line = program.line(int(settled.moves.block[settled.plan.pieces.move[piece]]))
+    raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {settled.emission.end[piece]}")
+
+
+def _followed(program: Program, text: bytes, settled: Settled, follow: Follow) -> Moves:
     try:
         again = follow(read(text, program.path, program.dialect)).moves
-    except SourceError as error:
+    except NcfixError as error:
         raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
-    emission, pieces = settled.emission, settled.plan.pieces
+    pieces = settled.plan.pieces
     if len(again) != len(pieces):
         raise SelfCheckError(f"the corrected program has {len(again)} motions, {len(pieces)} were written")
-    differs = _differs(again.end, emission.end)
+    return again
+
+
+def _differences(settled: Settled, again: Moves) -> Mask:
+    """(m,) pieces that the control would understand otherwise than they were meant."""
+    emission, pieces = settled.emission, settled.plan.pieces
+    differs: Mask = _differs(again.end, emission.end)
     arcs = np.flatnonzero(pieces.arc & ~pieces.kept)
     in_plane = np.where(np.abs(again.normal[arcs]) < 0.5, 1.0, np.nan)
-    differs[arcs] |= _differs(again.centre[arcs] * in_plane, emission.centre[arcs] * in_plane)
-    if differs.any():
-        piece = int(np.argmax(differs))
-        line = program.line(int(settled.moves.block[pieces.move[piece]]))
-        raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {emission.end[piece]}")
+    centres_differ = _differs(again.centre[arcs] * in_plane, emission.centre[arcs] * in_plane)
+    differs[arcs[centres_differ]] = True
+    return differs
 
 
 def _differs(found: Array, meant: Array) -> Mask:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.direction import signs
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import offsets, owners, places
+from ncfix.compensate.ragged import owners, places
 from ncfix.compensate.segments import Segments
 from ncfix.machine import Machine
 
@@ -29,32 +28,29 @@ def bends(intent: Intent, rows: Index) -> Array:
 
     The ways of all axes, each in the lengths over which it bends the error, added up. Without tool-centre-point
     control the ways are those of the commands, on arcs those of the full arc. With it the linear axes also make the way
-    that swinging the tip round takes: up to the distance of the tip from the rotary axes times the angle, and for small
-    angles, beyond the way from start to end, its square.
+    of swinging the tip round: up to the distance of the tip from the rotary axes times the angle.
     """
-    moves = intent.moves
-    length = features(intent.machine)
-    zero, one = np.zeros(len(rows)), np.ones(len(rows))
-    way = np.abs(intent.joints_at(rows, one) - intent.joints_at(rows, zero))
+    moves, machine = intent.moves, intent.machine
+    way = np.abs(moves.end[rows] - moves.start[rows])
     swung = np.flatnonzero(moves.tcp[rows])
     if swung.size:
-        angle = way[swung][:, intent.machine.rotary].sum(axis=1)
-        extra = _reach(intent, rows[swung]) * angle * np.minimum(1.0, angle)
-        way[swung[:, None], intent.columns] += extra[:, None]
+        angle = way[swung][:, machine.rotary].sum(axis=1)
+        way[swung[:, None], intent.columns] += (_reach(intent, rows[swung]) * angle)[:, None]
     arcs = np.flatnonzero(intent.segments.arc[rows])
     if arcs.size:
         way[arcs[:, None], intent.columns] += _arc_ways(intent, rows[arcs])
-    count: Array = (way / length).sum(axis=1)
+    count: Array = (way / features(machine)).sum(axis=1)
     count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
     return count
 
 
 def _reach(intent: Intent, rows: Index) -> Array:
-    """The distance of the tip from the rotary axes, roughly and from above, mm."""
-    machine = intent.machine
-    points = [np.linalg.norm(axis.point) for axis in machine.axes if axis.rotary]
-    tip = machine.tip(intent.joints_at(rows, np.ones(len(rows))), intent.lengths(rows))
-    reach: Array = np.linalg.norm(tip, axis=1) + max(points, default=0.0) + np.linalg.norm(machine.tool.point)
+    """The distance of the tip from the rotary axes with tool-centre-point control, roughly and from above, mm."""
+    machine, moves = intent.machine, intent.moves
+    points = [float(np.linalg.norm(axis.point)) for axis in machine.axes if axis.rotary]
+    fixed = max(points, default=0.0) + float(np.linalg.norm(machine.workpiece_offset))
+    tip = np.maximum(*(np.linalg.norm(end[rows][:, intent.columns], axis=1) for end in (moves.start, moves.end)))
+    reach: Array = tip + fixed + np.abs(moves.tool_length[rows])
     return reach
 
 
@@ -82,13 +78,11 @@ def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least
     """
     counts = np.clip(np.ceil(per_bend * bends(intent, rows)), least, MOST).astype(np.intp)
     fraction = even(counts)
-    if not kinked(intent.machine):
+    if not intent.kinks:
         return counts, fraction
-    owner, low, high = _stretches(intent.curved[rows], counts, fraction)
-    before, after = (intent.joints(rows[owner], real.at(rows[owner], each)) for each in (low, high))
-    stretch, share = passed(intent.machine, before, after)
-    at = low[stretch] + share * (high[stretch] - low[stretch])
-    return merged(len(rows), (owners(counts), fraction), (owner[stretch], at))
+    owner, at = _nodes(intent.curved[rows], counts, fraction)
+    q = intent.joints(rows[owner], real.at(rows[owner], at))
+    return merged(len(rows), (owners(counts), fraction), crossed(intent, owner, at, q))
 
 
 def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:
@@ -102,32 +96,34 @@ def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:
     return np.bincount(owner[new], minlength=n).astype(np.intp), fraction[new]
 
 
-def kinked(machine: Machine) -> list[tuple[int, Array]]:
-    """The axes with kinks or jumps of the error model, and where they are, ascending, mm and rad."""
-    places = [(j, machine.breakpoints(name)) for j, name in enumerate(machine.axis_names)]
-    return [(j, points) for j, points in places if len(points)]
-
-
-def passed(machine: Machine, before: Array, after: Array) -> tuple[Index, Array]:
+def passed(intent: Intent, before: Array, after: Array) -> tuple[Index, Array]:
     """Where axes going from `before` to `after` (k, n_axes) pass a kink or a jump: which motion, share of its way."""
     found = [(np.zeros(0, dtype=np.intp), np.zeros(0))]
-    for j, points in kinked(machine):
-        everywhere = _unrolled(points, before[:, j], after[:, j]) if machine.axes[j].endless else points
+    for j, points in intent.kinks:
+        endless = intent.machine.axes[j].endless
+        everywhere = _unrolled(points, before[:, j], after[:, j]) if endless else points
         found.append(_crossings(before[:, j], after[:, j], everywhere))
     return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
-def _stretches(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array, Array]:
-    """Stretches of motions over which axes move nearly linearly: owner, first and last fraction.
+def crossed(intent: Intent, owner: Index, fraction: Array, q: Array) -> tuple[Index, Array]:
+    """Where axes pass a kink or a jump on motions given by axis positions q (k, n_axes) at nodes, flat.
 
-    Between samples; motions that are not curved are taken in one.
+    Axes move nearly linearly from node to node. Returns owner and fraction, flat.
     """
-    pieces = np.where(curved, counts + 1, 1)
-    owner, place = owners(pieces), places(pieces)
-    at = offsets(counts)[:-1][owner] + place
-    low = np.where(place == 0, 0.0, fraction[np.maximum(at - 1, 0)])
-    high = np.where(place == pieces[owner] - 1, 1.0, fraction[np.minimum(at, len(fraction) - 1)])
-    return owner, low, high
+    stretch, share = passed(intent, q[:-1], q[1:])
+    inside = owner[stretch] == owner[stretch + 1]
+    stretch, share = stretch[inside], share[inside]
+    return owner[stretch], (1 - share) * fraction[stretch] + share * fraction[stretch + 1]
+
+
+def _nodes(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array]:
+    """Samples and both ends of curved motions, the ends only of others: owner and fraction, flat."""
+    inner = curved[owners(counts)]
+    each = np.arange(len(counts))
+    lists = [(owners(counts)[inner], fraction[inner]), (each, np.zeros(len(each))), (each, np.ones(len(each)))]
+    many, at = merged(len(counts), *lists)
+    return owners(many), at
 
 
 def _unrolled(points: Array, before: Array, after: Array) -> Array:
@@ -156,12 +152,12 @@ def reversals(intent: Intent, rows: Index, counts: Index, fraction: Array) -> tu
         return np.zeros(0, dtype=np.intp), np.zeros(0)
     member = np.isin(owners(counts), bent)
     owner, at = owners(counts)[member], fraction[member]
-    way = signs(intent.velocity(rows[owner], at))
+    way = intent.heading(rows[owner], at)
     turns = (way[1:] * way[:-1] < 0) & (owner[1:] == owner[:-1])[:, None]
     place, axis = np.nonzero(turns)
     low, high, before = at[place], at[place + 1], way[place, axis]
     for _ in range(BISECTIONS if place.size else 0):
         middle = (low + high) / 2
-        now = signs(intent.velocity(rows[owner[place]], middle))[np.arange(len(place)), axis]
+        now = intent.heading(rows[owner[place]], middle)[np.arange(len(place)), axis]
         low, high = np.where(now == before, middle, low), np.where(now == before, high, middle)
     return owner[place], (low + high) / 2

@@ -12,13 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.account import Reason
+from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Closure
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.path import Plan, plan
+from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine
-from ncfix.program.emit import PINNED, Emission, closure_of_refusals, emit
+from ncfix.program.emit import PINNED, Emission, Reading, closure_of_refusals, emit
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.tree import Program
 
@@ -42,8 +44,10 @@ class Settled:
     reasons: dict[int, Reason]
 
 
-def settle(program: Program, moves: Moves, machine: Machine, options: FixOptions) -> Settled:
-    """Plan and write until both agree."""
+def settle(
+    program: Program, moves: Moves, machine: Machine, options: FixOptions, reading: Reading | None = None
+) -> Settled:
+    """Plan and write until both agree. `reading` is what the control made of an earlier attempt."""
     kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL))
     reasons = _by_rule(moves)
     while True:
@@ -51,14 +55,19 @@ def settle(program: Program, moves: Moves, machine: Machine, options: FixOptions
         _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
         planned = _planned(program, moves, machine, options, kept)
+        against = findings(machine, moves, planned.pieces, planned.start)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
+        for finding in against:
+            refused[finding.moves] = True
         if refused.any():
-            _explain_findings(reasons, planned, moves, refused)
+            _explain_findings(reasons, (*against, *planned.findings), moves, refused)
             kept |= refused
             continue
-        emission = emit(program, moves, planned.pieces, increments(machine))
+        emission = emit(program, moves, planned.pieces, increments(machine), reading)
         if not emission.conflicts:
             return Settled(moves, planned, emission, kept, reasons)
+        if emission.conflicts.keys() <= reasons.keys():
+            raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(reasons, [block], CODE_OF_TEXT, why)
 
@@ -88,7 +97,7 @@ def _planned(program: Program, moves: Moves, machine: Machine, options: FixOptio
     )
 
 
-def _first_rows(planned: Plan, n: int) -> Array:
+def _first_rows(planned: Plan, n: int) -> Index:
     return np.searchsorted(planned.pieces.move, np.arange(n))
 
 
@@ -104,8 +113,8 @@ def _explain(reasons: dict[int, Reason], blocks: list[int], code: str, text: str
         reasons.setdefault(block, Reason(code, text))
 
 
-def _explain_findings(reasons: dict[int, Reason], planned: Plan, moves: Moves, refused: Mask) -> None:
-    for finding in planned.findings:
+def _explain_findings(reasons: dict[int, Reason], found: tuple[Finding, ...], moves: Moves, refused: Mask) -> None:
+    for finding in found:
         for k, row in enumerate(finding.moves.tolist()):
             if refused[row]:
                 _explain(reasons, [int(moves.block[row])], finding.code, finding.sentence(k))

@@ -17,7 +17,7 @@ from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.ragged import batches, owners
-from ncfix.compensate.sampling import MOST, bends, even, kinked, merged, passed
+from ncfix.compensate.sampling import MOST, bends, even, merged, passed
 from ncfix.compensate.steer import rows_of
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
@@ -116,7 +116,8 @@ def samples(written: Written, which: Index, density: float = DENSITY, least: int
 def _counts(written: Written, which: Index, density: float, least: int) -> Index:
     """Samples inside each piece, ends left out; none where only the end is looked at."""
     move = written.pieces.move[which]
-    motions, place = np.unique(move, return_inverse=True)
+    motions = np.unique(move)
+    place = np.searchsorted(motions, move)
     wished = np.ceil(density * bends(written.intent, motions)[place] * written.span[which])
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
@@ -131,10 +132,10 @@ def _places(written: Written, which: Index, counts: Index, uneasy: Mask) -> tupl
     lists = [(owners(counts), inner), (each, np.ones(len(which)))]
     begun = np.flatnonzero(written.opens[which] & uneasy[written.pieces.move[which]] & (counts > 0))
     lists.append((begun, np.full(len(begun), START)))
-    if kinked(written.intent.machine):
+    if written.intent.kinks:
         long = np.flatnonzero(counts)
         ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
-        on, share = passed(written.intent.machine, *ends)
+        on, share = passed(written.intent, *ends)
         lists.append((long[on], share))
     many, fraction = merged(len(which), *lists)
     return which[owners(many)], fraction
@@ -165,7 +166,8 @@ def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
 def _way(written: Written, piece: Index) -> Array:
     """The part of the way that each sample stands for, mm: its piece's chord shared out, or arc length."""
     segments = written.segments
-    _, place, counts = np.unique(piece, return_inverse=True, return_counts=True)
+    first = np.flatnonzero(np.diff(piece, prepend=-1))
+    counts = np.diff(first, append=len(piece))
     chord = (segments.end - segments.start)[piece][:, ~written.intent.machine.rotary]
     way = np.linalg.norm(np.nan_to_num(chord), axis=1)
     on_arc = np.flatnonzero(segments.arc[piece])
@@ -174,7 +176,7 @@ def _way(written: Written, piece: Index) -> Array:
         spoke = segments.start[arc[:, None], segments.columns] - segments.centre[arc]
         radius = np.linalg.norm(np.cross(segments.normal[arc], spoke), axis=1)
         way[on_arc] = np.hypot(way[on_arc], radius * np.abs(segments.sweep[arc]))
-    share: Array = way / counts[place]
+    share: Array = way / np.repeat(counts, counts)
     return share
 
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ncfix.program.frames import FrameMap
 from ncfix.program.layout import Layout, has_free_text, layout_of
-from ncfix.program.moves import FeedMode, Kind, Moves, Rule
+from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
-from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.writer import Edit
 
@@ -50,22 +50,54 @@ class Emission:
     added_blocks: int
 
 
-def emit(program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray) -> Emission:
-    """Write `pieces` into the program. `least_increment` (n_axes,) mm and rad: what the control can resolve."""
-    return _Emitter(program, moves, pieces, least_increment).run()
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a control made of an earlier attempt, one row per motion of the original.
+
+    A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
+
+    frame, frames  (n,) index into `frames`: the frame in which each motion is really read
+    end            (n, n_axes) where motions that are kept really end
+    """
+
+    frame: NDArray[np.int32]
+    frames: tuple[Frame, ...]
+    end: FloatArray
+
+    @classmethod
+    def of(cls, moves: Moves, pieces: Pieces | None = None) -> Reading:
+        """A reading of motions as they are, or of those that were written as `pieces` (same rows)."""
+        last = np.arange(len(moves)) if pieces is None else _last_pieces(pieces)
+        return cls(moves.frame[last], moves.frames, moves.end[last])
+
+
+def emit(
+    program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray, reading: Reading | None = None
+) -> Emission:
+    """Write `pieces` into the program.
+
+    least_increment  (n_axes,) mm and rad: what the control can resolve
+    reading          what a control made of an earlier attempt, if it was not what was meant
+    """
+    return _Emitter(program, moves, pieces, least_increment, reading or Reading.of(moves)).run()
 
 
 class _Emitter:
     """The walk over the motions; `run()` is called once."""
 
-    def __init__(self, program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray) -> None:
+    def __init__(
+        self, program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray, reading: Reading
+    ) -> None:
         self.program = program
         self.moves = moves
         self.pieces = pieces
-        self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
+        self.reading = reading
+        self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
+        self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
         self.first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
         self.jumps = _jumps(moves)
+        self.moved = moves.moved
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.eol = _line_end(program.source)
@@ -112,20 +144,26 @@ class _Emitter:
 
     def _keep(self, row: int) -> None:
         moves = self.moves
-        moved = moves.programmed[row] | (moves.end[row] != moves.start[row])
-        increment = moves.end[row] - moves.start[row]
-        target = self.position + increment if moves.incremental[row] else moves.end[row]
-        self.position = np.where(moved, target, self.position)
+        moved = self.moved[row]
+        self.position = np.where(moved, self._kept_end(row), self.position)
         self.end[self.first_piece[row]] = self.position
         if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
             return
         self._check_code(row)
         self._set_modal(row, int(moves.modal[row]))
 
+    def _kept_end(self, row: int) -> FloatArray:
+        moves = self.moves
+        end: FloatArray = self.reading.end[row]
+        if moves.incremental[row] and moves.rule[row] != Rule.PASS:
+            end = self.position + (moves.end[row] - moves.start[row])
+        return end
+
     def _check_code(self, row: int) -> None:
         block = int(self.moves.block[row])
         layout = self._layout(block)
-        lost = self.modal not in (-1, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
+        code = int(self.moves.modal[row])
+        lost = code in STRAIGHT_AND_ARCS and self.modal not in (-1, code) and (layout is None or layout.motion is None)
         if lost and self.modal_block not in self.conflicts:
             self.conflicts[self.modal_block] = MODE_LOST
 
@@ -146,7 +184,7 @@ class _Emitter:
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
         rendered = BlockRenderer(self.program, block, layout, target).render()
-        frame = self.frames[self.moves.frame[row]]
+        frame = self.frames[self.reading.frame[row]]
         self.end[rows] = frame.command(np.array(rendered.ends))
         if rendered.centre is not None:
             self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
@@ -163,10 +201,11 @@ class _Emitter:
 
     def _target(self, row: int, rows: slice) -> Target:
         moves, pieces = self.moves, self.pieces
-        frame = self.frames[moves.frame[row]]
+        frame = self.frames[self.reading.frame[row]]
+        as_programmed = self.nominal_frames[moves.frame[row]]
         start = frame.program(self.position.copy())
-        nominal_start = frame.program(moves.start[row].copy())
-        nominal = frame.program(moves.end[row].copy())
+        nominal_start = as_programmed.program(moves.start[row].copy())
+        nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
         is_cycle = moves.kind[row] == Kind.CYCLE
         modal = int(moves.modal[row])
@@ -174,15 +213,15 @@ class _Emitter:
         fractions = pieces.fraction[rows]
         return Target(
             letters=moves.axes,
-            decimals=self.decimals[moves.frame[row]],
+            decimals=self.decimals[self.reading.frame[row]],
             start=start,
             nominal=nominal,
             original=nominal - nominal_start if moves.incremental[row] else nominal,
             ends=frame.program(pieces.end[rows].copy()),
             arc=arc,
             centre=frame.program_point(pieces.centre[rows.start], moves.axes),
-            original_centre=frame.program_point(moves.centre[row], moves.axes),
-            origin=_spatial(frame.program(moves.start[row].copy()), moves.axes, frame),
+            original_centre=as_programmed.program_point(moves.centre[row], moves.axes),
+            origin=_spatial(nominal_start, moves.axes, as_programmed),
             plane=_plane(frame.frame.rotation.T @ moves.normal[row]) if moves.kind[row] == Kind.ARC else (0, 1, 2),
             spatial=self.spatial,
             diameter=frame.frame.diameter,
@@ -231,6 +270,11 @@ def _plane(normal: FloatArray) -> tuple[int, int, int]:
 
 def _decimals(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
     return np.array([decimals_for(step) for step in least_increment / frame.scale], dtype=np.int64)
+
+
+def _last_pieces(pieces: Pieces) -> NDArray[np.intp]:
+    """(n,) index of the last piece of each motion."""
+    return np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
 
 
 def _jumps(moves: Moves) -> NDArray[np.bool_]:

@@ -121,6 +121,13 @@ class Moves:
     def __len__(self) -> int:
         return len(self.block)
 
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
+        all_axes = (self.rule == Rule.PASS) & (self.kind != Kind.DWELL) & ~self.programmed.any(axis=1)
+        moved: NDArray[np.bool_] = self.programmed | (self.end != self.start) | all_axes[:, None]
+        return moved
+
 
 @dataclass(frozen=True, slots=True)
 class Trace:

@@ -19,6 +19,8 @@ from ncfix.program.tree import Constant, Literal, Program, Word
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
+STRAIGHT_AND_ARCS = (0, 10, 20, 30)
+"""Motion codes, in tenths, that may be stated anew: G0 to G3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +146,8 @@ class BlockRenderer:
 
     def _motion_code(self) -> None:
         wanted, word = self.target.code, self.layout.motion
+        if wanted not in STRAIGHT_AND_ARCS:
+            return
         if word is not None:
             if round(self._value(word, np.nan) * 10) != wanted:
                 self._rewrite(word, wanted / 10, 0)
@@ -168,8 +172,9 @@ class BlockRenderer:
         centre = target.centre.copy()
         word = self.layout.radius
         if word is not None:
-            if self._keep_radius(word, start, end):
-                self.out.centre = centre
+            meant = self._centre_by_radius(word, start, end)
+            if meant is not None:
+                self.out.centre = meant
                 return
             self._remove(word)
         base = np.zeros(3) if target.centre_absolute else self._xyz(start)
@@ -196,19 +201,23 @@ class BlockRenderer:
             original = 0.0
         return float(base + original)
 
-    def _keep_radius(self, word: Word, start: FloatArray, end: FloatArray) -> bool:
-        """Whether the radius as written still puts the centre within an output step of where it belongs."""
+    def _centre_by_radius(self, word: Word, start: FloatArray, end: FloatArray) -> FloatArray | None:
+        """The centre that the radius as written means, if that is within an output step of where it belongs."""
         plane = list(self.target.plane[:2])
         radius = abs(self._value(word, np.nan))
         begin, finish, wanted = self._xyz(start)[plane], self._xyz(end)[plane], self.target.centre[plane]
         chord = finish - begin
         half_chord = float(np.hypot(*chord)) / 2
         if not radius > half_chord > 0:
-            return False
+            return None
         rise = np.sqrt(radius**2 - half_chord**2) * np.array([-chord[1], chord[0]]) / (2 * half_chord)
-        middle = (begin + finish) / 2
-        distance = min(float(np.hypot(*(middle + side * rise - wanted))) for side in (1, -1))
-        return bool(distance <= 2 * self.half[self.target.spatial[plane[0]]])
+        sides = [(begin + finish) / 2 + side * rise for side in (1, -1)]
+        nearest = min(sides, key=lambda centre: float(np.hypot(*(centre - wanted))))
+        if float(np.hypot(*(nearest - wanted))) > 2 * self.half[self.target.spatial[plane[0]]]:
+            return None
+        centre = self.target.centre.copy()
+        centre[plane] = nearest
+        return centre
 
     def _xyz(self, position: FloatArray) -> FloatArray:
         """X Y Z of a position in the numbers in which centres are meant."""

@@ -27,9 +27,10 @@ def insertion(program: Program, text: str) -> Edit:
     comment = program.dialect.comment.format(text.replace("(", "[").replace(")", "]"))
     before = 0
     for block in program:
-        if not _is_head(program, block):
+        if _is_head(program, block):
+            before = block + 1
+        elif not _is_blank(program, block):
             break
-        before = block + 1
     eol = b"\r\n" if b"\r\n" in program.source else b"\n"
     line = comment.encode("latin-1", "replace")
     if before == 0:
@@ -49,6 +50,10 @@ def _is_head(program: Program, block: int) -> bool:
         for item in items
     )
     return head and not all(isinstance(item, Comment) for item in items)
+
+
+def _is_blank(program: Program, block: int) -> bool:
+    return all(isinstance(item, Comment) for item in program.items_of(block))
 
 
 def _is_number(item: object) -> bool:
