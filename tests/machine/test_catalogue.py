@@ -67,3 +67,14 @@ def test_components_that_are_said_to_do_nothing_do_nothing() -> None:
 
 def test_every_code_is_explained() -> None:
     assert all(code.title and len(code.text) > 30 and code.hint for code in CODES.values())
+
+
+def test_a_skewed_axis_has_motions_that_are_neither_axial_nor_radial() -> None:
+    skewed = Axis("B", True, True, (0.0, -(0.5**0.5), 0.5**0.5))
+    assert catalogue.title("EXB", skewed) == "radial motion of B in X"
+    assert catalogue.title("EYB", skewed) == "motion of B in Y"
+
+
+def test_the_axis_says_what_the_letter_does_not() -> None:
+    assert catalogue.title("EZB", Axis("B", True, True, (0.0, 0.0, 1.0))) == "axial motion of B in Z"
+    assert catalogue.title("EXW", Axis("W", True, True, (0.0, 0.0, 1.0))) == "radial motion of W in X"

@@ -142,8 +142,8 @@ def _depends_on(effect: Effect) -> list[str]:
 def _title(machine: Machine, effect: Effect) -> str:
     from ncfix.machine import catalogue
 
-    rotary = {axis.name: axis.rotary for axis in machine.axes}
-    return catalogue.title(effect.name, rotary.get(effect.joint))
+    axes = {axis.name: axis for axis in machine.axes}
+    return catalogue.title(effect.name, axes.get(effect.joint))
 
 
 def _vector(vector: tuple[float, float, float]) -> str:

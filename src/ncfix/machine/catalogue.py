@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from ncfix.machine.axis import Axis
 from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
+
+SKEWED = 0.01
+"""Cosine, or one minus it, from which an axis counts as skewed."""
 
 LINEAR = "XYZ"
 TURNS_ABOUT = dict(zip("ABC", LINEAR, strict=True))
@@ -11,10 +15,10 @@ IDLE = "no effect unless carried"
 """Said of what leaves an axis line in itself."""
 
 
-def title(name: str, rotary: bool | None = None) -> str:
+def title(name: str, axis: Axis | None = None) -> str:
     """What an ISO 230-1 component is, e.g. "straightness of X in Y".
 
-    `rotary` says of what kind the axis is; by default it goes by the letter: X Y Z U V W linear, others rotary.
+    Without the axis it goes by the letter: X Y Z U V W are linear, others rotary, and A B C turn about X Y Z.
     """
     match = NAME.fullmatch(name)
     if match is None:
@@ -22,10 +26,10 @@ def title(name: str, rotary: bool | None = None) -> str:
     component, zero, joint = match.groups()
     if joint == SPINDLE:
         return _spindle(component, bool(zero))
-    turns = rotary if rotary is not None else joint not in "XYZUVW"
+    turns = axis.rotary if axis else joint not in "XYZUVW"
     if zero:
         return _location(component, joint, turns)
-    return _rotary_motion(component, joint) if turns else _linear_motion(component, joint)
+    return _rotary_motion(component, joint, axis) if turns else _linear_motion(component, joint)
 
 
 def names(joints: str = "XYZABC" + SPINDLE) -> tuple[str, ...]:
@@ -60,13 +64,21 @@ def _linear_motion(component: str, joint: str) -> str:
     return f"tilt of {joint} about {TURNS_ABOUT[component]}"
 
 
-def _rotary_motion(component: str, joint: str) -> str:
-    about = TURNS_ABOUT.get(joint)
+def _rotary_motion(component: str, joint: str, axis: Axis | None) -> str:
     if component == joint:
         return f"angular positioning of {joint}"
     if component in LINEAR:
-        return f"{'axial' if component == about else 'radial'} motion of {joint} in {component}"
+        return f"{_sense(component, joint, axis)}motion of {joint} in {component}"
     return f"tilt of {joint} about {TURNS_ABOUT[component]}"
+
+
+def _sense(component: str, joint: str, axis: Axis | None) -> str:
+    """Whether a direction is that of the axis line or across it; neither for a skewed axis."""
+    if axis is None:
+        return "axial " if component == TURNS_ABOUT.get(joint) else "radial "
+    pairs = zip(axis.error_axes[LINEAR.index(component)], axis.direction, strict=True)
+    along = abs(sum(a * b for a, b in pairs))
+    return "axial " if along > 1 - SKEWED else "radial " if along < SKEWED else ""
 
 
 def _location(component: str, joint: str, rotary: bool) -> str:
