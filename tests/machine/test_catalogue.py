@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from machine import chains
-from ncfix.machine import Effect, catalogue
+from ncfix.machine import Axis, Effect, catalogue
 from ncfix.machine.codes import CODES
 
 
