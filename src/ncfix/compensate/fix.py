@@ -8,29 +8,27 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.following import Resolve, placed, rotary_names, with_tool_lengths
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import proven
 from ncfix.compensate.settle import Settled, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
 from ncfix.program import stamp
 from ncfix.program.emit import Reading
-from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
 from ncfix.program.writer import apply
-
-Resolve = Callable[[str], bytes | None]
 
 __all__ = ["FixOptions", "Fixed", "fix_program"]
 
@@ -63,19 +61,19 @@ def fix_program(
     _refuse_stamped(program, options)
     if machine.is_perfect:
         return _untouched(program)
-    placed = _placed(machine, setup)
+    on_machine = placed(machine, setup)
 
     def follow(source: Program) -> Trace:
-        return trace(source, setup, machine.axis_names, _rotary_names(machine), resolve)
+        return trace(source, setup, machine.axis_names, rotary_names(machine), resolve)
 
-    followed = _with_tool_lengths(program, follow(program), placed, setup)
+    followed = with_tool_lengths(program, follow(program), machine, setup)
 
     def attempt(reading: Reading | None) -> tuple[Settled, bytes]:
-        settled = settle(program, followed.moves, placed, options, reading)
+        settled = settle(program, followed.moves, on_machine, options, reading)
         return settled, _written(program, settled, machine, options, followed)
 
     proof = proven(program, attempt, follow)
-    errors = _errors(placed, proof.settled) if options.verify else None
+    errors = _errors(on_machine, proof.settled) if options.verify else None
     report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
     return Fixed(proof.text, proof.text != program.source, report)
 
@@ -85,48 +83,6 @@ def _refuse_stamped(program: Program, options: FixOptions) -> None:
     if block is not None and not options.force:
         text = "the program has been corrected already; correcting it again would put the error back in"
         raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
-
-
-def _placed(machine: Machine, setup: Setup) -> Machine:
-    """The machine with the workpiece where the setup has it."""
-    x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
-    return machine.replace(workpiece_offset=(x, y, z))
-
-
-def _rotary_names(machine: Machine) -> frozenset[str]:
-    return frozenset(axis.name for axis in machine.axes if axis.rotary)
-
-
-def _with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup: Setup) -> Trace:
-    """The trace with every tool length known.
-
-    Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
-    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero.
-    """
-    moves = followed.moves
-    unknown = np.isnan(moves.tool_length)
-    known = replace(followed, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
-    unknown &= moves.rule == Rule.CORRECT
-    if not machine.depends_on_tool_length or not unknown.any():
-        return known
-    tools, rows = np.unique(np.where(unknown, moves.tool, -1), return_index=True)
-    first = {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
-    if not setup.assume_zero:
-        raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
-    notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
-    assumed = (*followed.assumed, *(f"length of tool {tool}" for tool in first))
-    return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
-
-
-def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message:
-    text = f"the length of tool {tool} is needed and not given: the errors of this machine depend on it"
-    hint = f"--tool {tool}=LENGTH, or `{tool} = {{ length = ... }}` under [tools] in the setup file, or --assume-zero"
-    return Message("NCF431", text, program.place(int(moves.block[row])), hint)
-
-
-def _tool_assumed(program: Program, moves: Moves, tool: int, row: int) -> Message:
-    text = f"the length of tool {tool} is not given and was taken as zero"
-    return Message("NCF437", text, program.place(int(moves.block[row])), f"--tool {tool}=LENGTH")
 
 
 def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
