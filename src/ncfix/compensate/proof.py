@@ -81,5 +81,5 @@ def _differences(settled: Settled, again: Moves) -> Mask:
 
 
 def _differs(found: Array, meant: Array) -> Mask:
-    same: Mask = np.isclose(found, meant, rtol=0, atol=SAME, equal_nan=True).all(axis=1)
+    same: Mask = np.asarray(np.isclose(found, meant, rtol=0, atol=SAME, equal_nan=True).all(axis=1))
     return ~same

@@ -105,6 +105,7 @@ class _Emitter:
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.modal = -1
         self.modal_block = -1
+        self.cycle_end: FloatArray | None = None
         self.written: dict[int, Rendered] = {}
         self.conflicts: dict[int, str] = {}
         self.end = pieces.end.copy()
@@ -121,7 +122,10 @@ class _Emitter:
             else:
                 self._write(row)
             if self.moves.kind[row] == Kind.CYCLE:
+                self.cycle_end = self.position
                 self._retract(row)
+            elif self.moves.kind[row] != Kind.DWELL:
+                self.cycle_end = None
         edits, added = self._edits()
         return Emission(edits, self.end, self.centre, self.start, self.conflicts, added)
 
@@ -188,22 +192,26 @@ class _Emitter:
         self.end[rows] = frame.command(np.array(rendered.ends))
         if rendered.centre is not None:
             self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
-        self.position = self._stay_where_unmoved(self.end[rows.stop - 1], np.array(rendered.ends)[-1], target)
+        self.position = self._stay_where_unmoved(
+            self.end[rows.stop - 1], np.array(rendered.ends)[-1], target, self._before(row)
+        )
         self.end[rows.stop - 1] = self.position
         self._set_modal(row, target.code)
         earlier = self.written.setdefault(block, rendered)
         if earlier is not rendered and earlier.text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
 
-    def _stay_where_unmoved(self, command: FloatArray, program: FloatArray, target: Target) -> FloatArray:
+    def _stay_where_unmoved(
+        self, command: FloatArray, program: FloatArray, target: Target, before: FloatArray
+    ) -> FloatArray:
         """An axis that was not told to move stands exactly where it stood, free of the rounding of the frame maps."""
-        return np.where(program == target.start, self.position, command)
+        return np.where(program == target.start, before, command)
 
     def _target(self, row: int, rows: slice) -> Target:
         moves, pieces = self.moves, self.pieces
         frame = self.frames[self.reading.frame[row]]
         as_programmed = self.nominal_frames[moves.frame[row]]
-        start = frame.program(self.position.copy())
+        start = frame.program(self._before(row).copy())
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
@@ -232,6 +240,12 @@ class _Emitter:
             code=modal if arc else straight,
             active_code=modal if self.modal == -1 else self.modal,
         )
+
+    def _before(self, row: int) -> FloatArray:
+        """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
+        if self.moves.kind[row] == Kind.CYCLE and self.cycle_end is not None:
+            return self.cycle_end
+        return self.position
 
     def _layout(self, block: int) -> Layout | None:
         if block not in self.layouts:

@@ -1,0 +1,156 @@
+"""Corrected motions written back: what changes in the text, and what must not."""
+
+import numpy as np
+import pytest
+
+from ncfix.program.emit import SEVERAL_STATES, closure_of_refusals, emit
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.pieces import Pieces
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+from ncfix.program.trace import trace
+from ncfix.program.writer import apply
+
+AXES = ("X", "Y", "Z")
+STEP = np.full(3, 0.001)
+
+
+def traced(text: str) -> tuple:
+    program = read(text.encode("latin-1"), "test.ngc", "linuxcnc")
+    return program, trace(program, Setup(assume_zero=True), AXES, frozenset()).moves
+
+
+def whole(moves: Moves, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> Pieces:
+    """One piece per motion, all ends and centres shifted alike."""
+    arc = moves.kind == Kind.ARC
+    n = len(moves)
+    keep = np.zeros(n, dtype=bool) if kept is None else kept
+    return Pieces(np.arange(n), np.ones(n), moves.end + np.array(shift), arc, moves.centre + np.array(shift), keep)
+
+
+def rewritten(text: str, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> str:
+    program, moves = traced(text)
+    emission = emit(program, moves, whole(moves, shift, kept), STEP)
+    assert not emission.conflicts
+    return apply(program.source, emission.edits).decode("latin-1")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G0 X1 Y2. Z-.5\nG1 X1.000 F100\nM2\n",
+        "g1x+1.y2f100\r\n(a comment)\r\nG91 G1 X-0.5\r\nM2",
+        "G20 G1 X1 F10\nG2 X2 Y1 I1 J0\nG3 X3 Y2 R1\nM2\n",
+        "#1=5\nG1 X#1 Y[#1*2] F100\nM2\n",
+        "G93 G1 X1 F2\nG1 X2 F3\nM2\n",
+        "G81 X1 Y2 Z-3 R1 F100\nX2\nG80\nM2\n",
+        "G53 G0 Z0\nG1 X1 F100\nM2\n",
+    ],
+)
+def test_without_correction_nothing_changes(text: str):
+    assert rewritten(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        # every word keeps its style; a missing axis is added behind the last one
+        ("N5 G1 X10. Y20 F100 (go)\nM2\n", "N5 G1 X10.01 Y19.98 Z0.005 F100 (go)\nM2\n"),
+        ("g1x10.y20f100\nM2\n", "g1x10.01y19.98z0.005f100\nM2\n"),
+        # the second block need not say again what has not moved since
+        ("G1 X1 Y1 Z1 F9\nX2\nM2\n", "G1 X1.01 Y0.98 Z1.005 F9\nX2.01\nM2\n"),
+        # increments from emitted positions: the constant part is taken up once
+        ("G91 G1 X1. F9\nX1.\nM2\n", "G91 G1 X1.01 Y-0.020 Z0.005 F9\nX1.\nM2\n"),
+        # an expression gives way to a number
+        ("#1=3\nG1 X[#1+1] Y0 Z0 F9\nM2\n", "#1=3\nG1 X4.01 Y-0.02 Z0.005 F9\nM2\n"),
+        # inches: digits as the least increment needs them
+        ("G20 G1 X1. F9\nM2\n", "G20 G1 X1.00039 Y-0.00079 Z0.00020 F9\nM2\n"),
+        # arcs: incremental centres stay, the start has moved with everything else
+        ("G1 X0 Y0 Z0 F9\nG2 X2 Y0 I1 J0\nM2\n", "G1 X0.01 Y-0.02 Z0.005 F9\nG2 X2.01 Y-0.02 I1 J0\nM2\n"),
+        ("G1 X0 Y0 Z0 F9\nG2 X1 Y1 R1.\nM2\n", "G1 X0.01 Y-0.02 Z0.005 F9\nG2 X1.01 Y0.98 R1.\nM2\n"),
+    ],
+)
+def test_a_constant_shift(text: str, expected: str):
+    assert rewritten(text, (0.01, -0.02, 0.005)) == expected
+
+
+def test_half_a_step_is_the_threshold():
+    assert rewritten("G1 X1.000 Y0 Z0 F9\nM2\n", (0.00049, 0, 0)) == "G1 X1.000 Y0 Z0 F9\nM2\n"
+    assert rewritten("G1 X1.000 Y0 Z0 F9\nM2\n", (0.00051, 0, 0)) == "G1 X1.001 Y0 Z0 F9\nM2\n"
+
+
+def test_rounding_of_increments_is_carried():
+    """A correction of a third of a step per block: 300 blocks end within half a step of where they should."""
+    n = 300
+    program, moves = traced("G91 G1 F100 X0 Y0 Z0\n" + "X1.\n" * n + "M2\n")
+    pieces = whole(moves)
+    pieces.end[:, 0] += np.arange(len(moves)) * STEP[0] / 3
+    emission = emit(program, moves, pieces, STEP)
+    assert np.abs(emission.end - pieces.end).max() <= STEP[0] / 2 + 1e-9
+    text = apply(program.source, emission.edits).decode()
+    words = [float(line[1:]) for line in text.splitlines() if line.startswith("X")]
+    assert abs(sum(words) - pieces.end[-1, 0]) <= STEP[0] / 2 + 1e-9
+
+
+def split(moves: Moves, row: int, fraction: float) -> Pieces:
+    whole_pieces = whole(moves)
+    middle = moves.start[row] + fraction * (moves.end[row] - moves.start[row])
+    arc = whole_pieces.arc.copy()
+    arc[row] = False
+    return Pieces(
+        np.insert(whole_pieces.move, row, row),
+        np.insert(whole_pieces.fraction, row, fraction),
+        np.insert(moves.end, row, middle, axis=0),
+        np.insert(arc, row, False),
+        np.insert(whole_pieces.centre, row, np.nan, axis=0),
+        np.insert(whole_pieces.kept, row, False),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "row", "expected"),
+    [
+        ("G0 X0 Y0 Z0\nG1 X10. F9 S1000 M3\nM2\n", 1, "G0 X0 Y0 Z0\nG1 X4. F9 S1000 M3\nX10.000\nM2\n"),
+        ("G0 X0 Y0 Z0\n/G1 X10. F9 M1\nM2\n", 1, "G0 X0 Y0 Z0\n/G1 X4. F9\n/X10.000 M1\nM2\n"),
+        ("G0 X0 Y0 Z0\nG93\nG1 X10. F2.\nM2\n", 1, "G0 X0 Y0 Z0\nG93\nG1 X4. F5.\nX10.000 F3.333\nM2\n"),
+        ("G0 X0 Y0 Z0\nG91 G1 X10. F9\r\nX1.\nM2\n", 1, "G0 X0 Y0 Z0\nG91 G1 X4. F9\nX6.000\r\nX1.\nM2\n"),
+    ],
+)
+def test_words_of_a_split_block_go_to_the_right_piece(text: str, row: int, expected: str):
+    program, moves = traced(text)
+    emission = emit(program, moves, split(moves, row, 0.4), STEP)
+    assert apply(program.source, emission.edits).decode() == expected.replace(
+        "\r\n", "\n" if "\r" not in text else "\r\n"
+    )
+
+
+def test_an_arc_made_of_lines_states_the_codes_around_it():
+    program, moves = traced("G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\nX4 I1 J0\nM2\n")
+    emission = emit(program, moves, split(moves, 1, 0.5), STEP)
+    text = apply(program.source, emission.edits).decode()
+    assert text.splitlines()[1:4] == ["G1 X1 Y0 F9", "X2.000", "G2 X4 I1 J0"]
+
+
+def test_a_loop_that_needs_different_corrections_is_a_conflict():
+    program, moves = traced("G1 X0 Y0 Z0 F9\nG91\no1 repeat [3]\nG1 X1\no1 endrepeat\nM2\n")
+    pieces = whole(moves)
+    pieces.end[:, 0] += np.array([0.0, 0.01, 0.03, 0.06])
+    emission = emit(program, moves, pieces, STEP)
+    assert emission.conflicts == {3: SEVERAL_STATES}
+
+
+def test_a_loop_whose_corrections_agree_is_written():
+    text = "G1 X0 Y0 Z0 F9\no1 repeat [3]\nG1 X1\nX0\no1 endrepeat\nM2\n"
+    program, moves = traced(text)
+    emission = emit(program, moves, whole(moves, (0.01, 0, 0)), STEP)
+    assert not emission.conflicts
+    assert apply(program.source, emission.edits).decode().splitlines()[2:4] == ["G1 X1.01", "X0.01"]
+
+
+def test_a_kept_arc_pins_what_comes_before_it():
+    _, moves = traced("G1 X0 Y0 Z0 F9\nG1 X5\nX1 Y1\nG2 X2 Y0 I1 J0\nM2\n")
+    kept = np.array([False, False, False, True])
+    closed, added = closure_of_refusals(moves, kept)
+    # Z is not named by the motion before the arc, nor by the one before that: back to the one that names all axes
+    assert closed.tolist() == [True, True, True, True]
+    assert sorted(added) == [0, 1, 2]
