@@ -32,8 +32,8 @@ from ncfix.compensate.steer import rows_of
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 
-INSTANT, WHILE = 1e-8, 1e-3
-"""Fractions of a motion over which it is looked at which way its axes go: first the short one, then the long one."""
+INSTANT, WHILE = 1e-4, 1e-3
+"""Fractions of a motion over which it is looked at which way its axes go: around an instant, and for a while before."""
 NOISE = 1e-11
 """mm or rad; what axis positions may differ by for rounding of the arithmetic."""
 
@@ -124,9 +124,9 @@ class Intent:
 
         0 where an axis has not moved for a thousandth of the motion.
         """
-        q = self.joints_at(rows, fraction)
-        now = signs(q - self.joints_at(rows, np.maximum(fraction - INSTANT, 0.0)), NOISE)
-        lately = signs(q - self.joints_at(rows, np.maximum(fraction - WHILE, 0.0)), NOISE)
+        after = self.joints_at(rows, np.minimum(fraction + INSTANT / 2, 1.0))
+        now = signs(after - self.joints_at(rows, np.maximum(fraction - INSTANT / 2, 0.0)), NOISE)
+        lately = signs(after - self.joints_at(rows, np.maximum(fraction - WHILE, 0.0)), NOISE)
         return np.where(now != 0, now, lately)
 
     def direction(self, rows: Index, fraction: Array) -> Signs:
