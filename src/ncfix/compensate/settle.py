@@ -24,6 +24,7 @@ from ncfix.program.emit import PINNED, Emission, Reading, closure_of_refusals, e
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.tree import Program
 
+RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
 
@@ -103,6 +104,8 @@ def _first_rows(planned: Plan, n: int) -> Index:
 
 def _by_rule(moves: Moves) -> dict[int, Reason]:
     reasons: dict[int, Reason] = {}
+    relative = (moves.kind == Kind.CYCLE) & moves.incremental & (moves.rule == Rule.CORRECT)
+    _explain(reasons, moves.block[relative].tolist(), CODE_OF_RULE, RELATIVE_CYCLE)
     for row in np.flatnonzero(moves.rule == Rule.REFUSE):
         _explain(reasons, [int(moves.block[row])], CODE_OF_RULE, moves.reasons[moves.reason[row]])
     return reasons

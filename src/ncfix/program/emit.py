@@ -57,18 +57,20 @@ class Reading:
     A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
 
     frame, frames  (n,) index into `frames`: the frame in which each motion is really read
-    end            (n, n_axes) where motions that are kept really end
+    start, end     (n, n_axes) where motions that are kept really start and end; None before any attempt
     """
 
     frame: NDArray[np.int32]
     frames: tuple[Frame, ...]
-    end: FloatArray
+    start: FloatArray | None = None
+    end: FloatArray | None = None
 
     @classmethod
-    def of(cls, moves: Moves, pieces: Pieces | None = None) -> Reading:
-        """A reading of motions as they are, or of those that were written as `pieces` (same rows)."""
-        last = np.arange(len(moves)) if pieces is None else _last_pieces(pieces)
-        return cls(moves.frame[last], moves.frames, moves.end[last])
+    def of(cls, moves: Moves, pieces: Pieces) -> Reading:
+        """From the motions that were read where `pieces` were written (same rows)."""
+        last = _last_pieces(pieces)
+        first = np.append(0, last[:-1] + 1)
+        return cls(moves.frame[last], moves.frames, moves.start[first], moves.end[last])
 
 
 def emit(
@@ -79,7 +81,7 @@ def emit(
     least_increment  (n_axes,) mm and rad: what the control can resolve
     reading          what a control made of an earlier attempt, if it was not what was meant
     """
-    return _Emitter(program, moves, pieces, least_increment, reading or Reading.of(moves)).run()
+    return _Emitter(program, moves, pieces, least_increment, reading or Reading(moves.frame, moves.frames)).run()
 
 
 class _Emitter:
@@ -135,7 +137,8 @@ class _Emitter:
         """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
         jump = self.jumps[row]
         if jump.any():
-            self.position[jump] = self.moves.start[row][jump]
+            read = self.moves.start if self.reading.start is None else self.reading.start
+            self.position = np.where(jump, read[row], self.position)
 
     def _retract(self, row: int) -> None:
         """After a canned cycle the control stands where it started along the axes along which it went back."""
@@ -158,10 +161,11 @@ class _Emitter:
 
     def _kept_end(self, row: int) -> FloatArray:
         moves = self.moves
-        end: FloatArray = self.reading.end[row]
+        if self.reading.end is not None:
+            return np.asarray(self.reading.end[row])
         if moves.incremental[row] and moves.rule[row] != Rule.PASS:
-            end = self.position + (moves.end[row] - moves.start[row])
-        return end
+            return np.asarray(self.position + (moves.end[row] - moves.start[row]))
+        return np.asarray(moves.end[row])
 
     def _check_code(self, row: int) -> None:
         block = int(self.moves.block[row])
