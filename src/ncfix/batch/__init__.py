@@ -1,0 +1,1 @@
+"""Many programs: who does the work, what is done, and how to go on after a stop."""

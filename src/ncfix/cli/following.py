@@ -43,8 +43,11 @@ class Following:
 
     def trace(self, program: Program, path: str) -> Trace:
         """The motions of a program."""
+        from ncfix.compensate.following import traced
         from ncfix.program.trace import trace
 
+        if self.machine is not None:
+            return traced(program, self.machine, self.setup, subprograms(path))
         return trace(program, self.setup, *self._axes(program), subprograms(path))
 
     def checked(self, program: Program, path: str) -> Checked:

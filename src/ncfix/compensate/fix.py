@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal
-from ncfix.compensate.following import Resolve, placed, rotary_names, with_tool_lengths
+from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import proven
 from ncfix.compensate.settle import Settled, settle
@@ -26,7 +26,6 @@ from ncfix.program import stamp
 from ncfix.program.emit import Reading
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
 from ncfix.program.tree import Program
 from ncfix.program.writer import apply
 
@@ -64,7 +63,7 @@ def fix_program(
     on_machine = placed(machine, setup)
 
     def follow(source: Program) -> Trace:
-        return trace(source, setup, machine.axis_names, rotary_names(machine), resolve)
+        return traced(source, machine, setup, resolve)
 
     followed = with_tool_lengths(program, follow(program), machine, setup)
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
@@ -35,8 +36,30 @@ def follow(program: Program, machine: Machine, setup: Setup, resolve: Resolve | 
     Raises SourceError for what cannot be followed, UsageError for what is used and not given: NCF431 for the lengths of
     tools, where the errors of the machine depend on them.
     """
-    found = trace(program, setup, machine.axis_names, rotary_names(machine), resolve)
+    found = traced(program, machine, setup, resolve)
     return Followed(placed(machine, setup), with_tool_lengths(program, found, machine, setup))
+
+
+def traced(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Trace:
+    """The motions of a program on a machine; tool lengths that are not given are NaN. Raises what `trace` raises."""
+    names, rotary = machine.axis_names, rotary_names(machine)
+    return trace(program, setup, names, rotary, resolve, kinematics=kinematics_of(machine))
+
+
+def kinematics_of(machine: Machine) -> Kinematics | None:
+    """How commands with and without tool-centre-point control say the same position; None without X, Y and Z."""
+    if not {"X", "Y", "Z"} <= set(machine.axis_names):
+        return None
+
+    def convert(command: Sequence[float], before: TcpState, after: TcpState) -> Sequence[float]:
+        row = np.array([command], dtype=np.float64)
+        q = joints_from_commands(machine, row, np.array([before.on]), np.array([before.tool_length]))
+        result: list[float] = commands_from_joints(machine, q, np.array([after.on]), np.array([after.tool_length]))[
+            0
+        ].tolist()
+        return result
+
+    return convert
 
 
 def placed(machine: Machine, setup: Setup) -> Machine:

@@ -1,0 +1,1 @@
+"""Where model and measurement disagree, and which effect is missing."""

@@ -8,6 +8,7 @@ make axis positions of that, this floor does not.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -46,6 +47,23 @@ class FeedMode(IntEnum):
     PER_MINUTE = 94
     INVERSE_TIME = 93
     PER_REVOLUTION = 95
+
+
+@dataclass(frozen=True, slots=True)
+class TcpState:
+    """Whether tool-centre-point control is on, and the length of the tool that the control knows of, mm."""
+
+    on: bool
+    tool_length: float
+
+    @property
+    def shift(self) -> float:
+        """How far a command along Z is from the axis position while all rotary axes stand at zero, mm."""
+        return self.tool_length if self.on else 0.0
+
+
+Kinematics = Callable[[Sequence[float], TcpState, TcpState], Sequence[float]]
+"""A machine's own: a command (one number per axis) as it is under one state, said as it is under another."""
 
 
 @dataclass(frozen=True, slots=True)

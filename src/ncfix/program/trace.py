@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from ncfix.diagnostics import UsageError
 from ncfix.program import stamp
-from ncfix.program.moves import Trace
+from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.coordinates import LETTERS
 from ncfix.program.rs274.interpreter import MAX_BLOCKS, Interpreter
@@ -23,11 +23,14 @@ def trace(
     rotary: frozenset[str],
     resolve: Callable[[str], bytes | None] | None = None,
     max_blocks: int = MAX_BLOCKS,
+    kinematics: Kinematics | None = None,
 ) -> Trace:
     """The motions of a program, in commands in mm and rad with all offsets in, in the order of execution.
 
     `axes` are the machine's axis letters, the columns of the motions; `rotary` those of them that turn. `resolve` gives
     the text of a subprogram file by its name (`foo` for `o<foo> call`, `100` for `M98 P100`), None if there is none.
+    `kinematics` is the machine's; without it, where axes stand after tool-centre-point control goes on or off is known
+    only while the rotary axes stand at zero.
 
     Raises SourceError NCF2xx at the first block at which the control would stop, UsageError with everything that the
     program uses and the setup does not give, and with every axis that the program moves and the machine lacks.
@@ -35,7 +38,7 @@ def trace(
     strangers = [axis for axis in axes if axis not in LETTERS]
     if strangers:
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
-    control = Control(setup, axes, rotary, program.dialect)
+    control = Control(setup, axes, rotary, program.dialect, kinematics)
     Interpreter(control, program, resolve, max_blocks).run()
     lacking = (*control.foreign.values(), *control.knowledge.missing.values())
     if lacking:

@@ -1,0 +1,1 @@
+"""Results as pages and plots; nothing is computed here."""

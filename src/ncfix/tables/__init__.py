@@ -1,0 +1,1 @@
+"""Tables that controls understand, made from a machine and read back."""

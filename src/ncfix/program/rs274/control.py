@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
-from ncfix.program.moves import Kind, Rule
+from ncfix.program.moves import Kind, Kinematics, Rule
 from ncfix.program.rs274.builder import Arc, Builder, Style
 from ncfix.program.rs274.coordinates import (
     DEGREE,
@@ -84,8 +84,16 @@ class Control:
     saved      the modal states that M70 saved, one place for each call level
     """
 
-    def __init__(self, setup: Setup, axes: tuple[str, ...], rotary: frozenset[str], dialect: Dialect) -> None:
+    def __init__(
+        self,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        dialect: Dialect,
+        kinematics: Kinematics | None = None,
+    ) -> None:
         self.setup = setup
+        self.kinematics = kinematics
         self.dialect = dialect
         self.rules: Rules = LINUXCNC if dialect.semantics == "linuxcnc" else ISO
         self.machine = tuple(INDEX[axis] for axis in axes)
