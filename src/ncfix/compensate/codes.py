@@ -99,4 +99,33 @@ CODES = {
         "Check that both files belong together, and that the machine, its setup and the tool are those of the "
         "correction.",
     ),
+    "NCF430": Code(
+        "the program has been corrected already",
+        "It carries the stamp that `ncfix fix` puts into what it writes. Correcting it again would correct the "
+        "corrections: the error would be back, with the opposite sign.",
+        "Fix the original program. `--force` corrects it all the same.",
+    ),
+    "NCF431": Code(
+        "a tool length is needed and not given",
+        "The machine has angular errors, and what they do at the tip depends on how long the tool is.",
+        "`--tool 12=120.0`, [tools] in the setup file, `--tool-table FILE`, or `--assume-zero`.",
+    ),
+    "NCF432": Code(
+        "a motion that is not corrected",
+        "Its path or its end is not known from the program, or it is of a kind that a correction of its words would not "
+        "put right (splines, threads, turning cycles, positions that are known only at run time). The block is left as it "
+        "was.",
+        "Have the CAM system write lines and arcs there, or accept it with `--allow-refused`.",
+    ),
+    "NCF433": Code(
+        "a block that cannot be written once for all",
+        "The block is executed several times from different places and needs another correction each time, or it has to "
+        "stay as it is because a refused block depends on it.",
+        "Write the loop out, or accept it with `--allow-refused`.",
+    ),
+    "NCF437": Code(
+        "a tool length was taken as zero",
+        "`--assume-zero` was given, and the length of this tool is used and not known.",
+        "`--tool 12=120.0` gives it.",
+    ),
 }
