@@ -70,6 +70,12 @@ class Intent:
         return np.asarray((self.moves.kind == Kind.ARC) | self.moves.tcp, dtype=bool)
 
     @cached_property
+    def moving(self) -> Mask:
+        """Motions that are to move anything, (n,); others only take up what the machine is off where they begin."""
+        way = signs(self.moves.end - self.moves.start).any(axis=1)
+        return np.asarray(way | (self.moves.kind == Kind.ARC), dtype=bool)
+
+    @cached_property
     def kinks(self) -> list[tuple[int, Array]]:
         """The axes (columns) with kinks or jumps of the error model, and where these are, ascending, mm and rad."""
         machine = self.machine

@@ -58,12 +58,14 @@ def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tupl
 
 def solve(maps: Array, tips: Array) -> Array:
     """The linear motion that moves the tip by `tips` (n, 3): maps (n or 1, 3, 3) -> (n, 3) mm of X, Y, Z."""
-    return np.asarray(np.linalg.solve(maps, tips[..., None])[..., 0], dtype=np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.linalg.solve(maps, tips[..., None])[..., 0], dtype=np.float64)
 
 
 def regular(maps: Array) -> tuple[Array, Mask]:
     """The maps with those that cannot be inverted replaced by the identity, and which can (n or 1,)."""
-    fine = np.asarray(~(np.abs(np.linalg.det(maps)) < FLAT))
+    with np.errstate(invalid="ignore"):
+        fine = np.asarray(~(np.abs(np.linalg.det(maps)) < FLAT))
     usable: Array = maps if fine.all() else np.where(fine[:, None, None], maps, np.eye(3))
     return usable, fine
 

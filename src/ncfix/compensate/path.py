@@ -116,7 +116,7 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, strategy: 
         return deviation
     kind = intent.moves.kind
     followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
-    followed &= ~kept & np.isfinite(real.start).all(axis=1)
+    followed &= ~kept & intent.moving & np.isfinite(real.start).all(axis=1)
     rows = np.flatnonzero(followed & ~broken)
     deviation[rows] = deviations(intent, real, rows, uneasy_starts(intent, kept), demands.budget.path)
     deviation[followed & broken] = np.inf

@@ -121,6 +121,7 @@ def _counts(written: Written, which: Index, density: float, least: int) -> Index
     wished = np.ceil(density * bends(written.intent, motions)[place] * written.span[which])
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
+    along &= written.intent.moving[move]
     along &= np.isfinite(written.segments.start[which]).all(axis=1) & np.isfinite(written.start[move]).all(axis=1)
     along &= np.isfinite(written.intent.moves.start[move]).all(axis=1)
     return np.where(along, np.clip(np.nan_to_num(wished), least, MOST), 0).astype(np.intp)

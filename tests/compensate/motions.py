@@ -1,0 +1,193 @@
+"""Motions by code, as a tracer would give them, and a control and a machine of the tests' own to judge plans by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.compensate.assembly import Plan
+from ncfix.machine import Machine, State
+from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
+
+
+@dataclass(frozen=True)
+class Arc:
+    """An arc from where the motion before ended: about `centre`, in the plane across `normal`, rising by `rise`."""
+
+    centre: Sequence[float]
+    normal: Sequence[float]
+    sweep: float
+    rise: float = 0.0
+    turn: Sequence[float] = ()
+
+
+def motions(
+    machine: Machine,
+    start: Sequence[float],
+    steps: Sequence[Sequence[float] | Arc],
+    kinds: Sequence[Kind] | Kind = Kind.FEED,
+    tcp: bool = False,
+    tool_length: float = 100.0,
+) -> Moves:
+    """Motions one after another: straight ones to command positions, or arcs. Angles in rad."""
+    n, width = len(steps), len(machine.axes)
+    xyz = [machine.axis_names.index(name) for name in "XYZ"]
+    starts, ends = np.empty((n, width)), np.empty((n, width))
+    centre, normal, sweep = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)
+    kind = np.array([kinds] * n if isinstance(kinds, Kind) else list(kinds), dtype=np.int8)
+    here = np.asarray(start, dtype=float)
+    for row, step in enumerate(steps):
+        starts[row] = here
+        if isinstance(step, Arc):
+            kind[row], sweep[row] = Kind.ARC, step.sweep
+            centre[row] = step.centre
+            normal[row] = np.asarray(step.normal) / np.linalg.norm(step.normal)
+            here = _end_of(step, here, xyz, normal[row], machine.rotary)
+        else:
+            here = np.asarray(step, dtype=float)
+        ends[row] = here
+    whole, none = np.ones(n, dtype=bool), np.zeros(n, dtype=bool)
+    return Moves(
+        axes=machine.axis_names,
+        rotary=machine.rotary,
+        start=starts,
+        end=ends,
+        programmed=np.ones((n, width), dtype=bool),
+        kind=kind,
+        rule=np.full(n, Rule.CORRECT, dtype=np.int8),
+        reason=np.zeros(n, dtype=np.int16),
+        block=np.arange(n, dtype=np.int32),
+        frame=np.zeros(n, dtype=np.int32),
+        incremental=none,
+        arc_absolute=none,
+        tcp=whole if tcp else none,
+        compensated=none,
+        tool=np.zeros(n, dtype=np.int32),
+        tool_length=np.full(n, tool_length),
+        feed=np.full(n, 1000.0),
+        feed_mode=np.full(n, FeedMode.PER_MINUTE, dtype=np.int8),
+        centre=centre,
+        normal=normal,
+        sweep=sweep,
+        modal=np.full(n, 10, dtype=np.int16),
+        frames=(Frame(np.zeros(width), np.eye(3), 1.0),),
+        reasons=("",),
+    )
+
+
+def _end_of(arc: Arc, start: np.ndarray, xyz: list[int], normal: np.ndarray, rotary: np.ndarray) -> np.ndarray:
+    end = start.copy()
+    spoke = start[xyz] - np.asarray(arc.centre)
+    along = normal * (spoke @ normal)
+    across = spoke - along
+    turned = np.cos(arc.sweep) * across + np.sin(arc.sweep) * np.cross(normal, across)
+    if abs(arc.sweep / (2 * np.pi) - round(arc.sweep / (2 * np.pi))) < 1e-12:
+        turned = across
+    end[xyz] = np.asarray(arc.centre) + along + normal * arc.rise + turned
+    if np.all(turned == across) and not arc.rise:
+        end[xyz] = start[xyz]
+    if len(arc.turn):
+        end[rotary] += arc.turn
+    return end
+
+
+def changed(moves: Moves, **columns: object) -> Moves:
+    """The motions with columns replaced."""
+    return replace(moves, **columns)
+
+
+# -- a control of our own ---------------------------------------------------------------------------------------------
+
+
+def interpolated(start: np.ndarray, end: np.ndarray, xyz: list[int], arc: dict | None, f: np.ndarray) -> np.ndarray:
+    """Commands of one block at fractions f (k,): straight, or an arc given by centre, normal and sweep."""
+    command = start + f[:, None] * (end - start)
+    if arc is None:
+        return command
+    normal, centre = arc["normal"], arc["centre"]
+    first = np.cross(normal, [0.3, 0.5, 0.7])
+    first /= np.linalg.norm(first)
+    second = np.cross(normal, first)
+    frame = np.stack([first, second, normal])
+    a, b = frame @ (start[xyz] - centre), frame @ (end[xyz] - centre)
+    angle = np.arctan2(a[1], a[0]) + f * arc["sweep"]
+    radius = np.hypot(a[0], a[1]) + f * (np.hypot(b[0], b[1]) - np.hypot(a[0], a[1]))
+    local = np.stack([radius * np.cos(angle), radius * np.sin(angle), a[2] + f * (b[2] - a[2])], axis=1)
+    command[:, xyz] = centre + local @ frame
+    return command
+
+
+def sweep_of(start: np.ndarray, end: np.ndarray, centre: np.ndarray, normal: np.ndarray, like: float) -> float:
+    """The sweep that a control works out from the ends, in the sense and with the full turns of `like`."""
+    a, b = start - centre, end - centre
+    a, b = a - normal * (a @ normal), b - normal * (b @ normal)
+    angle = np.arctan2(np.cross(a, b) @ normal, a @ b) % (2 * np.pi)
+    if like < 0:
+        angle -= 2 * np.pi
+    if np.linalg.norm(a - b) < 1e-9:
+        angle = np.copysign(2 * np.pi, like)
+    return float(angle + np.copysign(2 * np.pi, like) * max(0, round((abs(like) - abs(angle)) / (2 * np.pi))))
+
+
+def joints(machine: Machine, commands: np.ndarray, tcp: bool, length: float) -> np.ndarray:
+    """What a control makes of commands; with tool-centre-point control by solving for X Y Z numerically."""
+    if not tcp:
+        return commands
+    xyz = [machine.axis_names.index(name) for name in "XYZ"]
+    plain = commands.copy()
+    plain[:, machine.rotary] = 0.0
+    wanted = machine.tip(plain, 0.0)
+    q = commands.copy()
+    for _ in range(3):
+        gap = machine.nominal(q, length)[:, :3, 3] - wanted
+        jacobian = machine.jacobians(q, length).axes[:, :3][:, :, xyz]
+        q[:, xyz] -= np.linalg.solve(jacobian, gap[..., None])[..., 0]
+    return q
+
+
+def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, with_play: bool = False) -> np.ndarray:
+    """Tip errors along every block of a plan, (pieces, count) mm, by a loop over pieces: start left out, end included.
+
+    Pieces that only take up a jump (shorter than a millionth of the block) are left out (NaN); so are rapids.
+    with_play: the direction of each axis is that in which the program moves it, and stays while it rests.
+    """
+    xyz = [machine.axis_names.index(name) for name in "XYZ"]
+    pieces = plan.pieces
+    result = np.full((len(pieces), count), np.nan)
+    here, before, last = None, 0.0, np.zeros(len(machine.axes))
+    for k in range(len(pieces)):
+        row = int(pieces.move[k])
+        if k == 0 or pieces.move[k - 1] != row:
+            here, before = plan.start[row], 0.0
+        span = pieces.fraction[k] - before
+        length, tcp = float(moves.tool_length[row]), bool(moves.tcp[row])
+        arc = None
+        if moves.kind[row] == Kind.ARC:
+            arc = {"normal": moves.normal[row], "centre": moves.centre[row], "sweep": float(moves.sweep[row])}
+        steps = np.arange(count + 1) / count
+
+        def programmed(at: np.ndarray, row: int = row, arc: dict | None = arc) -> np.ndarray:
+            commands = interpolated(moves.start[row], moves.end[row], xyz, arc, at)
+            return joints(machine, commands, bool(moves.tcp[row]), float(moves.tool_length[row]))
+
+        meant = programmed(before + span * steps)
+        if pieces.arc[k]:
+            centre = pieces.centre[k]
+            sweep = sweep_of(here[xyz], pieces.end[k][xyz], centre, moves.normal[row], float(moves.sweep[row]))
+            arc = {"normal": moves.normal[row], "centre": centre, "sweep": sweep}
+        else:
+            arc = None
+        done = joints(machine, interpolated(here, pieces.end[k], xyz, arc, steps), tcp, length)
+        ways = 0
+        if with_play:
+            motion = np.diff(meant, axis=0)
+            ways = np.where(np.abs(motion) > 1e-10, np.sign(motion), last)
+            ways = np.concatenate([ways[:1], ways])
+            last = ways[-1] if span > 1e-6 else last
+        if span > 1e-6 and moves.kind[row] in (Kind.FEED, Kind.ARC):
+            gap = machine.actual(done, State(length, ways))[:, :3, 3] - machine.nominal(meant, length)[:, :3, 3]
+            result[k] = np.linalg.norm(gap, axis=1)[1:]
+        here, before = pieces.end[k], float(pieces.fraction[k])
+    return result

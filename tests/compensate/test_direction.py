@@ -1,0 +1,76 @@
+"""Which way each axis came: along lines, round arcs, with tool-centre-point control, and where it rests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from compensate.machines_at_random import TOPOLOGIES, perfect
+from compensate.motions import Arc, motions
+from ncfix.compensate.direction import carried, matters, signs
+from ncfix.compensate.intent import Intent
+from ncfix.machine import Effect, Machine, State
+from ncfix.machine.piecewise import Step
+from ncfix.machine.smooth import Backlash
+
+
+def with_play(topology: str) -> Machine:
+    return perfect(topology).replace(effects=(Effect("EXX", (0.01,), Backlash()),))
+
+
+def test_only_errors_that_depend_on_it_make_it_matter() -> None:
+    machine = perfect(TOPOLOGIES["three-axis"])
+    assert not matters(machine)
+    assert not matters(machine.replace(effects=(Effect("EXX", (0.0,), Backlash()),)))
+    assert not matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), Step((5.0,))),)))
+    assert matters(machine.replace(effects=(Effect("EXX", (0.0, 0.1), Step((5.0,), "positive")),)))
+    assert matters(with_play(TOPOLOGIES["three-axis"]))
+
+
+def test_the_last_direction_is_kept_at_rest_and_unknown_before_the_first() -> None:
+    motion = np.array([[0.0, 1.0], [2.0, 1e-12], [0.0, 0.0], [-0.1, np.nan], [0.0, 3.0]])
+    assert carried(signs(motion)).tolist() == [[0, 1], [1, 1], [1, 1], [-1, 1], [-1, 1]]
+
+
+def test_along_lines() -> None:
+    machine = with_play("w F X Y Z t")
+    moves = motions(machine, (0, 0, 0), [(5, 0, 0), (5, 5, 0), (2, 5, 0), (2, 5, -1)])
+    arrival = Intent(machine, moves, State()).arrival
+    assert arrival is not None
+    assert arrival.tolist() == [[1, 0, 0], [1, 1, 0], [-1, 1, 0], [-1, 1, -1]]
+
+
+def test_round_a_circle_each_axis_turns_at_its_own_place() -> None:
+    """Counter-clockwise from the right: X goes down to the left, then up; Y up, down, up."""
+    machine = with_play("w F X Y Z t")
+    moves = motions(machine, (10, 0, 0), [Arc((0, 0, 0), (0, 0, 1), 2 * np.pi)])
+    intent = Intent(machine, moves, State())
+    f = np.linspace(0.01, 0.99, 99)
+    way = intent.direction(np.zeros(99, dtype=np.intp), f)
+    assert (way[:, 0] == np.where(f < 0.5, -1, 1))[np.abs(f - 0.5) > 1e-6].all()
+    assert (way[:, 1] == np.where((f < 0.25) | (f > 0.75), 1, -1))[np.abs(f % 0.5 - 0.25) > 1e-6].all()
+    assert (way[:, 2] == 0).all()
+    arrival = intent.arrival
+    assert arrival is not None
+    assert arrival[0].tolist() == [1, 1, 0]
+
+
+def test_at_a_turning_point_it_is_the_direction_before_it() -> None:
+    """A quarter circle that ends where X turns: the axis has come to its end from below."""
+    machine = with_play("w F X Y Z t")
+    moves = motions(machine, (0, -10, 0), [Arc((0, 0, 0), (0, 0, 1), np.pi / 2), (10, 5, 0)])
+    arrival = Intent(machine, moves, State()).arrival
+    assert arrival is not None
+    assert arrival.tolist() == [[1, 1, 0], [1, 1, 0]]
+
+
+def test_with_tcp_the_axes_count_not_the_words() -> None:
+    """Only B is programmed, from -0.5 to 0.5 rad: to keep the tip, the head swings X up, Z up and down again."""
+    machine = with_play("w F X Y Z B t")
+    moves = motions(machine, (0, 0, 0, -0.5), [(0, 0, 0, 0.5)], tcp=True, tool_length=100.0)
+    intent = Intent(machine, moves, State())
+    f = np.array([0.1, 0.3, 0.7, 0.9])
+    q = intent.joints_at(np.zeros(100, dtype=np.intp), np.linspace(0, 1, 100))
+    expected = np.sign(np.diff(q, axis=0))[[10, 30, 70, 90]]
+    way = intent.direction(np.zeros(4, dtype=np.intp), f)
+    np.testing.assert_array_equal(way, expected)
+    assert set(way[:, 2].tolist()) == {-1, 1}, "the case has a reversal inside"
