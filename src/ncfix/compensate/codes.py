@@ -112,15 +112,15 @@ CODES = {
     ),
     "NCF432": Code(
         "a motion that is not corrected",
-        "Its path or its end is not known from the program, or it is of a kind that a correction of its words would not "
-        "put right (splines, threads, turning cycles, positions that are known only at run time). The block is left as it "
-        "was.",
+        "Its path or its end is not known from the program, or it is of a kind that a correction of its words would "
+        "not put right (splines, threads, turning cycles, positions that are known only at run time). The block is "
+        "left as it was.",
         "Have the CAM system write lines and arcs there, or accept it with `--allow-refused`.",
     ),
     "NCF433": Code(
         "a block that cannot be written once for all",
-        "The block is executed several times from different places and needs another correction each time, or it has to "
-        "stay as it is because a refused block depends on it.",
+        "The block is executed several times from different places and needs another correction each time, or it has "
+        "to stay as it is because a refused block depends on it.",
         "Write the loop out, or accept it with `--allow-refused`.",
     ),
     "NCF437": Code(

@@ -7,13 +7,14 @@ take turns until nothing more has to be kept; motions are only ever added to tho
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.compensate.account import Reason
 from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Closure
+from ncfix.compensate.digits import on_digits
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
@@ -25,6 +26,8 @@ from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
+ARM_CHANGE_MM = 5.0
+"""By so much the arm between a rotary axis and the tip may change along a piece without being felt."""
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
 
@@ -56,6 +59,7 @@ def settle(
         _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
         planned = _planned(program, moves, machine, options, kept)
+        planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
@@ -79,21 +83,26 @@ def increments(machine: Machine) -> Array:
     return np.where(machine.rotary, rotary, linear)
 
 
-def rounding(machine: Machine) -> float:
-    """How far the tip may be off because the linear axes' numbers are rounded: the norm of half output steps, mm."""
-    return float(0.5 * machine.least_increment[0] * np.sqrt(np.count_nonzero(~machine.rotary)))
+def rounding(machine: Machine, turns: bool = False) -> float:
+    """How far the tip may be off because numbers are rounded, mm: the norm of half output steps of the linear axes.
+
+    turns  rotary words are rewritten too: X Y Z take up their rounding where a piece ends, but in between the arm is
+           another by some mm
+    """
+    linear = 0.5 * machine.least_increment[0] * np.sqrt(np.count_nonzero(~machine.rotary))
+    return float(linear + (0.5 * machine.least_increment[1] * ARM_CHANGE_MM if turns else 0.0))
 
 
 def _planned(program: Program, moves: Moves, machine: Machine, options: FixOptions, kept: Mask) -> Plan:
-    dialect = program.dialect
+    dialect, strategy = program.dialect, get_strategy(options.strategy)
     return plan(
         machine,
         moves,
-        get_strategy(options.strategy),
+        strategy,
         options.tolerance_mm,
         Closure(dialect.closure_mm, dialect.closure_relative),
         kept,
-        rounding_mm=rounding(machine),
+        rounding_mm=rounding(machine, strategy.corrects_orientation),
         split_rapids=options.split_rapids,
     )
 

@@ -1,0 +1,54 @@
+"""Corrected rotary positions on the control's digits, and X Y Z to go with them.
+
+A rotary axis resolves 0.001 degree, say: 1.7 um at 100 mm. Rounding its word after the correction would throw the tip
+off by as much. So corrected rotary positions are put on the digits that will be written, and X Y Z are solved again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.compensate.steer import steer
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Moves
+from ncfix.program.number_style import decimals_for
+from ncfix.program.pieces import Pieces
+
+
+def on_digits(machine: Machine, moves: Moves, pieces: Pieces) -> Pieces:
+    """The pieces with rotary positions as they will be written; those that the program wrote stay as they are."""
+    rows = _newly_written(moves, pieces)
+    if not rows.size:
+        return pieces
+    move = pieces.move[rows]
+    commands = pieces.end[rows].copy()
+    offset = np.array([frame.offset for frame in moves.frames])[moves.frame[move]][:, moves.rotary]
+    commands[:, moves.rotary] = offset + _rounded(commands[:, moves.rotary] - offset, machine)
+    intent = Intent(machine, moves, State())
+    fraction = pieces.fraction[rows]
+    q, arrived = steer(
+        machine, intent.joints(move, commands), intent.tip(move, fraction), intent.states(move, fraction)
+    )
+    end = pieces.end.copy()
+    solved = commands_from_joints(machine, q, moves.tcp[move], moves.tool_length[move])
+    end[rows[arrived]] = solved[arrived]
+    return replace(pieces, end=end)
+
+
+def _newly_written(moves: Moves, pieces: Pieces) -> Index:
+    """Straight pieces with a rotary position that the program does not have as a number of its own."""
+    turned = (pieces.end != moves.end[pieces.move])[:, moves.rotary].any(axis=1)
+    rows: Index = np.flatnonzero(turned & ~pieces.kept & ~pieces.arc)
+    return rows
+
+
+def _rounded(angle: Array, machine: Machine) -> Array:
+    """Angles (rad) rounded to the decimals (of degrees) that the least increment needs."""
+    decimals = decimals_for(float(np.degrees(machine.least_increment[1])))
+    result: Array = np.radians(np.round(np.degrees(angle), decimals))
+    return result
