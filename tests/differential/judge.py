@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from differential import calls, paths
-from differential.canon import ARC, FEED, RAPID, Canon
+from differential.canon import ARC, FEED, RAPID, SPLINE, Canon
 from differential.errors import Machine
-from differential.segment import Fate, Segments, match
+from differential.segment import Fate, Segments, match, untouched
 
 Floats = NDArray[np.float64]
 
 FLOAT_SLACK = 1e-5
 """mm: two exact models may differ in the order of composing small rotations: (3e-5 rad)**2 times 10 m."""
 DENSE = (0.125, 0.25, 0.5, 0.75, 0.9)
+LARGEST_RADIUS = 5.0  # mm, of a cutter
 MOST_DENSE = 4000  # motions of a file that are looked at along their whole length, evenly spread
 
 
@@ -71,13 +72,19 @@ class Verdict:
         """Nothing to complain about."""
         return not self.complaints
 
-    def note(self, what: str, distance: Floats, allowed: Floats, lines: NDArray[np.int64]) -> None:
-        """Keep the worst, and complain of what is more than allowed (the first three of a kind)."""
+    def note(
+        self, what: str, distance: Floats, allowed: Floats, lines: NDArray[np.int64], excused: Floats | None = None
+    ) -> None:
+        """Keep the worst, and complain of what is more than allowed (the first three of a kind).
+
+        excused  of the allowed, what comes from a motion before that was not corrected: left out of the worst
+        """
         if not distance.size:
             return
-        at = int(np.argmax(distance))
-        if distance[at] >= self.worst.get(what, (-1.0, 0))[0]:
-            self.worst[what] = (float(distance[at]), int(lines[at]))
+        own = distance if excused is None else np.where(excused > 0, 0.0, distance)
+        at = int(np.argmax(own))
+        if own[at] >= self.worst.get(what, (-1.0, 0))[0]:
+            self.worst[what] = (float(own[at]), int(lines[at]))
         for row in np.flatnonzero(~(distance <= allowed))[:3]:
             self.complain(int(lines[row]), f"{what}: {distance[row] * 1e3:.3f} um, allowed {allowed[row] * 1e3:.3f}")
 
@@ -131,23 +138,40 @@ class _Judge:
         self.verdict.compensated = fates[Fate.COMPENSATED] + fates[Fate.CYCLE] + fates[Fate.CONTOUR]
         for k in np.flatnonzero(segments.fate == Fate.UNCHANGED):
             line = int(self.original.line[k])
-            if self.terms.passed(line):
+            if self.terms.passed(line) or self.rests(segments, k):
                 self.verdict.passed += 1
-            elif line in self.terms.refused:
+            elif (reason := self.reason(k)) is not None:
                 self.verdict.refused += 1
-                self.verdict.reasons[self.terms.refused[line]] += 1
+                self.verdict.reasons[reason] += 1
             else:
                 self.verdict.complain(line, f"left uncorrected in silence ({self.miss(segments, k):.1f} um off)")
         for k in np.flatnonzero(segments.fate == Fate.COMPENSATED):
             line = int(self.original.line[k])
-            if self.terms.passed(line) and self.moved(segments, k):
+            if self.terms.passed(line) and not untouched(self.original, self.fixed, k, segments.last[k]):
                 self.verdict.complain(line, "a motion that is passed by rule was corrected")
+
+    def rests(self, segments: Segments, k: int) -> bool:
+        """A motion word alone makes LinuxCNC call a motion to where it is."""
+        j = segments.last[k]
+        moves = (self.original.end[k] - self.original.start[k], self.fixed.end[j] - self.fixed.start[j])
+        return all(bool(np.all(np.abs(move) < 1e-9)) for move in moves)
+
+    def reason(self, k: int) -> str | None:
+        """Why a motion was refused, if it was.
+
+        A spline is told at its last block, and a turning cycle at no line of its own: they belong to a refused line
+        since the motion before.
+        """
+        line = self.original.line
+        if line[k] > 0 and self.original.kind[k] != SPLINE:
+            return self.terms.refused.get(int(line[k]))
+        known = line[: k + 1][(line[: k + 1] > 0) & (np.arange(k + 1) < k)]
+        first = int(known[-1]) if known.size else 0
+        last = next((int(each) for each in line[k:] if each > 0), first)
+        return next((self.terms.refused[each] for each in range(first, last + 1) if each in self.terms.refused), None)
 
     def miss(self, segments: Segments, k: int) -> float:
         return float(np.abs(self.seen[segments.last[k]] - self.original.end[k])[:3].max()) * 1e3
-
-    def moved(self, segments: Segments, k: int) -> bool:
-        return bool(np.any(np.abs(self.fixed.end[segments.last[k]] - self.original.end[k]) > 1e-6 + self.printed))
 
     # -- ends ---------------------------------------------------------------------------------------------------------
 
@@ -187,12 +211,11 @@ class _Judge:
 
     def fractions(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """On the original motion, the fractions at which each piece begins and ends; they must grow."""
+        begins, ends = pieces == segments.first[of], pieces == segments.last[of]
         leaving = paths.fraction_of(self.original, of, self.seen[pieces], np.zeros(len(of)))
-        for _ in range(3 if np.any(np.abs(self.original.turns[of]) > 1) else 1):
-            before = np.where(pieces == segments.first[of], 0.0, np.roll(leaving, 1))
-            leaving = paths.fraction_of(self.original, of, self.seen[pieces], before)
-            leaving[pieces == segments.last[of]] = 1.0
-        entering = np.where(pieces == segments.first[of], 0.0, np.roll(leaving, 1))
+        leaving += paths.turns_before(self.original, of, leaving, begins)
+        leaving[ends] = 1.0
+        entering = np.where(begins, 0.0, np.roll(leaving, 1))
         for row in np.flatnonzero(leaving < entering - 1e-6)[:3]:
             self.verdict.complain(int(self.original.line[of[row]]), "the pieces of this motion go back and forth")
         return entering, leaving
@@ -213,9 +236,10 @@ class _Judge:
             return self.machine.tip(paths.at(self.original, of, fraction), self.length[pieces])
 
         _, distance = paths.nearest(intended, real, guess, low, high)
-        allowed = self.terms.tolerance + np.sqrt(3) * self.half + self.entry_error(segments, pieces, of) * (1 - u)
+        excused = self.entry_error(segments, pieces, of) * (1 - u)
+        allowed = self.terms.tolerance + np.sqrt(3) * self.half + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
-        self.verdict.note(what, distance, allowed, self.original.line[of])
+        self.verdict.note(what, distance, allowed, self.original.line[of], excused)
 
     def entry_error(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> Floats:
         """How far the tip is off where a motion begins, if the one before was not corrected; it fades on the way."""
@@ -251,23 +275,34 @@ class _Judge:
             if fate == Fate.CYCLE:
                 bottom = _bottoms(self.original, rows) & ~refused
                 self.verdict.note("cycle bottoms", linear[bottom], np.full(int(bottom.sum()), self.half), lines[bottom])
-            near = self.half + self.variation(rows)
+            near = self.half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
             self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
             self.verdict.refused += int(refused.sum())
             self.verdict.compensated -= int(refused.sum())
             self.verdict.reasons.update(self.terms.refused[int(line)] for line in lines[refused])
 
     def variation(self, rows: NDArray[np.int64]) -> Floats:
-        """How much the correction differs among the motions of a block (cycle), or near them (contour)."""
-        ends = self.original.end[rows]
-        correction = self.machine.corrected(ends, _lengths(self.original, self.terms)[rows]) - ends
-        line = self.original.line[rows]
-        change = np.flatnonzero(np.diff(line)) + 1
+        """How much the correction differs over the holes of one cycle and the way to the first of them.
+
+        The height to which a cycle returns is that from which it was called.
+        """
         spread = np.zeros(len(rows))
-        for group in np.split(np.arange(len(rows)), change):
-            some = correction[group][:, self.machine.linear]
-            spread[group] = (some.max(axis=0) - some.min(axis=0)).max()
+        for group in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
+            places = np.concatenate([self.original.start[rows[group[:1]]], self.original.end[rows[group]]])
+            length = _lengths(self.original, self.terms)[rows[group[0]]]
+            some = (self.machine.corrected(places, length) - places)[:, self.machine.linear]
+            spread[group] = np.ptp(some, axis=0).max()
         return spread
+
+    def offset_change(self, rows: NDArray[np.int64]) -> Floats:
+        """What the correction changes within the largest radius round a contour, and what rounding does at a corner."""
+        places, length = self.original.end[rows], _lengths(self.original, self.terms)[rows]
+        total = np.full(len(rows), 2 * self.terms.step)
+        for axis in (0, 1):
+            shift = np.eye(9)[axis] * LARGEST_RADIUS
+            change = self.machine.corrected(places + shift, length) - self.machine.corrected(places - shift, length)
+            total += np.abs(change - 2 * shift).max(axis=1)
+        return total
 
 
 def _bottoms(canon: Canon, rows: NDArray[np.int64]) -> NDArray[np.bool_]:

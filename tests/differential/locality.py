@@ -11,7 +11,11 @@ from collections import Counter
 from collections.abc import Iterator
 
 COMMENT = re.compile(rb"\([^)\n]*\)|;[^\n]*")
-MOTION = re.compile(rb"[XYZABCUVWIJKRPF][-+]?(?:\d+\.?\d*|\.\d+)|G0*[0123](?![\d.])")
+BRACKETS = rb"\[[^][]*\]"
+for _ in range(4):
+    BRACKETS = rb"\[(?:[^][]|" + BRACKETS + rb")*\]"
+VALUE = rb"(?:[-+]?(?:\d+\.?\d*|\.\d+)|[A-Z]*" + BRACKETS + rb"|[-+]?#+(?:\d+|<[^>]*>|" + BRACKETS + rb"))"
+MOTION = re.compile(rb"[XYZABCUVWIJKRPF]" + VALUE + rb"|G0*[0123](?![\d.])")
 TOKEN = re.compile(rb"\([^)\n]*\)|;.*|[A-Z][-+]?[0-9.]+|[^ \t]")
 NUMBERED = re.compile(rb"[XYZABCUVWIJKR][-+]?[\d.\[#]")
 STAMP = b"ncfix"

@@ -55,6 +55,16 @@ def fraction_of(canon: Canon, rows: Rows, position: Floats, after: Floats) -> Fl
     return np.clip(fraction, 0.0, 1.0)
 
 
+def turns_before(canon: Canon, rows: Rows, fraction: Floats, begins: NDArray[np.bool_]) -> Floats:
+    """What to add to fractions of successive pieces of arcs of many turns, each told as if it were the first turn."""
+    falls = np.where(begins, 0, np.diff(fraction, prepend=0.0) < -1e-6)
+    total = np.cumsum(falls)
+    starts = np.maximum.accumulate(np.where(begins, np.arange(len(rows)), 0))
+    many = np.abs(canon.turns[rows]) > 1
+    turn = np.where(many, 2 * np.pi / np.maximum(np.abs(sweep(canon, rows)), 1e-9), 0.0)
+    return (total - total[starts]) * turn
+
+
 def _arc_fraction(canon: Canon, rows: Rows, position: Floats, after: Floats) -> Floats:
     first, _, normal = _arms(canon, rows)
     arm = position - canon.centre[rows]

@@ -82,14 +82,16 @@ class _Matcher:
 
     def motion(self, k: int) -> None:
         """Consume the corrected motions of one original motion."""
+        progress = np.zeros(1)
         for j in range(self.j, min(self.j + LOOKAHEAD, len(self.fixed))):
             if not self.same_kind(k, j):
                 break
             if self.arrives(k, j):
                 return self.take(k, j, Fate.COMPENSATED)
-            if j == self.j and self.unchanged(k, j):
+            if j == self.j and untouched(self.original, self.fixed, k, j):
                 return self.take(k, j, Fate.UNCHANGED)
-            if not self.on_the_way(k, j):
+            progress = self.progress(k, j, progress)
+            if np.isnan(progress[0]):
                 break
         self.complaints.append((k, self.describe(k)))
         return self.take(k, min(self.j, len(self.fixed) - 1), Fate.WRONG)
@@ -110,18 +112,12 @@ class _Matcher:
             return False
         return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= self.near))
 
-    def unchanged(self, k: int, j: int) -> bool:
-        """The command is the original's; an axis without a word, or with an increment, stays off by what it was."""
-        turn = -self.original.rotation[k]
-        off = _turned(self.fixed.end[j] - self.original.end[k], turn)
-        carried = _turned(self.fixed.start[j] - self.original.start[k], turn)
-        return bool(np.all((np.abs(off) <= 1e-6) | (np.abs(off - carried) <= 1e-6)))
-
-    def on_the_way(self, k: int, j: int) -> bool:
-        """The piece ends near the original path; unless the first one, which may be the only one of its motion."""
+    def progress(self, k: int, j: int, before: Floats) -> Floats:
+        """(1,) the fraction of the original motion that a piece ends at, NaN if it ends far from the path."""
         row, point = np.array([k]), self.seen[j][None]
-        fraction = paths.fraction_of(self.original, row, point, np.zeros(1))
-        return bool(np.all(np.abs(paths.at(self.original, row, fraction) - point) <= FAR))
+        fraction = paths.fraction_of(self.original, row, point, before)
+        near = np.all(np.abs(paths.at(self.original, row, fraction) - point) <= FAR)
+        return fraction if near else np.full(1, np.nan)
 
     def describe(self, k: int) -> str:
         j = min(self.j, len(self.fixed) - 1)
@@ -141,6 +137,14 @@ class _Matcher:
             self.complaints.append((k, f"{stop - k} motions of a block became {end - self.j}"))
         self.j = end
         return stop
+
+
+def untouched(original: Canon, fixed: Canon, k: int, j: int) -> bool:
+    """The command is the original's; an axis without a word, or with an increment, stays off by what it was."""
+    turn = -original.rotation[k]
+    off = _turned(fixed.end[j] - original.end[k], turn)
+    carried = _turned(fixed.start[j] - original.start[k], turn)
+    return bool(np.all((np.abs(off) <= 1e-6) | (np.abs(off - carried) <= 1e-6)))
 
 
 def _same_line(canon: Canon, k: int) -> int:

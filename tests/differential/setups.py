@@ -14,6 +14,7 @@ def text(controls: Controls, axes: str, start: bool = True) -> str:
     names = ("G54", "G55", "G56", "G57", "G58", "G59")
     padded = {name: [*controls.offsets.get(name, ()), *[0.0] * 6][:6] for name in names}
     lines = [f"work_offsets.{name} = {values}" for name, values in padded.items()] if start else []
+    lines += ["tools.0 = { length = 0.0 }"] if start else []
     lines += [f"tools.{n} = {{ length = {length!r}, radius = {diameter / 2!r} }}"
               for n, (length, diameter) in controls.tools.items()]  # fmt: skip
     lines += [f"references.{name} = {_by_axis(values, axes)}" for name, values in controls.references.items()]

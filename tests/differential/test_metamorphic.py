@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from differential import product
+from differential import paths, product
 from differential.canon import Canon
 from differential.errors import Machine
 from differential.judge import Terms, judge
@@ -21,7 +21,7 @@ G0 X10.5 Y5 Z20
 G1 Z-1.25 F300
 X60 Y12
 G2 X70 Y22 I10 J0
-G3 X90 Y2 I0 J-20
+G2 X90 Y2 I0 J-20
 G1 X90 Y-140
 X-31.007 Y-139.125 Z-2
 G2 X-61.007 Y-139.125 I-15 J0
@@ -127,7 +127,10 @@ def test_the_variants_are_the_same_program(rs274: Callable[..., Canon]) -> None:
     for name, change in (EXACT | NEAR).items():
         variant = rs274(change(BASE).encode())
         assert variant.accepted, f"{name}: {variant.error}"
-        np.testing.assert_allclose(variant.end, base.end, atol=1e-6, err_msg=name)
+        for half in (0.5, 1.0):
+            rows, fraction = np.arange(len(base)), np.full(len(base), half)
+            there, wanted = paths.at(variant, rows, fraction), paths.at(base, rows, fraction)
+            np.testing.assert_allclose(there, wanted, atol=1e-6, err_msg=name)
 
 
 def test_correcting_twice_is_refused(machine_file: Callable[[str], Path], tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ class Bad:
 
 ONLY_G54 = ("--offset", "G54=0,0,0")
 PROGRAMS = {
-    "an axis that the machine lacks": Bad(HEAD + b"G1 X20 A30 F100\nM2\n", product.REFUSED, "NCF", 3),
+    "an axis that the machine lacks": Bad(HEAD + b"G1 X20 A30 F100\nM2\n", product.USAGE, "NCF2", 3),
     "a binary file": Bad(bytes(range(256)) * 4, product.UNREADABLE, "NCF101", None),
     "UTF-16": Bad("G0 X1\nM2\n".encode("utf-16"), product.UNREADABLE, "NCF101", None),
     "an empty file": Bad(b"", product.UNREADABLE, "NCF102", None),
@@ -51,9 +51,8 @@ PROGRAMS = {
     "a subprogram that never ends": Bad(HEAD + b"o<a> sub\nG1 X3\nM2\n", product.UNREADABLE, "NCF", 3),
     "a loop without an end": Bad(HEAD + b"o1 while [1]\nG1 X3 F9\no1 endwhile\nM2\n", product.UNREADABLE, "NCF2", None),
     "a call of nothing": Bad(HEAD + b"o<nothing> call\nM2\n", product.UNREADABLE, "NCF2", 3),
-    "a missing work offset": Bad(HEAD + b"G55 G1 X20 F100\nM2\n", product.UNREADABLE, "NCF", None, ONLY_G54),
-    "a missing tool length": Bad(HEAD + b"T7 M6\nG43 Z5\nM2\n", product.UNREADABLE, "NCF", None, ONLY_G54),
-    "a stamp": Bad(b"(ncfix 1: already done)\n" + GOOD, product.REFUSED, "NCF", 1),
+    "a missing work offset": Bad(HEAD + b"G55 G1 X20 F100\nM2\n", product.USAGE, "NCF2", 3, ONLY_G54),
+    "a missing tool length": Bad(HEAD + b"T7 M6\nG43 Z5\nM2\n", product.USAGE, "NCF2", 4, ONLY_G54),
 }  # fmt: skip
 
 

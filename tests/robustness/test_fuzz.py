@@ -28,8 +28,8 @@ PIECES = (
 
 
 def _mutated(line: bytes, rng: random.Random) -> bytes:
-    """One to three small accidents."""
-    for _ in range(rng.randint(0, 3)):
+    """Mostly as it is; else one to three small accidents."""
+    for _ in range(rng.choice((0, 0, 0, 1, 1, 2, 3))):
         at = rng.randint(0, len(line))
         match rng.randrange(5):
             case 0:
@@ -46,10 +46,10 @@ def _mutated(line: bytes, rng: random.Random) -> bytes:
 
 
 def _programs(folder: Path, count: int, rng: random.Random) -> list[bytes]:
-    sources = [e.path for e in corpus.entries(folder) if e.dialect in ("linuxcnc", "iso", "grbl")]
+    sources = [entry.path for entry in corpus.entries(folder) if entry.accepted and entry.motions]
     lines = [line for path in rng.sample(sources, 60) for line in path.read_bytes().splitlines()[:200]]
     return [
-        HEAD + b"\n".join(_mutated(rng.choice(lines), rng) for _ in range(rng.randint(1, 8))) + b"\nM2\n"
+        HEAD + b"\n".join(_mutated(rng.choice(lines), rng) for _ in range(rng.randint(1, 6))) + b"\nM2\n"
         for _ in range(count)
     ]
 
@@ -69,9 +69,9 @@ def test_mutated_programs(
             break
         outcome = product.fix_text(source, machine_file("three"), tmp_path, "--assume-zero", "--allow-refused")
         codes[outcome.code] += 1
-        if outcome.code not in (product.DONE, product.UNREADABLE, product.REFUSED):
+        if outcome.code not in (product.DONE, product.USAGE, product.UNREADABLE, product.REFUSED):
             wrong.append(f"{source!r}\n{outcome.errors}")
-        elif outcome.text is not None and judged["asked"] < JUDGED and number % 3 == 0:
+        elif outcome.text is not None and judged["asked"] < JUDGED and number % 2 == 0:
             judged["asked"] += 1
             wrong += _judged(source, outcome, rs274, machine("three"), judged)
     with capsys.disabled():

@@ -32,7 +32,7 @@ def test_cut_after_every_line(
     for count in range(1, min(len(lines), 16)):
         source = "".join(lines[:count]).encode()
         outcome = product.fix_text(source, machine_file(case.machine), tmp_path, "--setup", setup, "--allow-refused")
-        assert outcome.code in (product.DONE, product.UNREADABLE, product.REFUSED), outcome.errors
+        assert outcome.code in (product.DONE, product.USAGE, product.UNREADABLE, product.REFUSED), outcome.errors
         assert (outcome.text is None) == (outcome.code != product.DONE)
         if outcome.text is not None and (count + len(name)) % EVERY == 0:
             _judge(case, source, outcome, rs274, model)
@@ -44,7 +44,7 @@ def test_cut_at_the_start_nothing_is_assumed(machine_file: Callable[[str], Path]
     for first in range(1, 5):
         source = "".join(lines[first:])
         outcome = product.fix_text(source, machine_file("three"), tmp_path)
-        assert outcome.code in (product.REFUSED, product.UNREADABLE), outcome.errors
+        assert outcome.code in (product.USAGE, product.REFUSED, product.UNREADABLE), outcome.errors
         assert outcome.text is None
         assert outcome.errors
 
