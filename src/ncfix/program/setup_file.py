@@ -127,8 +127,7 @@ class Reading:
         """A work offset: numbers in the order X Y Z A B C, or a table by axis letter."""
         name = key.partition(".")[2]
         if name not in SYSTEMS and not name.startswith("G54.1P"):
-            close = get_close_matches(name, SYSTEMS, 1)
-            self.fault(UNKNOWN_KEY, key, "no work offset", f"did you mean {close[0]}?" if close else "G54 ... G59.3")
+            self.fault(UNKNOWN_KEY, key, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...")
         if isinstance(value, list):
             if not 1 <= len(value) <= len(OFFSET_AXES):
                 self.fault(WRONG_VALUE, key, f"expected 1 to {len(OFFSET_AXES)} numbers, found {len(value)}")

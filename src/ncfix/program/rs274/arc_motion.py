@@ -23,7 +23,7 @@ def arc(control: Control, block: Block, code: int) -> None:
     control.modal.motion = code
     plane = control.modal.plane
     check_words(control, block, plane)
-    control.settle((plane.first, plane.second))
+    control.settle(tuple(control.unknown))
     target, unknown = destination(control, block)
     step = in_frame(control, [b - a for a, b in zip(control.position, target, strict=True)])
     end = step[plane.first], step[plane.second]

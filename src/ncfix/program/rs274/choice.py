@@ -23,8 +23,7 @@ def motion_of(control: Control, plan: Plan, codes: Codes) -> int | None:
         return None
     modal = control.modal.motion
     if has_axes and modal in (NO_MOTION, -1):
-        without_code(control, codes)
-        return None
+        return without_code(control)
     if has_axes:
         return modal
     return modal if plan.letters & {"I", "J", "K"} and modal in ARCS else None
@@ -50,9 +49,8 @@ def only_modal(control: Control, motion: int, fault: str) -> None:
     control.modal.motion = motion
 
 
-def without_code(control: Control, codes: Codes) -> None:
+def without_code(control: Control) -> int:
     """Axis words while no motion code is in force."""
     if control.rules.strict:
         raise Fault(BAD_MOTION, "axis words, and no motion code is in force", "G0 or G1 is missing")
-    if not codes.unknown:
-        control.refusal = control.refusal or NO_CODE
+    return NO_CODE

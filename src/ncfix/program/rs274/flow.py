@@ -15,7 +15,7 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.labels import BAD_FLOW, Label, Labels, short
+from ncfix.program.rs274.labels import BAD_FLOW, Label, Labels, oword
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine
 from ncfix.program.rs274.settings import restore
@@ -142,7 +142,7 @@ class FlowControl:
         name = self.name_of(flow)
         keyword = flow.keyword
         if keyword in ("sub", "program") and self.defining is not None:
-            raise Fault(BAD_FLOW, f"o{name} {keyword} stands inside the subprogram o{self.defining}")
+            raise Fault(BAD_FLOW, f"{oword(name)} {keyword} stands inside the subprogram {oword(self.defining)}")
         if self.skipping is not None and self.skipping != name:
             return
         if self.skipping_to_sub and keyword not in ("sub", "program"):
@@ -158,17 +158,19 @@ class FlowControl:
         if self.skipping is not None:
             return self.missing_end()
         if self.calls:
-            return Fault(BAD_FLOW, f"the file ends inside the subprogram o{self.calls[-1].label}", "endsub is missing")
+            return Fault(
+                BAD_FLOW, f"the file ends inside the subprogram {oword(self.calls[-1].label)}", "endsub is missing"
+            )
         return None
 
     def missing_end(self) -> Fault:
         """The fault of a text that ends while something is still looked for."""
-        label = short(self.skipping or "")
+        label = oword(self.skipping or "")
         if self.skipping_to_sub:
             hint = "subprograms are looked for further down in the program and in files beside it"
-            return Fault(NO_SUBPROGRAM, f"there is no subprogram o{label}", hint)
+            return Fault(NO_SUBPROGRAM, f"there is no subprogram {label}", hint)
         what = "endsub" if self.defining is not None else "the end"
-        return Fault(BAD_FLOW, f"the program ends and {what} of o{label} is missing")
+        return Fault(BAD_FLOW, f"the program ends and {what} of {label} is missing")
 
     # -- subprograms --------------------------------------------------------------------------------------------------
 
@@ -177,7 +179,8 @@ class FlowControl:
         by_code = bool(self.calls) and self.calls[-1].by_code
         if self.calls and self.skipping is not None and by_code != (flow.keyword == "program"):
             raise Fault(
-                BAD_FLOW, f"o{name} is called with {'M98' if by_code else 'call'} and begins with the other's form"
+                BAD_FLOW,
+                f"{oword(name)} is called with {'M98' if by_code else 'call'} and begins with the other's form",
             )
         if self.skipping is not None:
             self.enter_label(flow, name)
@@ -206,7 +209,7 @@ class FlowControl:
     def begin(self, call: Call) -> None:
         """Enter a subprogram: known already, in a file of its own, or further down."""
         if len(self.calls) + 1 >= MAX_CALLS:
-            raise Fault(TOO_DEEP, f"subprograms are nested more than {MAX_CALLS - 1} deep at o{call.label}")
+            raise Fault(TOO_DEEP, f"subprograms are nested more than {MAX_CALLS - 1} deep at {oword(call.label)}")
         self.calls.append(call)
         self.control.parameters.scopes.append(Store())
         self.control.saved.append(None)
@@ -226,12 +229,12 @@ class FlowControl:
         """`endsub` and `return`."""
         if not self.calls:
             if self.defining is None:
-                raise Fault(BAD_FLOW, f"o{name} {flow.keyword} stands outside a subprogram")
+                raise Fault(BAD_FLOW, f"{oword(name)} {flow.keyword} stands outside a subprogram")
             if flow.keyword == "endsub":
                 self.defining = self.skipping = None
             return
         if self.calls[-1].by_code:
-            raise Fault(BAD_FLOW, f"o{self.calls[-1].label} was called with M98 and has to end with M99")
+            raise Fault(BAD_FLOW, f"{oword(self.calls[-1].label)} was called with M98 and has to end with M99")
         parameters = self.control.parameters
         value = self.argument(flow) if flow.arguments else 0.0
         parameters.returned = (value, bool(flow.arguments))

@@ -22,7 +22,7 @@ from ncfix.program.rs274.plans import Codes, Plan, grouped_codes
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.rs274.wordcheck import check_words
-from ncfix.program.tree import Program, Span, Word
+from ncfix.program.tree import Constant, Program, Span, Word
 
 MAX_BLOCKS = 10_000_000
 """Blocks that are executed before a program counts as endless."""
@@ -174,13 +174,13 @@ class Interpreter:
             raise plan.fault
         block = self.evaluate(plan, index)
         codes = plan.codes or self.computed_codes(plan)
+        if codes.unknown:
+            self.unknown_codes(plan, codes)
         motion = motion_of(control, plan, codes)
         check_words(control, plan, codes, motion)
         if plan.command is not None:
             self.command(plan.command)
         self.note_foreign(plan)
-        for code in codes.unknown:
-            unknown_code(control, code)
         for step, code in codes.steps:
             step(control, block, code)
         if motion is not None:
@@ -230,6 +230,16 @@ class Interpreter:
         if parameters.touched:
             self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
         return grouped_codes(pairs, plan.letters, self.control.rules)
+
+    def unknown_codes(self, plan: Plan, codes: Codes) -> None:
+        """G codes that are not known."""
+        spans = {
+            w.value.value: w.span for w in plan.template.words if w.address == "G" and isinstance(w.value, Constant)
+        }
+        for code in codes.unknown:
+            self.span = spans.get(code / 10)
+            unknown_code(self.control, code)
+        self.span = None
 
     def note_foreign(self, plan: Plan) -> None:
         """Note axes that the program moves and the machine lacks."""

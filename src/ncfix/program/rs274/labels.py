@@ -35,17 +35,18 @@ class Labels:
         known = self.entries.setdefault(name, Label(unit, block, keyword))
         if known.block != block or known.unit is not unit:
             line = known.unit.program.line(known.block)
-            raise Fault(BAD_FLOW, f"the label o{short(name)} is used already, in line {line}")
+            raise Fault(BAD_FLOW, f"the label {oword(name)} is used already, in line {line}")
         return known
 
     def known(self, name: str, keyword: str, *openings: str) -> Label:
         """The label that a line with this keyword belongs to; raises `Fault` if it was not met as one of `openings`."""
         known = self.entries.get(name)
         if known is None or known.keyword not in openings:
-            raise Fault(BAD_FLOW, f"o{short(name)} {keyword} has no {' or '.join(openings)} before it")
+            raise Fault(BAD_FLOW, f"{oword(name)} {keyword} has no {' or '.join(openings)} before it")
         return known
 
 
-def short(name: str) -> str:
-    """A label without the subprogram that it stands in."""
-    return name.rpartition("#")[2]
+def oword(name: str) -> str:
+    """A label as it is written, without the subprogram that it stands in: `o100`, `o<name>`."""
+    label = name.rpartition("#")[2]
+    return f"o{label}" if label.isdigit() else f"o<{label}>"

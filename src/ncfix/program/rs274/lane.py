@@ -122,7 +122,7 @@ def take(control: Control, words: Words, motion: FloatArray, feed: FloatArray, b
     given = ~np.isnan(words.feed)
     if given.any():
         modal.feed, modal.feed_given = float(feeds[-1]), bool(feeds[-1] != 0.0)
-    modal.motion = int(motion[-1])
+    modal.motion = modal.straight = int(motion[-1])
     rows = np.flatnonzero(words.mask)
     if not len(rows):
         return

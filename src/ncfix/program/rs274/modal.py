@@ -32,6 +32,7 @@ class Modal:
     """What is in force. G codes in tenths.
 
     motion        motion code
+    straight      the last of G0 and G1
     plane         of arcs and cycles
     unit          mm per unit of linear words
     diameter      X words are diameters (G7)
@@ -49,6 +50,7 @@ class Modal:
     """
 
     motion: int = NO_MOTION
+    straight: int = NO_MOTION
     plane: Plane = PLANES[170]
     unit: float = 1.0
     diameter: bool = False

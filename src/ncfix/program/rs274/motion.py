@@ -18,7 +18,10 @@ PROBING = "probing"
 AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
-NO_CODE = "no motion code is in force"
+NO_CODE = -2
+"""The motion code of blocks with axis words while none is in force."""
+
+AFTER_NO_CODE = "where the axis {} stands after a motion without a code is not known"
 
 REFUSALS = {
     50: "spline (G5)",
@@ -34,7 +37,7 @@ def straight(control: Control, block: Block, code: int) -> None:
     """G0 and G1; with G53 in machine coordinates."""
     if code:
         check_feed(control, block)
-    control.modal.motion = code
+    control.modal.motion = control.modal.straight = code
     if not block.axes:
         return
     target, unknown = destination(control, block)
@@ -181,6 +184,13 @@ def turning_cycle(control: Control, block: Block, code: int) -> None:
     control.move(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal)
 
 
+def undecided(control: Control, block: Block, code: int) -> None:
+    """Axis words while no motion code is in force: what ISO controls do with them differs."""
+    target, unknown = destination(control, block)
+    moved = {index: AFTER_NO_CODE for index in control.machine if block.axes >> index & 1}
+    control.move(Kind.RAPID, block.axes, target, unknown | moved, code, refusal="no motion code is in force")
+
+
 def dwell(control: Control, block: Block, code: int) -> None:
     """G4."""
     if control.rules.strict and block.get("P", -1.0) == -1.0:
@@ -189,5 +199,5 @@ def dwell(control: Control, block: Block, code: int) -> None:
 
 
 def cancel(control: Control, block: Block, code: int) -> None:
-    """G80."""
-    control.modal.motion = code
+    """G80: no motion code is in force; on ISO controls the one before the cycle is again."""
+    control.modal.motion = code if control.rules.strict else control.modal.straight

@@ -14,6 +14,7 @@ from ncfix.program.rs274.cycles import cycle
 from ncfix.program.rs274.feeds import feed, feed_mode, speed
 from ncfix.program.rs274.lengths import change_tool, select_tool, set_data, tool_offset
 from ncfix.program.rs274.motion import (
+    NO_CODE,
     cancel,
     dwell,
     end_spline,
@@ -24,6 +25,7 @@ from ncfix.program.rs274.motion import (
     save_reference,
     straight,
     turning_cycle,
+    undecided,
 )
 from ncfix.program.rs274.settings import (
     arc_distance,
@@ -102,6 +104,7 @@ MOTIONS: Mapping[int, Step] = {
     30: arc,
     310: probe,
     800: cancel,
+    NO_CODE: undecided,
     **dict.fromkeys(groups.PROBES, probe),
     **dict.fromkeys((*groups.SPLINES, *groups.THREADS), refused),
     **dict.fromkeys(groups.TURNING_CYCLES, turning_cycle),

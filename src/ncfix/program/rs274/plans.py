@@ -13,6 +13,7 @@ from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.expressions import Evaluate, compiled
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import Rules
+from ncfix.program.rs274.modal import NO_MOTION
 from ncfix.program.rs274.order import Step, steps_of
 from ncfix.program.tree import (
     Assignment,
@@ -198,7 +199,10 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
 
 
 def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:
-    """Note a code; raises `Fault` if its group has one already (LinuxCNC: even the same one)."""
+    """Note a code; raises `Fault` if its group has one already (LinuxCNC: even the same one). G80 gives way."""
+    if group == groups.MOTION and NO_MOTION in (codes.get(group), code):
+        codes[group] = code if codes.get(group, NO_MOTION) == NO_MOTION else codes[group]
+        return
     if group in codes and (rules.strict or codes[group] != code):
         first, second = (f"{word.address}{number / 10:g}" for number in (codes[group], code))
         raise Fault(CONFLICT, f"{first} and {second} exclude one another (both set the {group})", span=word.span)

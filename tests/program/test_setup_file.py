@@ -1,0 +1,149 @@
+"""Setup files and tool tables: what they say, and everything that is wrong with them at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ncfix.diagnostics import ConfigError, ExitCode, SourceError
+from ncfix.program.setup import Setup, Tool
+from ncfix.program.setup_file import load, load_tool_table, loads
+
+FULL = """
+ncfix = 1
+work_offsets.G54 = [1, 2, 3, 10, 20, 30]
+work_offsets.G59.1 = { X = 7.5 }
+tools.12 = { length = 120.0, radius = 5 }
+tools.3 = 80.5
+workpiece_offset = [0.0, 0.0, 150]
+initial = { X = 0, z = 300.0 }
+references.G28 = { Z = 0 }
+variables."#100" = 3.0
+variables."#<depth>" = -4
+tcp = true
+assume_zero = false
+block_skip = true
+"""
+
+
+def test_everything() -> None:
+    assert loads(FULL) == Setup(
+        work_offsets={"G54": {"X": 1, "Y": 2, "Z": 3, "A": 10, "B": 20, "C": 30}, "G59.1": {"X": 7.5}},
+        tools={12: Tool(120.0, 5.0), 3: Tool(80.5, None)},
+        initial={"X": 0.0, "Z": 300.0},
+        references={"G28": {"Z": 0.0}},
+        variables={"#100": 3.0, "#<depth>": -4.0},
+        workpiece_offset=(0.0, 0.0, 150.0),
+        tcp=True,
+        assume_zero=False,
+        block_skip=True,
+    )
+
+
+def test_nothing() -> None:
+    assert loads("") == Setup()
+
+
+def test_all_faults_are_named_at_once() -> None:
+    text = """
+ncfix = 2
+work_ofsets.G54 = [0]
+work_offsets.G53 = [0]
+work_offsets.G55 = "X0"
+tools.a = 5
+tools.4 = { lenght = 1.0 }
+initial = { Q = 1 }
+workpiece_offset = [1, 2]
+references.G29 = { X = inf }
+variables.depth = 1
+tcp = 1
+"""
+    with pytest.raises(ConfigError) as caught:
+        loads(text, "part.toml")
+    assert str(caught.value) == "\n".join(
+        [
+            "part.toml: NCF383: ncfix: schema version 2, this ncfix reads 1",
+            "part.toml: NCF382: work_ofsets: unknown key",
+            "  hint: did you mean work_offsets?",
+            "part.toml: NCF382: work_offsets.G53: no work offset",
+            "  hint: they are G54 ... G59.3, and G54.1P1 ...",
+            "part.toml: NCF383: work_offsets.G55: expected a table like { X = 0.0, Z = 300.0 }",
+            "part.toml: NCF382: tools.a: no tool number",
+            "part.toml: NCF382: tools.4.lenght: unknown key",
+            "  hint: did you mean length?",
+            "part.toml: NCF382: initial.Q: no axis letter",
+            "  hint: they are X Y Z A B C U V W",
+            "part.toml: NCF383: workpiece_offset: expected three numbers [x, y, z], mm",
+            "part.toml: NCF382: references.G29: no reference point",
+            "  hint: they are G28 and G30",
+            "part.toml: NCF383: references.G29.X: expected a number, found inf",
+            "part.toml: NCF382: variables.depth: no parameter",
+            '  hint: they are written "#100" or "#<name>"',
+            "part.toml: NCF383: tcp: expected true or false, found 1",
+        ]
+    )
+    assert caught.value.exit_code == ExitCode.UNREADABLE
+
+
+def test_a_text_that_is_no_toml() -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads("work_offsets = [")
+    assert caught.value.code == "NCF381"
+
+
+def test_files(tmp_path: Path) -> None:
+    path = tmp_path / "setup.toml"
+    path.write_text(FULL, encoding="utf-8")
+    assert load(str(path)) == loads(FULL)
+    with pytest.raises(SourceError):
+        load(str(tmp_path / "none.toml"))
+
+
+# -- tool tables ------------------------------------------------------------------------------------------------------
+
+
+def table(tmp_path: Path, name: str, text: str) -> dict[int, Tool]:
+    """The tools of a table."""
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return load_tool_table(str(path))
+
+
+def test_linuxcnc_tables(tmp_path: Path) -> None:
+    text = "; my tools\nT1 P1 X0 Z+120.5 D10 ;end mill\n\nT2 P2 Z.5\nt3p3z-1.25d+0.5Q0\nT4 P9\n"
+    assert table(tmp_path, "tool.tbl", text) == {
+        1: Tool(120.5, 5.0),
+        2: Tool(0.5, None),
+        3: Tool(-1.25, 0.25),
+        4: Tool(0.0, None),
+    }
+
+
+def test_csv_tables(tmp_path: Path) -> None:
+    assert table(tmp_path, "tools.csv", "tool,length,radius\n1,100.5,5\n\n2, 80 ,2.5\n") == {
+        1: Tool(100.5, 5.0),
+        2: Tool(80.0, 2.5),
+    }
+    assert table(tmp_path, "tools.csv", "\ufeffLength,Tool,Diameter\n100.5,1,5\n") == {1: Tool(100.5, 2.5)}
+    assert table(tmp_path, "tools.csv", "tool,length\n1,100.5\n") == {1: Tool(100.5, None)}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "faults"),
+    [
+        ("t.tbl", "T1 Z1\nnonsense\nP2 Z1\nT1 Z2\n", [2, 3, 4]),
+        ("t.tbl", "; nothing\n", [0]),
+        ("t.csv", "tool,length\n1,2,3\n2,1.5x\n-1,1\n1.5,2\n", [2, 3, 4, 5]),
+        ("t.csv", "tool;length\n1;2\n", [1]),
+        ("t.csv", "tool,length,colour\n1,2,red\n", [1]),
+        ("t.csv", 'tool,length\n1,"2,5"\n', [2]),
+        ("t.csv", "tool,length\n1,\n", [2]),
+        ("t.csv", "tool,length\n1,nan\n", [2]),
+    ],
+)
+def test_wrong_lines_are_named_all_at_once(tmp_path: Path, name: str, text: str, faults: list[int]) -> None:
+    with pytest.raises(ConfigError) as caught:
+        table(tmp_path, name, text)
+    assert [message.place.line for message in caught.value.messages if message.place] == faults
+    assert {message.code for message in caught.value.messages} == {"NCF385"}

@@ -1,0 +1,230 @@
+"""What a program cannot know: it is asked for, all at once, or motions are refused; nothing is guessed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import UsageError
+from ncfix.program.moves import Rule, Trace
+from ncfix.program.setup import Setup
+from program.tracing import NOTHING, ZERO, ends, follow, reasons
+
+G54 = {"G54": ZERO}
+
+
+def lacking(text: str, axes: str = "XYZ", **given: object) -> list[tuple[str, str]]:
+    """Code and text of everything that is missing."""
+    with pytest.raises(UsageError) as caught:
+        follow(text, axes, NOTHING, **given)  # type: ignore[arg-type]
+    return [(message.code, message.text) for message in caught.value.messages]
+
+
+def rules(followed: Trace) -> list[int]:
+    return list(followed.moves.rule.tolist())
+
+
+# -- what has to be given ---------------------------------------------------------------------------------------------
+
+
+def test_everything_that_is_missing_is_named_at_once() -> None:
+    found = lacking("T4 M6\nG43\nG0 X1 Y1\nG43 H12\nG55 G0 X2\nZ5")
+    assert found == [
+        ("NCF202", "length of tool 4 is used and not given"),
+        ("NCF201", "work offset G54 is used and not given"),
+        ("NCF203", "start position of Z matters and not given"),
+        ("NCF202", "length of tool 12 is used and not given"),
+        ("NCF201", "work offset G55 is used and not given"),
+    ]
+
+
+def test_each_comes_with_its_option_and_place() -> None:
+    with pytest.raises(UsageError) as caught:
+        follow("G0 X1 Y1\nG43 H12 Z1", "XYZ", NOTHING)
+    assert str(caught.value) == "\n".join(
+        [
+            "part.ngc:1: NCF201: work offset G54 is used and not given",
+            "    G0 X1 Y1",
+            "  hint: --offset G54=x,y,z or --assume-zero",
+            "part.ngc:1: NCF203: start position of Z matters and not given",
+            "    G0 X1 Y1",
+            "  hint: --initial Z=... or --assume-zero",
+            "part.ngc:2: NCF202: length of tool 12 is used and not given",
+            "    G43 H12 Z1",
+            "  hint: --tool 12=LENGTH or --assume-zero",
+        ]
+    )
+
+
+def test_a_rapid_to_all_axes_needs_no_start_position() -> None:
+    followed = follow("G0 X1 Y2 Z3\nG1 X2 F1", "XYZ", Setup(work_offsets=G54))
+    assert rules(followed) == [Rule.CORRECT, Rule.CORRECT]
+    assert np.isnan(followed.moves.start[0]).all()
+    assert ends(followed)[0] == [1, 2, 3]
+
+
+def test_a_cut_needs_its_start_position() -> None:
+    found = lacking("F1 G1 X1 Y2 Z3", work_offsets=G54)
+    assert found == [("NCF203", f"start position of {axis} matters and not given") for axis in "XYZ"]
+    assert [text for _, text in lacking("F1 G2 X1 Y1 I1", work_offsets=G54)] == [
+        f"start position of {axis} matters and not given" for axis in "XYZ"
+    ]
+
+
+def test_increments_need_their_start_position_and_no_offset() -> None:
+    assert lacking("G91 G0 X1 Y1 Z1") == [
+        ("NCF203", f"start position of {axis} matters and not given") for axis in "XYZ"
+    ]
+    followed = follow("G91 G0 X1", "XYZ", Setup(initial={"X": 5.0, "Y": 6.0, "Z": 7.0}))
+    assert ends(followed) == [[6, 6, 7]]
+
+
+def test_machine_coordinates_need_nothing() -> None:
+    followed = follow("G53 G0 Z0\nG53 G0 X0 Y0", "XYZ", NOTHING)
+    assert rules(followed) == [Rule.PASS, Rule.PASS]
+    assert np.array_equal(followed.moves.end, [[np.nan, np.nan, 0], [0, 0, 0]], equal_nan=True)
+
+
+def test_an_offset_that_the_program_sets_is_given() -> None:
+    followed = follow("G10 L2 P1 X1 Y2 Z3\nG0 X0 Y0 Z0", "XYZ", NOTHING)
+    assert ends(followed) == [[1, 2, 3]]
+    assert lacking("G10 L2 P1 X1\nG0 X0 Y0 Z0") == [("NCF201", "work offset G54 is used and not given")]
+
+
+def test_a_parameter_that_holds_an_offset_is_asked_for() -> None:
+    assert lacking("#1=#5221") == [("NCF201", "work offset G54 is used and not given")]
+    assert lacking("#1=#5161")[0][0] == "NCF204"
+
+
+def test_a_position_that_is_read_is_asked_for() -> None:
+    assert lacking("#1=#<_z>") == [("NCF203", "start position of Z matters and not given")]
+
+
+def test_axes_that_the_machine_lacks_are_named_once() -> None:
+    with pytest.raises(UsageError) as caught:
+        follow("G0 X1 A2 Z3\nA5 B6")
+    assert [
+        (message.code, message.place.line, message.place.column) for message in caught.value.messages if message.place
+    ] == [
+        ("NCF206", 1, 7),
+        ("NCF206", 2, 4),
+    ]
+
+
+# -- assume_zero ------------------------------------------------------------------------------------------------------
+
+
+def test_what_is_assumed_is_zero_and_listed_once() -> None:
+    followed = follow("T4 M6 G43\nG0 X1 Y1\nG55 X2\nG54 X1\nG28", "XYZ", NOTHING, assume_zero=True)
+    assert followed.assumed == (
+        "length of tool 4",
+        "work offset G54",
+        "start position of Z",
+        "work offset G55",
+        "reference point G28",
+    )
+    assert [message.code for message in followed.messages] == ["NCF205"] * 5
+    assert ends(followed) == [[1, 1, 0], [2, 1, 0], [1, 1, 0], [0, 0, 0]]
+
+
+def test_nothing_is_assumed_that_is_not_used() -> None:
+    assert follow("T4 M6\nG0 X1 Y1 Z1", "XYZ", NOTHING, assume_zero=True).assumed == ("work offset G54",)
+
+
+# -- known only at run time -------------------------------------------------------------------------------------------
+
+
+def test_reference_points_that_are_not_given_leave_their_axes_unknown() -> None:
+    setup = Setup(work_offsets=G54, initial=ZERO)
+    followed = follow("G0 X1 Y1 Z1\nG28 Z5\nG0 X2\nG1 Y3 F1\nG0 Z4\nG1 X5", "XYZ", setup)
+    assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert reasons(followed)[3] == "where the axis Z stands after the reference point is approached is not given"
+    assert np.isnan(followed.moves.end[3, 2])
+    assert np.isnan(followed.moves.start[5, 2])
+
+
+def test_after_probing_only_what_is_named_anew_is_known() -> None:
+    followed = follow("F1 G38.2 Z-5\nG0 X1\nG91 G0 Z1\nG90 G0 Z5\nG1 X2")
+    assert rules(followed) == [Rule.PASS, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert reasons(followed)[:2] == ["probing", "where the axis Z stands after probing is known only at run time"]
+
+
+@pytest.mark.parametrize("setting", ["G92 Z0", "G10 L20 P1 Z0", "G10 L2 P1 Z#5063"])
+def test_an_offset_that_was_probed_is_known_only_at_run_time(setting: str) -> None:
+    followed = follow(f"F1 G38.2 Z-5\n{setting}\nG0 X1 Y1 Z5\nG1 X2")
+    assert rules(followed)[1:] == [Rule.REFUSE, Rule.REFUSE]
+    assert "offset of the axis Z is known only at run time" in reasons(followed)[1]
+
+
+def test_a_word_computed_from_a_probed_value() -> None:
+    followed = follow("F1 G38.2 Z-5\nG0 Z10\nG0 X[#5063+1]\nG0 X3")
+    assert rules(followed)[1:] == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
+    assert "run time" in reasons(followed)[2]
+
+
+def test_marks_follow_assignments_and_arguments_and_go_with_new_values() -> None:
+    text = "F1 G38.2 Z-5\nG0 Z10\n#1=#5063\n#<a>=[#1*2]\no1 sub\nG0 X#1\no1 endsub\no1 call [#<a>]\n#1=4\nG0 X#1"
+    assert rules(follow(text))[2:] == [Rule.REFUSE, Rule.CORRECT]
+
+
+def test_a_branch_that_depends_on_a_probed_value_makes_everything_after_it_uncertain() -> None:
+    followed = follow("F1 G38.2 Z-5\nG0 Z5\no1 if [#5070 eq 1]\nG0 X1\no1 endif\nG0 X2 Y2 Z2")
+    assert rules(followed) == [Rule.PASS, Rule.CORRECT, Rule.REFUSE, Rule.REFUSE]
+    assert "run time" in reasons(followed)[-1]
+
+
+def test_inputs_are_known_only_at_run_time() -> None:
+    assert rules(follow("M66 P0 L0\nG0 X#5399\nX1")) == [Rule.REFUSE, Rule.CORRECT]
+
+
+def test_a_length_that_was_measured() -> None:
+    followed = follow("F1 G38.2 Z-5\nG10 L1 P1 Z#5063\nG43 H1\nG0 X1 Y1 Z1")
+    assert rules(followed)[-1] == Rule.REFUSE
+
+
+def test_an_arc_about_a_probed_centre() -> None:
+    followed = follow("F1 G38.2 Z-5\nG0 Z5\nG2 X2 I[#5061+1]")
+    assert rules(followed)[-1] == Rule.REFUSE
+
+
+# -- codes of ISO controls --------------------------------------------------------------------------------------------
+
+
+def test_harmless_codes_are_passed_over_and_unknown_ones_make_motions_refused() -> None:
+    followed = follow("G5 P10000\nG8 P1\nG9 G1 X1 F1\nG187 P2\nM88\nX2\nG234 H1\nX3", dialect="iso")
+    assert rules(followed) == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+    assert reasons(followed)[-1] == "G234 is not known, and may move axes or change coordinates"
+    assert [message.code for message in followed.messages] == ["NCF228"]
+
+
+@pytest.mark.parametrize(
+    ("on", "off"),
+    [("G16", "G15"), ("G51 X0 Y0 P2", "G50"), ("G51.1 X0", "G50.1 X0"), ("G68.2 X0 Y0 Z0 I0 J30 K0", "G69")],
+)
+def test_coordinates_that_are_not_followed_are_refused_until_they_end(on: str, off: str) -> None:
+    followed = follow(f"G0 X1 Y1 Z1\n{on}\nG1 X2 F1\n{off}\nG0 X3 Y3 Z3\nG1 X4", dialect="iso")
+    assert rules(followed) == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert np.isnan(followed.moves.start[2]).all()
+
+
+def test_skip_signals_are_probing() -> None:
+    assert reasons(follow("G31 Z-5 F1\nG0 Z1", dialect="iso")) == ["probing", ""]
+
+
+def test_commands_to_grbl_lose_the_position() -> None:
+    followed = follow("G0 X1 Y1 Z1\n$H\nG0 X2\nG0 X1 Y1 Z1\nG1 X5 F1", dialect="iso")
+    assert rules(followed) == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+
+
+def test_axis_words_before_any_code_are_refused() -> None:
+    followed = follow("X1 Y1\nG0 X2\nY2", dialect="iso")
+    assert rules(followed) == [Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
+    assert reasons(followed)[0] == "no motion code is in force"
+
+
+def test_further_work_offsets() -> None:
+    followed = follow("G54.1 P2\nG0 X1 Y1 Z1", dialect="iso", work_offsets={"G54.1P2": {"X": 10.0}})
+    assert ends(followed) == [[11, 1, 1]]
+    with pytest.raises(UsageError) as caught:
+        follow("G54.1 P3\nG0 X1", dialect="iso")
+    assert caught.value.messages[0].text == "work offset G54.1P3 is used and not given"

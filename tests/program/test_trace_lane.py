@@ -1,0 +1,104 @@
+"""The fast lane and the steps of single blocks give the same motions, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ncfix.diagnostics import NcfixError
+from ncfix.program.moves import Moves
+from ncfix.program.rs274 import lane
+from program.tracing import KNOWN, follow
+
+ALWAYS, NEVER = 1, 10**9
+
+
+@contextmanager
+def stretches_of(shortest: int) -> Iterator[None]:
+    """Which stretches go through the fast lane."""
+    before, lane.SHORTEST = lane.SHORTEST, shortest
+    try:
+        yield
+    finally:
+        lane.SHORTEST = before
+
+
+def columns(text: str, shortest: int, dialect: str) -> dict[str, object] | str:
+    """All columns of the trace, or the error."""
+    with stretches_of(shortest):
+        try:
+            moves = follow(text, "XYZBC", KNOWN, dialect).moves
+        except NcfixError as error:
+            return str(error)
+    table = {
+        field.name: getattr(moves, field.name) for field in fields(Moves) if field.name not in ("frames", "reasons")
+    }
+    table["offsets"] = [moves.frames[index].offset.tolist() for index in moves.frame]
+    table["why"] = [moves.reasons[index] for index in moves.reason]
+    return table
+
+
+def assert_same(text: str, dialect: str = "linuxcnc") -> None:
+    one, other = columns(text, ALWAYS, dialect), columns(text, NEVER, dialect)
+    if isinstance(one, str) or isinstance(other, str):
+        assert one == other
+        return
+    for name, values in one.items():
+        if name not in ("frame", "reason"):
+            np.testing.assert_array_equal(values, other[name], err_msg=name)
+
+
+def line(random: Random) -> str:
+    """A block, most often of the kind that the lane takes."""
+    if random.random() < 0.06:
+        return random.choice(
+            ["G91", "G90", "G20", "G21", "G55", "G92 X3", "G93", "G94 F50", "G43 H1", "S5", "G10 L2 P1 R30"]
+        )
+    words = [
+        letter + f"{random.uniform(-99, 99):.{random.choice([0, 1, 3])}f}"
+        for letter in "XYZBC"
+        if random.random() < 0.5
+    ]
+    words += [f"F{random.randint(0, 500)}"] * (random.random() < 0.15)
+    words += [random.choice(["G0", "G1"])] * (random.random() < 0.4)
+    random.shuffle(words)
+    head = f"N{random.randint(1, 999)} " if random.random() < 0.3 else ""
+    return head + " ".join(words) + random.choice(["", "", " (comment)", " ; more"])
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso"]))
+def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
+    random = Random(seed)
+    head = "G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.8 else "G0 X1"
+    assert_same("\n".join([head, *(line(random) for _ in range(random.randint(1, 40)))]), dialect)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "F1 G81 X1 Z-1 R1\nX2\nX3\nX4",
+        "G2 F1 X1 I1\nX2\nX3",
+        "F1 G38.2 Z-1\nX1\nX2\nZ3\nG1 X3\nX4",
+        "G41 D1 F1\nG1 X1\nX2\nG40 X3",
+        "o1 repeat [3]\nG91 G1 F1 X1\nY1\nX-1\no1 endrepeat\nG90\nX0\nX1",
+        "G0 X1\nG0 X2 A5\nX3",
+    ],
+)
+def test_what_is_not_for_the_lane_is_left_alone(text: str) -> None:
+    assert_same(text)
+
+
+def test_the_lane_takes_what_it_should() -> None:
+    text = "G0 X0 Y0 Z0 B0 C0\n" + "\n".join(f"G1 X{i} F100" for i in range(100))
+    with stretches_of(lane.SHORTEST):
+        moves = follow(text, "XYZBC").moves
+    assert moves.end[1:, 0].tolist() == list(range(100))
+    assert np.array_equal(moves.start[1:], moves.end[:-1])

@@ -1,0 +1,175 @@
+"""Offsets of every kind, against positions worked out by hand. None of them moves the machine."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import SourceError
+from ncfix.program.setup import Tool
+from program.tracing import KNOWN, ZERO, ends, follow, last, reasons
+
+HALF = math.sqrt(0.5)
+
+
+def test_work_offsets_come_from_the_setup() -> None:
+    offsets = {"G54": {**ZERO, "X": 10.0, "B": 90.0}, "G59.3": {**ZERO, "Z": -5.0}}
+    followed = follow("G0 X1 Y1 B10\nG59.3 X1 Z1", axes="XYZB", work_offsets=offsets)
+    assert ends(followed) == [[11, 1, 0, 100], [1, 1, -4, 100]]
+
+
+def test_frames_lead_from_numbers_to_commands() -> None:
+    followed = follow("G10 L2 P1 X1 R30\nG92 X5\nG43.1 Z7\nG20\nG0 X2 Y3 Z4", axes="XYZ")
+    moves = followed.moves
+    frame = moves.frames[moves.frame[-1]]
+    program = np.array([2.0, 3.0, 4.0])
+    assert np.allclose(frame.offset + frame.rotation @ (frame.unit * program), moves.end[-1])
+    assert frame.unit == 25.4
+
+
+@pytest.mark.parametrize("code", ["G54", "G55", "G59", "G59.1", "G59.3"])
+def test_g10_l2_sets_any_system(code: str) -> None:
+    number = {"G54": 1, "G55": 2, "G59": 6, "G59.1": 7, "G59.3": 9}[code]
+    assert last(follow(f"G10 L2 P{number} X7\n{code} G0 X1"))[0] == 8.0
+
+
+def test_g10_p0_is_the_system_in_force_and_words_that_are_absent_stay() -> None:
+    assert last(follow("G55\nG10 L2 P0 X7 Y8\nG10 L2 P0 X9\nG0 X1 Y1"))[:2] == [10, 9]
+
+
+def test_g10_l20_calls_the_position_by_the_words() -> None:
+    assert ends(follow("G0 X10 Y10\nG10 L20 P1 X1\nG0 X0 Y0")) == [[10, 10, 0], [9, 0, 0]]
+    assert last(follow("G0 X10\nG10 L20 P2 X1\nG55 G0 X0"))[0] == 9.0
+
+
+def test_g10_r_turns_and_a_word_alone_keeps_the_other_axis_in_the_turned_frame() -> None:
+    followed = follow("G0 X1\nG10 L2 P1 R90\nG0 X2\nG0 Y1\nG91 X1")
+    assert np.allclose(followed.moves.end[:, :2], [[1, 0], [1, 2], [-1, 2], [-1, 3]])
+
+
+def test_g10_l20_in_a_turned_frame() -> None:
+    followed = follow("G10 L2 P1 R45\nG0 X10\nG10 L20 P1 X0 Y0\nG0 X1")
+    assert np.allclose(followed.moves.end[-1, :2], [11 * HALF, 11 * HALF])
+
+
+def test_g92_and_its_kin() -> None:
+    text = "G0 X5 Y5\nG92 X1 Y2\nG0 X0\nG92.2\nG0 X0\nG92.3\nG0 X0\nG52 X3\nX0\nG92.1\nX0"
+    assert ends(follow(text)) == [[5, 5, 0], [4, 5, 0], [0, 5, 0], [4, 5, 0], [3, 5, 0], [0, 5, 0]]
+
+
+def test_g92_shifts_all_systems() -> None:
+    assert last(follow("G0 X5\nG92 X0\nG55 G0 X1"))[0] == 6.0
+
+
+def test_g92_under_a_turned_frame_is_turned() -> None:
+    followed = follow("G10 L2 P1 R90\nG0 X10 Y0\nG92 X0\nG0 X1")
+    assert np.allclose(followed.moves.end[-1, :2], [0, 11])
+
+
+# -- tool lengths -----------------------------------------------------------------------------------------------------
+
+TOOLS = {1: Tool(100.0), 2: Tool(50.0), 3: Tool(None)}
+
+
+def test_length_offsets() -> None:
+    text = "T1 M6 G43\nG0 Z0\nG43 H2 Z0\nG43.1 Z7\nG0 Z0\nG49 Z0\nG43.2 H1\nZ0\nG43.2 H2\nZ0"
+    moves = follow(text, tools=TOOLS).moves
+    assert moves.end[:, 2].tolist() == [100, 50, 7, 0, 100, 150]
+    assert moves.tool_length.tolist()[:3] == [100, 50, 7]
+    assert moves.tool.tolist()[:2] == [1, 2]
+
+
+def test_length_offsets_move_nothing_by_themselves() -> None:
+    assert ends(follow("G0 X1 Z5\nG43 H1\nG0 X2", tools=TOOLS)) == [[1, 0, 5], [2, 0, 5]]
+
+
+def test_h0_is_the_tool_in_the_spindle_for_linuxcnc_and_none_for_others() -> None:
+    text = "T1 M6\nG43 H0\nG0 Z0"
+    assert last(follow(text, tools=TOOLS))[2] == 100.0
+    assert last(follow(text, tools=TOOLS, dialect="iso"))[2] == 0.0
+
+
+def test_g44_subtracts() -> None:
+    assert last(follow("G44 H1\nG0 Z0", tools=TOOLS, dialect="iso"))[2] == -100.0
+
+
+def test_g10_sets_lengths() -> None:
+    text = "T1 M6\nG10 L1 P1 Z10\nG43 G0 Z0\nG10 L10 P1 Z3\nG43 Z0"
+    assert [row[2] for row in ends(follow(text, tools=TOOLS))] == [10, 7]
+
+
+def test_tool_length_is_that_of_the_spindle_without_an_offset() -> None:
+    moves = follow("G0 X1\nT1 M6\nX2\nM61 Q2\nX3\nT3 M6\nX4\nT9 M6\nX5", tools=TOOLS).moves
+    assert moves.tool.tolist() == [0, 1, 2, 3, 9]
+    assert np.array_equal(moves.tool_length, [np.nan, 100, 50, np.nan, np.nan], equal_nan=True)
+
+
+# -- rotation of ISO controls -----------------------------------------------------------------------------------------
+
+
+def test_g68_turns_about_a_point_until_g69() -> None:
+    text = "G0 X10 Y0\nG68 X10 Y10 R90\nG0 X20 Y10\nG1 X20 Y20 F100\nG69\nG0 X1 Y1"
+    followed = follow(text, dialect="iso")
+    assert np.allclose(followed.moves.end[:, :2], [[10, 0], [10, 20], [0, 20], [1, 1]])
+    assert reasons(followed) == ["", "", "", ""]
+
+
+def test_g68_in_other_planes() -> None:
+    followed = follow("G18 G68 X0 Z0 R90\nG0 X0 Z1", dialect="iso")
+    assert np.allclose(followed.moves.end[-1], [1, 0, 0])
+
+
+# -- tool-centre-point control ----------------------------------------------------------------------------------------
+
+
+def test_tcp_on_and_off_while_nothing_is_turned() -> None:
+    followed = follow("G0 Z150\nG43.4 H1\nG0 Z40\nG49\nG0 X1", axes="XYZBC", tools=TOOLS, dialect="iso")
+    assert [row[2] for row in ends(followed)] == [150, 40, 140]
+    assert followed.moves.start[1, 2] == 50.0
+    assert followed.moves.tcp.tolist() == [False, True, False]
+    assert followed.moves.tool_length.tolist()[1] == 100.0
+
+
+def test_tcp_on_while_turned_leaves_the_start_unknown_and_the_end_known() -> None:
+    text = "G0 X0 Y0 Z150 B30 C0\nG43.4 H1 X1 Y2 Z3 B30 C0\nG1 X2 F100"
+    followed = follow(text, axes="XYZBC", tools=TOOLS, dialect="iso")
+    assert np.isnan(followed.moves.start[1, :3]).all()
+    assert np.allclose(ends(followed)[1:], [[1, 2, 3, 30, 0], [2, 2, 3, 30, 0]])
+    assert reasons(followed) == ["", "", ""]
+    unknown = follow("G0 X0 Y0 Z150 B30 C0\nG43.4 H1\nG1 X1 F1", axes="XYZBC", tools=TOOLS, dialect="iso")
+    assert "kinematics" in reasons(unknown)[1]
+
+
+def test_tcp_from_the_start() -> None:
+    followed = follow("T1 M6 G43\nG0 Z3", axes="XYZBC", tools=TOOLS, tcp=True)
+    assert followed.moves.tcp.all()
+    assert last(followed)[2] == 3.0
+    assert followed.moves.tool_length[0] == 100.0
+
+
+def test_tool_vectors_are_refused() -> None:
+    followed = follow("G43.5 H1\nG1 X1 I0 J0 K1 F100", axes="XYZBC", tools=TOOLS, dialect="iso")
+    assert "G43.5" in reasons(followed)[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "G10 L3 P1 X1",
+        "G10 L2 P10 X1",
+        "G10 L20 P1 R5",
+        "G10 L1 X1",
+        "G92",
+        "G52",
+        "G43.2",
+        "G43 H-1",
+        "M61",
+        "G10 L2 P1.5",
+    ],
+)
+def test_impossible_words(text: str) -> None:
+    with pytest.raises(SourceError) as caught:
+        follow(text, setup=KNOWN)
+    assert caught.value.code in ("NCF210", "NCF221", "NCF222", "NCF224")
