@@ -1,1 +1,1 @@
-"""The floor of measurements: files, instruments, calibration, plans. Empty so far."""
+"""The floor of measurements: files, instruments, calibration, plans."""

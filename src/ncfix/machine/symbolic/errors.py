@@ -75,8 +75,8 @@ def _symbol(machine: Machine, name: str) -> ErrorSymbol:
     if len({(_reference(it), it.carried) for it in same}) > 1:
         text = f"the effects {name} of this machine differ in reference or carried: one symbol cannot stand for them"
         raise UsageError.of("NCF393", text, hint="leave it out, or give them one reference point")
-    turns = {axis.name: axis.rotary for axis in machine.axes}
-    title = catalogue.title(name, turns.get(effect.joint))
+    axes = {axis.name: axis for axis in machine.axes}
+    title = catalogue.title(name, axes.get(effect.joint))
     return ErrorSymbol(
         variable=Variable(name, Size.SMALL, title, rotary=effect.rotational, arguments=_arguments(same)),
         joint=effect.joint,
