@@ -88,7 +88,8 @@ class Moves:
 
     axes         names of the columns of positions, e.g. ("X", "Y", "Z", "B", "C")
     rotary       (n_axes,) which of them are rotary
-    start, end   (n, n_axes) commands in mm and rad; NaN where not known
+    start, end   (n, n_axes) commands in mm and rad; NaN where not known. A rapid that may be corrected has a known
+                 end, but its start need not be; other motions that may be corrected have both
     programmed   (n, n_axes) True where the block has a word for the axis
     kind         (n,) `Kind`
     rule         (n,) `Rule`
