@@ -15,7 +15,7 @@ from ncfix.program.faults import BlockError, explain
 from ncfix.program.grammar import parse, squeeze
 from ncfix.program.tree import Template, Word
 
-CAPACITY = 20_000
+CAPACITY = 5_000
 """How many shapes and texts of a dialect are remembered; the one that was not used for longest goes first."""
 
 MAY_REPEAT = frozenset("GM")
