@@ -57,6 +57,14 @@ def test_words_have_addresses_values_and_places() -> None:
     assert program.values_of(0).tolist() == [10.0, -12.5, 0.5, 100.0]
 
 
+def test_polar_and_spindle_addresses_of_linuxcnc() -> None:
+    program = read(b"G1 @10 ^45.5\nM3 $1 S200\n", dialect="linuxcnc")
+    assert_read_right(program)
+    assert program.column("@")[0] == 10.0
+    assert program.column("^")[0] == 45.5
+    assert program.column("$")[1] == 1.0
+
+
 def test_the_numbers_of_g_and_m_belong_to_the_template() -> None:
     program = read(b"G38.2 Z-5 M08\nG91.1\nG1\nG01\nG#1 M[2]\n", dialect="linuxcnc")
     codes = [(template.g_codes, template.m_codes) for template in program.templates]
