@@ -13,6 +13,7 @@ import pytest
 
 from ncfix import plugins
 from ncfix.cli.main import VERBS, cli
+from ncfix.program.setup_file import loads
 
 DOCUMENTS = (
     "README.md",
@@ -103,3 +104,13 @@ def test_no_room_holds_two_ideas(root: Path) -> None:
         if (n := len(path.read_text().splitlines())) > 400
     }
     assert not long
+
+
+def test_the_setup_file_of_the_document_is_one(root: Path) -> None:
+    section = (root / "docs/formats.md").read_text().split("## Setup file")[1]
+    example = re.findall(r"```toml\n(.*?)```", section, re.DOTALL)[0]
+    setup = loads(example)
+    assert setup.work_offsets["G54"] == {"X": 0.0, "Y": 0.0, "Z": 120.0, "A": 0.0, "B": 0.0}
+    assert set(setup.work_offsets) == {"G54", "G55", "G59.1"}
+    assert setup.tools[12].radius == 5.0
+    assert set(setup.variables) == {"#100", "#<_probe_offset>"}

@@ -219,3 +219,23 @@ def test_the_shipped_five_axis_example(examples: Path, ncfix: Any, tmp_path: Pat
     assert entry["error_after_um"]["max"] <= 1.0
     verified = ncfix("verify", program, tmp_path / "blade.nc", "--setup", setup, "-m", machine, "--json")
     assert verified.code == ExitCode.DONE
+
+
+def test_the_readme_shows_what_its_first_command_does(root: Path, ncfix: Any, tmp_path: Path) -> None:
+    """The command is the one in ./try, the figures and the blocks are those in README.md."""
+    script = (root / "try").read_text().replace("\\\n", " ")
+    (command,) = re.findall(r"exec \.venv/bin/ncfix (fix .*)", script)
+    arguments = [str(root / word) if word.startswith("examples/") else word for word in command.split()]
+    arguments[arguments.index("out/")] = f"{tmp_path}/"
+    result = ncfix(*arguments)
+    assert result.code == ExitCode.DONE, result.err
+    readme = (root / "README.md").read_text()
+    figures = re.findall(r"^  (?:motion blocks|largest|tip error).*$", result.err, re.MULTILINE)
+    assert len(figures) == 4
+    assert "\n".join(figures) in readme
+    original, corrected = (root / "examples/programs/blade.nc").read_text(), (tmp_path / "blade.nc").read_text()
+    shown = [re.split(r"(?:->)? {6,}(?:-> +)?", line) for line in re.findall(r"^N\d+ .*$", readme, re.MULTILINE)]
+    assert len(shown) == 3
+    for before, after in shown:
+        assert f"\n{before}\n" in original
+        assert f"\n{after}\n" in corrected

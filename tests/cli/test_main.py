@@ -203,6 +203,24 @@ def test_messages_are_plain_where_no_terminal_is_or_no_colour_is_wanted(
     assert capsys.readouterr().err == "red\n"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
+@pytest.mark.parametrize("no_color", ["", "1"])
+def test_on_a_terminal_tables_are_drawn_and_codes_stand_out(no_color: str) -> None:
+    import pty
+
+    def on_terminal(*arguments: str) -> bytes:
+        ours, theirs = pty.openpty()
+        environment = {**os.environ, "NO_COLOR": no_color, "TERM": "xterm"}
+        command = [sys.executable, "-m", "ncfix", *arguments]
+        subprocess.run(command, stdout=theirs, stderr=theirs, env=environment, check=False)
+        os.close(theirs)
+        with open(ours, "rb", buffering=0) as screen:
+            return screen.read(65536)
+
+    assert "\N{BOX DRAWINGS LIGHT HORIZONTAL}".encode() in on_terminal("dialects")
+    assert (b"\x1b[1mNCF009" in on_terminal("explain", "NCF998")) == (no_color == "")
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion_scripts_call_back(ncfix: Any, shell: str) -> None:
     result = ncfix("completion", shell)

@@ -37,6 +37,7 @@ def test_nothing_said_is_an_empty_setup() -> None:
     [
         ("G54=0,0,-300", {"G54": {"X": 0.0, "Y": 0.0, "Z": -300.0}}),
         ("g55=1", {"G55": {"X": 1.0}}),
+        ("G54.1P2=1", {"G54.1P2": {"X": 1.0}}),
         ("G59.3=1,2,3,4,5,6", {"G59.3": dict(zip("XYZABC", (1.0, 2.0, 3.0, 4.0, 5.0, 6.0), strict=True))}),
         ("G54=Z-300, b45", {"G54": {"Z": -300.0, "B": 45.0}}),
     ],
@@ -57,7 +58,7 @@ def test_tools_and_start() -> None:
     [
         (["--offset", "G54"], "no ="),
         (["--offset", "54=1,2,3"], "not a work offset"),
-        (["--offset", "G54=1,2,3,4,5,6,7"], "at most 6"),
+        (["--offset", "G54=1,2,3,4,5,6,7,8,9,10"], "at most 9"),
         (["--offset", "G54=1;2"], "1;2"),
         (["--offset", "G54="], "G54="),
         (["--offset", "G54=nan"], "nan is not a number"),
