@@ -73,6 +73,19 @@ def test_an_existing_output_is_kept_without_force(shop: Any, ncfix: Any) -> None
     assert fixed(shop, ncfix, "--force").code == ExitCode.DONE
 
 
+def test_no_other_input_is_written_over_either(shop: Any, ncfix: Any) -> None:
+    before = shop.machine.read_bytes()
+    for call in (
+        ["fix", shop.program, "-m", shop.machine],
+        ["trace", shop.program, "-m", shop.machine],
+        ["simulate", "--program", shop.program, "-m", shop.machine],
+    ):
+        result = ncfix(*call, "-o", shop.machine, "--force", "--assume-zero")
+        assert result.code == ExitCode.USAGE
+        assert "NCF005" in result.err
+    assert shop.machine.read_bytes() == before
+
+
 def test_a_perfect_machine_gives_every_byte_back_without_any_setup(shop: Any, ncfix: Any) -> None:
     result = ncfix("fix", shop.program, "-m", shop.perfect, "-o", "-")
     assert (result.code, result.out) == (ExitCode.DONE, shop.program.read_bytes())

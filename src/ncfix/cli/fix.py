@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout.")
 @click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
 @click.option("--force", is_flag=True, help="Replace an existing output; correct a program that carries a stamp.")
-@click.option("--strategy", default="rotary-then-linear", show_default=True, metavar="NAME", help="How to correct.")
+@click.option(
+    "--strategy", default="rotary-then-linear", show_default=True, metavar="NAME", help="Or position, or full."
+)
 @click.option("--thesis", is_flag=True, help="Ellingsdalen's printed algorithm, without the corrections to it.")
 @tolerance_option
 @dialect_option
@@ -58,7 +60,7 @@ def fix(
     Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
     was written.
     """
-    found = targets(programs, output, in_place, force)
+    found = targets(programs, output, in_place, force, (machine_path, *given.files))
     if as_json and any(target.path == STREAM for target in found):
         text = "the program and the JSON object would both go to standard output"
         raise UsageError.of("NCF010", text, hint="-o FILE")

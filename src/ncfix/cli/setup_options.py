@@ -119,6 +119,11 @@ class SetupOptions:
     initial: dict[str, float] | None = None
     assume_zero: bool = False
 
+    @property
+    def files(self) -> tuple[str | None, str | None]:
+        """The files that are read."""
+        return self.setup_file, self.tool_table
+
     def load(self) -> Setup:
         """The setup: the file, then the tool table, then the single options, each over the one before."""
         from ncfix.program import setup_file

@@ -35,7 +35,8 @@ def simulate(
     as_json: bool,
 ) -> None:
     """Say how far the tool tip of this machine is from where the program means it to be, along the whole path."""
-    target = targets([program], output, in_place=False, force=force)[0] if output else None
+    inputs = (machine_path, *given.files)
+    target = targets([program], output, False, force, inputs)[0] if output else None
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"simulating {shown(program)}"):
         source, moves, error = following.simulated(program)

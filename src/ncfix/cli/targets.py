@@ -61,8 +61,13 @@ class Target:
             files.write_whole(self.path, data, replace=self.force)
 
 
-def targets(sources: Sequence[str], output: str | None, in_place: bool, force: bool) -> list[Target]:
-    """Where each output goes; raises `UsageError` NCF003 ... NCF011 before anything is computed or written."""
+def targets(
+    sources: Sequence[str], output: str | None, in_place: bool, force: bool, others: Sequence[str | None] = ()
+) -> list[Target]:
+    """Where each output goes, which is none of the sources nor of the `others` that are read.
+
+    Raises `UsageError` NCF003 ... NCF011 before anything is computed or written.
+    """
     if in_place and output is not None:
         raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
     if in_place:
@@ -76,7 +81,7 @@ def targets(sources: Sequence[str], output: str | None, in_place: bool, force: b
         if target.in_place:
             _check_in_place(target)
         elif target.path != STREAM:
-            _check_output(target, sources)
+            _check_output(target, [*sources, *(other for other in others if other)])
     return found
 
 
@@ -116,10 +121,10 @@ def _check_in_place(target: Target) -> None:
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
 
 
-def _check_output(target: Target, sources: Sequence[str]) -> None:
+def _check_output(target: Target, inputs: Sequence[str]) -> None:
     place = Place(target.path)
     _check_regular(target.path)
-    if any(_same(target.path, source) for source in sources):
+    if any(_same(target.path, each) for each in inputs):
         raise UsageError.of("NCF005", "is an input too, and inputs are not changed", place, "--in-place, or another -o")
     if os.path.lexists(target.path) and not target.force:
         raise files.exists_already(target.path)

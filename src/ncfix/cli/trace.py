@@ -43,7 +43,7 @@ def trace(
     as_json: bool,
 ) -> None:
     """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
-    (target,) = targets([program], output, in_place=False, force=force)
+    (target,) = targets([program], output, False, force, (machine_path, *given.files))
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"following {shown(program)}"):
         source = following.read(program)
