@@ -115,6 +115,11 @@ def test_iso_programs_find_numbered_subprograms_anywhere_and_move_before_they_ca
     assert followed.moves.end.tolist() == [[0, 1], [1, 1], [1, 2]]
 
 
+def test_iso_calls_may_hold_the_repeats_in_p_and_files_may_begin_with_o() -> None:
+    followed = follow("M98 P30020", dialect="iso", files={"O0020": "O20\nG91 G0 X1\nM99\n"})
+    assert [row[0] for row in ends(followed)] == [1, 2, 3]
+
+
 def test_a_state_can_be_saved_and_comes_back() -> None:
     text = "o1 sub\nM73\nG91 G20 G55\no1 endsub\no1 call\nG0 X1\nM70\nG91\nM72\nX2"
     assert xs(text) == [1.0, 2.0]

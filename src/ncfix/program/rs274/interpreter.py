@@ -31,6 +31,9 @@ ENDLESS = "NCF233"
 NO_END = "NCF234"
 CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
+LAST_PROGRAM = 9999
+"""Greater P words of M98 on ISO controls hold the number of repeats before the four digits of the program."""
+
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
@@ -67,9 +70,11 @@ class Interpreter:
     def find(self, name: str) -> Unit | None:
         """The file of a subprogram."""
         if name not in self.files:
-            source = self.resolve(name) if self.resolve else None
+            names = (name, f"O{name:0>4}") if name.isdigit() else (name,)
+            found = ((each, self.resolve(each)) for each in names if self.resolve)
             dialect: Dialect = self.main.program.dialect
-            self.files[name] = self.unit_of(read(source, name, dialect), name) if source else None
+            units = (self.unit_of(read(source, each, dialect), each) for each, source in found if source)
+            self.files[name] = next(units, None)
         return self.files[name]
 
     def unit_of(self, program: Program, name: str) -> Unit:
@@ -270,8 +275,10 @@ class Interpreter:
         if codes.stop in PROGRAM_ENDS:
             return True
         if codes.call == CALL:
-            label = str(whole(block.get("P"), "P of M98"))
-            self.flow.call_by_code(label, whole(block.get("L", 1.0), "L of M98"))
+            number, times = whole(block.get("P"), "P of M98"), whole(block.get("L", 1.0), "L of M98")
+            if not self.control.rules.strict and "L" not in block.values and number > LAST_PROGRAM:
+                times, number = divmod(number, LAST_PROGRAM + 1)
+            self.flow.call_by_code(str(number), times)
         if codes.call == RETURN:
             if not self.flow.calls:
                 return True
