@@ -49,7 +49,7 @@ def random_machine(
 ) -> Machine:
     """All error motions and location errors; together about `micrometres` and `microradians` at most on each joint.
 
-    `share` is the part of the effects that is there; `backlash` (um) is added to the positioning of each axis.
+    `share` is the part of the effects that is there; `backlash` (um, urad) is the play of each axis.
     """
     machine = perfect(topology, (0.0, -np.sqrt(0.5), np.sqrt(0.5)) if rng.random() < 0.3 else None)
     effects: list[Effect] = []
@@ -61,9 +61,8 @@ def random_machine(
             effects.append(_motion(rng, axis, component, size * rng.uniform(0.2, 0.6), str(rng.choice(bases))))
             effects.append(Effect(f"E{component}0{axis.name}", (size * rng.uniform(-0.3, 0.3),)))
         if backlash:
-            own = axis.name if not axis.rotary else {"B": "B", "C": "C"}[axis.name]
-            size = backlash * 1e-3 * (1.0 if not axis.rotary else 1e-3)
-            effects.append(Effect(f"E{own}{axis.name}", (size,), Backlash()))
+            size = backlash * (1e-6 if axis.rotary else 1e-3)
+            effects.append(Effect(f"E{axis.name}{axis.name}", (size,), Backlash()))
     effects += [Effect("EX0S", (0.02,)), Effect("EA0S", (1e-4,)), Effect("EZS", (-0.01,), Constant())]
     return machine.replace(effects=tuple(effects))
 

@@ -131,19 +131,15 @@ def sweep_of(start: np.ndarray, end: np.ndarray, centre: np.ndarray, normal: np.
     return float(angle + np.copysign(2 * np.pi, like) * max(0, round((abs(like) - abs(angle)) / (2 * np.pi))))
 
 
-def joints(machine: Machine, commands: np.ndarray, tcp: bool, length: float) -> np.ndarray:
-    """What a control makes of commands; with tool-centre-point control by solving for X Y Z numerically."""
-    if not tcp:
-        return commands
-    xyz = [machine.axis_names.index(name) for name in "XYZ"]
-    plain = commands.copy()
-    plain[:, machine.rotary] = 0.0
-    wanted = machine.tip(plain, 0.0)
+def joints(machine: Machine, commands: np.ndarray, tcp: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """What a control makes of commands (k, n_axes); with tool-centre-point control by one Newton step: it is linear."""
     q = commands.copy()
-    for _ in range(3):
-        gap = machine.nominal(q, length)[:, :3, 3] - wanted
-        jacobian = machine.jacobians(q, length).axes[:, :3][:, :, xyz]
-        q[:, xyz] -= np.linalg.solve(jacobian, gap[..., None])[..., 0]
+    xyz = np.array([machine.axis_names.index(name) for name in "XYZ"])
+    rows = np.flatnonzero(tcp)
+    plain = np.where(machine.rotary, 0.0, commands[rows])
+    gap = machine.nominal(commands[rows], length[rows])[:, :3, 3] - machine.nominal(plain, 0.0)[:, :3, 3]
+    jacobian = machine.jacobians(commands[rows], length[rows]).axes[:, :3][:, :, xyz]
+    q[rows[:, None], xyz] -= np.linalg.solve(jacobian, gap[..., None])[..., 0]
     return q
 
 
@@ -154,40 +150,39 @@ def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, w
     with_play: the direction of each axis is that in which the program moves it, and stays while it rests.
     """
     xyz = [machine.axis_names.index(name) for name in "XYZ"]
-    pieces = plan.pieces
-    result = np.full((len(pieces), count), np.nan)
-    here, before, last = None, 0.0, np.zeros(len(machine.axes))
-    for k in range(len(pieces)):
-        row = int(pieces.move[k])
+    pieces, width = plan.pieces, len(machine.axes)
+    meant, done = np.empty((2, len(pieces), count + 1, width))
+    steps, span = np.arange(count + 1) / count, np.empty(len(pieces))
+    here, before = np.zeros(width), 0.0
+    for k, row in enumerate(pieces.move.tolist()):
         if k == 0 or pieces.move[k - 1] != row:
             here, before = plan.start[row], 0.0
-        span = pieces.fraction[k] - before
-        length, tcp = float(moves.tool_length[row]), bool(moves.tcp[row])
-        arc = None
-        if moves.kind[row] == Kind.ARC:
-            arc = {"normal": moves.normal[row], "centre": moves.centre[row], "sweep": float(moves.sweep[row])}
-        steps = np.arange(count + 1) / count
-
-        def programmed(at: np.ndarray, row: int = row, arc: dict | None = arc) -> np.ndarray:
-            commands = interpolated(moves.start[row], moves.end[row], xyz, arc, at)
-            return joints(machine, commands, bool(moves.tcp[row]), float(moves.tool_length[row]))
-
-        meant = programmed(before + span * steps)
+        span[k] = pieces.fraction[k] - before
+        arc = {"normal": moves.normal[row], "centre": moves.centre[row], "sweep": float(moves.sweep[row])}
+        programmed = arc if moves.kind[row] == Kind.ARC else None
+        meant[k] = interpolated(moves.start[row], moves.end[row], xyz, programmed, before + span[k] * steps)
         if pieces.arc[k]:
-            centre = pieces.centre[k]
-            sweep = sweep_of(here[xyz], pieces.end[k][xyz], centre, moves.normal[row], float(moves.sweep[row]))
-            arc = {"normal": moves.normal[row], "centre": centre, "sweep": sweep}
-        else:
-            arc = None
-        done = joints(machine, interpolated(here, pieces.end[k], xyz, arc, steps), tcp, length)
-        ways = 0
-        if with_play:
-            motion = np.diff(meant, axis=0)
-            ways = np.where(np.abs(motion) > 1e-10, np.sign(motion), last)
-            ways = np.concatenate([ways[:1], ways])
-            last = ways[-1] if span > 1e-6 else last
-        if span > 1e-6 and moves.kind[row] in (Kind.FEED, Kind.ARC):
-            gap = machine.actual(done, State(length, ways))[:, :3, 3] - machine.nominal(meant, length)[:, :3, 3]
-            result[k] = np.linalg.norm(gap, axis=1)[1:]
+            arc["centre"] = pieces.centre[k]
+            arc["sweep"] = sweep_of(here[xyz], pieces.end[k][xyz], pieces.centre[k], arc["normal"], arc["sweep"])
+        done[k] = interpolated(here, pieces.end[k], xyz, arc if pieces.arc[k] else None, steps)
         here, before = pieces.end[k], float(pieces.fraction[k])
-    return result
+    each = np.repeat(pieces.move, count + 1)
+    length, tcp = moves.tool_length[each], moves.tcp[each]
+    meant, done = (joints(machine, path.reshape(-1, width), tcp, length) for path in (meant, done))
+    ways = _ways(meant.reshape(len(pieces), count + 1, width), span) if with_play else np.zeros(width)
+    gap = machine.actual(done, State(length, ways))[:, :3, 3] - machine.nominal(meant, length)[:, :3, 3]
+    errors = np.linalg.norm(gap, axis=1).reshape(len(pieces), count + 1)[:, 1:]
+    cut = (moves.kind[pieces.move] == Kind.FEED) | (moves.kind[pieces.move] == Kind.ARC)
+    errors[~cut | (span <= 1e-6)] = np.nan
+    return errors
+
+
+def _ways(path: np.ndarray, span: np.ndarray) -> np.ndarray:
+    """The direction of each axis at each sample of paths (pieces, samples, n_axes): the last in which it moved."""
+    ways, last = np.empty_like(path), np.zeros(path.shape[2])
+    for k, piece in enumerate(path):
+        motion = np.diff(piece, axis=0)
+        way = np.where(np.abs(motion) > 1e-10, np.sign(motion), last)
+        ways[k] = np.concatenate([way[:1], way])
+        last = way[-1] if span[k] > 1e-6 else last
+    return ways.reshape(-1, path.shape[2])

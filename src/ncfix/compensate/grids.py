@@ -149,6 +149,6 @@ def _follow(intent: Intent, rows: Index, commands: Array, strategy: Strategy) ->
     plain = np.flatnonzero(~intent.moves.tcp[rows])
     if strategy.corrects_orientation and plain.size:
         turning = np.flatnonzero(intent.machine.rotary)
-        jacobian = intent.machine.jacobians(commands[plain], intent.moves.tool_length[rows[plain]]).axes
+        jacobian = intent.machine.jacobians(commands[plain], intent.lengths(rows[plain])).axes
         follow[plain[:, None, None], np.arange(3)[:, None], turning] = jacobian[:, :3, turning]
     return follow

@@ -111,7 +111,15 @@ class Intent:
 
     def lengths(self, rows: Index) -> Array:
         """Tool lengths of motions: (k,) or () mm."""
-        return common(self.moves.tool_length[rows])
+        return common(self._lengths[rows])
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """(n,) mm. Where a length is not known and does not matter to the error, any will do."""
+        lengths = self.moves.tool_length
+        if self.machine.depends_on_tool_length:
+            return lengths
+        return np.where(np.isnan(lengths) & ~self.moves.tcp, 0.0, lengths)
 
     # -- the rest of the state ----------------------------------------------------------------------------------------
 
