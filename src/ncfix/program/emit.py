@@ -18,7 +18,7 @@ from ncfix.program.layout import Layout, has_free_text, layout_of
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
-from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Target
+from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Retract, Target
 from ncfix.program.tree import Program
 from ncfix.program.writer import Edit
 
@@ -108,6 +108,7 @@ class _Emitter:
         self.modal = -1
         self.modal_block = -1
         self.cycle_end: FloatArray | None = None
+        self.retract = np.nan
         self.written: dict[int, Rendered] = {}
         self.conflicts: dict[int, str] = {}
         self.end = pieces.end.copy()
@@ -120,6 +121,7 @@ class _Emitter:
             self._resync(row)
             self.start[row] = self.position
             if self.pieces.kept[self.first_piece[row]]:
+                self.retract = np.nan
                 self._keep(row)
             else:
                 self._write(row)
@@ -148,6 +150,19 @@ class _Emitter:
         back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
         self.position = np.where(back, self.start[row], self.position)
         self.jumps[row + 1] &= ~back
+        if not np.isnan(self.retract):
+            self._stand_at_r(row)
+
+    def _stand_at_r(self, row: int) -> None:
+        """Where the control goes back to R only, it stands at R as written."""
+        moves, frame = self.moves, self.frames[self.reading.frame[row]]
+        index = int(np.argmax(np.abs(frame.frame.rotation.T @ moves.normal[row])))
+        column = self.spatial[index]
+        if self.jumps[row + 1][column]:
+            there = frame.program(self.position.copy())
+            there[column] = self.retract
+            self.position = frame.command(there)
+            self.jumps[row + 1][list(self.spatial)] = False
 
     def _keep(self, row: int) -> None:
         moves = self.moves
@@ -201,6 +216,7 @@ class _Emitter:
         )
         self.end[rows.stop - 1] = self.position
         self._set_modal(row, target.code)
+        self.retract = rendered.retract
         earlier = self.written.setdefault(block, rendered)
         if earlier is not rendered and earlier.text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
@@ -219,7 +235,7 @@ class _Emitter:
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
-        is_cycle = moves.kind[row] == Kind.CYCLE
+        is_cycle = bool(moves.kind[row] == Kind.CYCLE)
         modal = int(moves.modal[row])
         straight = modal if modal in (0, 10) or is_cycle else 10
         fractions = pieces.fraction[rows]
@@ -239,11 +255,25 @@ class _Emitter:
             diameter=frame.frame.diameter,
             incremental=bool(moves.incremental[row]),
             centre_absolute=bool(moves.arc_absolute[row]),
+            retract=self._retract_target(row, frame, as_programmed) if is_cycle else None,
             shares=np.diff(fractions, prepend=0.0),
             inverse_time=moves.feed_mode[row] == FeedMode.INVERSE_TIME and modal != 0,
             code=modal if arc else straight,
             active_code=modal if self.modal == -1 else self.modal,
         )
+
+    def _retract_target(self, row: int, frame: FrameMap, as_programmed: FrameMap) -> Retract | None:
+        """R goes where the correction at the bottom of the hole takes it."""
+        moves = self.moves
+        if np.isnan(moves.centre[row]).any() or -1 in self.spatial:
+            return None
+        index = int(np.argmax(np.abs(frame.frame.rotation.T @ moves.normal[row])))
+        columns = list(self.spatial)
+        shift = self.pieces.end[self.first_piece[row]][columns] - moves.end[row][columns]
+        wanted = frame.program_point(moves.centre[row] + shift, moves.axes)[index]
+        original = as_programmed.program_point(moves.centre[row], moves.axes)[index]
+        in_force = self.retract if self.cycle_end is not None else original
+        return Retract(index, float(original), float(wanted), float(in_force))
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
