@@ -1,0 +1,93 @@
+"""Heat in a machine over a day: bodies that nobody measures, and sensors that follow them late and with a flaw.
+
+All values are kelvin above the state at the start. Time is in seconds from the start of the measurement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from scipy.signal import lfilter
+
+from .motion import Array
+
+BODIES = ("spindle", "column", "bed", "table", "ambient")
+STEP, SPAN = 20.0, 16 * 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Climate:
+    """Temperature rises on a time grid: what the bodies have, and what the sensors beside them show."""
+
+    grid: Array
+    bodies: dict[str, Array]
+    sensors: dict[str, Array]
+    level: float
+
+    def body(self, name: str, time: Array) -> Array:
+        """True mean rise of a body."""
+        result: Array = np.interp(time, self.grid, self.bodies[name])
+        return result
+
+    def sensor(self, name: str, time: Array) -> Array:
+        """What the sensor shows, degree C."""
+        result: Array = self.level + np.interp(time, self.grid, self.sensors[name])
+        return result
+
+
+def lagged(signal: Array, time_constant: float, step: float = STEP) -> Array:
+    """First-order answer to a signal on an even grid, starting at its first value."""
+    gain = -np.expm1(-step / time_constant)
+    result: Array = lfilter([gain], [1.0, gain - 1.0], signal - signal[0]) + signal[0]
+    return result
+
+
+def draw_climate(rng: Generator) -> Climate:
+    """A working day: the spindle runs and rests, the drives work, the hall warms and cools."""
+    grid = np.arange(0.0, SPAN, STEP)
+    hall = _hall(rng, grid)
+    spindle = lagged(_duty(rng, grid) * rng.uniform(7, 14), _minutes(rng, 12, 30))
+    drives = lagged(_duty(rng, grid) * rng.uniform(2, 4), _minutes(rng, 15, 40))
+    bodies = {
+        "spindle": spindle + 0.5 * hall,
+        "column": lagged(0.25 * spindle + hall, _minutes(rng, 40, 90)) + 0.2 * drives,
+        "bed": lagged(0.8 * drives + hall, _minutes(rng, 30, 60)),
+        "table": lagged(_duty(rng, grid) * rng.uniform(2, 4) + hall, _minutes(rng, 20, 50)),
+        "ambient": hall,
+    }
+    bodies = {name: values - values[0] for name, values in bodies.items()}
+    return Climate(grid, bodies, {name: _sensed(rng, values) for name, values in bodies.items()}, rng.uniform(19, 23))
+
+
+def _minutes(rng: Generator, low: float, high: float) -> float:
+    return 60.0 * float(rng.uniform(low, high))
+
+
+def _hall(rng: Generator, grid: Array) -> Array:
+    """The air: part of a day's swing, a faster one from doors and heating, a little wandering."""
+    day = rng.uniform(0.8, 2.0) * np.sin(2 * np.pi * grid / 86400 + rng.uniform(0, 2 * np.pi))
+    fast = rng.uniform(0.1, 0.3) * np.sin(2 * np.pi * grid / _minutes(rng, 50, 130) + rng.uniform(0, 2 * np.pi))
+    walk = lagged(np.cumsum(rng.normal(size=len(grid))) * 0.01, _minutes(rng, 5, 15))
+    result: Array = day + fast + walk
+    return result
+
+
+def _duty(rng: Generator, grid: Array) -> Array:
+    """Load between 0 and 1: idle at first, then levels that hold for 10 to 60 minutes."""
+    level, until = np.zeros(len(grid)), _minutes(rng, 5, 30)
+    current = 0.0
+    for i, t in enumerate(grid):
+        if t > until:
+            current = 0.0 if rng.random() < 0.3 else float(rng.uniform(0.3, 1.0))
+            until = t + _minutes(rng, 10, 60)
+        level[i] = current
+    return level
+
+
+def _sensed(rng: Generator, body: Array) -> Array:
+    """The sensor: its own lag, a gain that is off by some percent, its noise."""
+    slow = lagged(body, _minutes(rng, 1, 6))
+    result: Array = slow * rng.uniform(0.9, 1.1) + rng.normal(scale=0.03, size=len(body))
+    return result

@@ -1,0 +1,135 @@
+"""What heat does: catalogue rows 39 to 44 and 47. Bodies are warm, late and unmeasured; sensors only hint at them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.random import Generator
+
+from ..chain import Joint, Machine
+from ..climate import lagged
+from ..motion import Array
+from ..situation import Situation
+from .entry import Entry, Field, field, spread, symbol
+
+FAMILY = "thermal"
+SESSION = 6.0 * 3600
+
+
+def entries(machine: Machine) -> list[Entry]:
+    """All of them for one machine."""
+    linear = [joint for joint in machine.joints if not joint.rotary]
+    result = [_growth(), _artefact()]
+    result += [_drift(letter) for letter in "XYZ"]
+    result += [_swing(letter) for letter in "XYZ"]
+    result += [_scale(joint) for joint in linear]
+    result += [_bend(joint, "AB"[i % 2]) for i, joint in enumerate(linear) if joint.tool_side]
+    result += [_centre(machine, joint) for joint in machine.joints if joint.rotary and _carried(machine, joint)]
+    return result
+
+
+def _carried(machine: Machine, joint: Joint) -> bool:
+    """Whether another rotary axis carries it: else its centre drifts like the column."""
+    names = [j.name for j in machine.outwards(joint.tool_side)]
+    return any(machine.joint(name).rotary for name in names[: names.index(joint.name)])
+
+
+def heated(rng: Generator, body: str) -> Callable[[Situation], Array]:
+    """A length that follows a body's heat: a quick part and a late part, growing less as it gets warmer.
+
+    Zero is its mean over a session, since a constant is the set-up's.
+    """
+    late, share, soft = rng.uniform(600, 3600), rng.uniform(0.0, 0.5), rng.uniform(0.0, 0.15)
+
+    def signal(s: Situation) -> Array:
+        quick = s.climate.bodies[body]
+        both = (1 - share) * quick + share * lagged(quick, late)
+        size = np.max(np.abs(both)) + 1e-9
+        bent = both * (1 - soft * np.abs(both) / size)
+        bent -= np.mean(bent[s.climate.grid < SESSION])
+        result: Array = np.interp(s.time, s.climate.grid, bent)
+        return result
+
+    return signal
+
+
+def _growth() -> Entry:
+    """The spindle grows along the tool."""
+    return Entry(
+        "spindle growth", 39, "spindle growth", "", ("EZS",), FAMILY,
+        lambda rng: field({("S", "Z"): heated(rng, "spindle")}),
+    )  # fmt: skip
+
+
+def _drift(letter: str) -> Entry:
+    """Column and bed walk apart along one base direction."""
+
+    def draw(rng: Generator) -> Field:
+        return field({("F", letter): heated(rng, "column")})
+
+    return Entry(f"drift {letter}", 40, "drift", letter, (f"E{letter}0F",), FAMILY, draw)
+
+
+def _swing(letter: str) -> Entry:
+    """The hall's air moves the machine along one base direction, some hours late."""
+
+    def draw(rng: Generator) -> Field:
+        return field({("F", letter): heated(rng, "ambient")})
+
+    return Entry(f"ambient swing {letter}", 44, "ambient swing", letter, (f"E{letter}0F",), FAMILY, draw)
+
+
+def _scale(joint: Joint) -> Entry:
+    """A warm screw or scale: positioning in proportion to travel from where it is held, near its middle."""
+
+    def draw(rng: Generator) -> Field:
+        warm, held, bow = heated(rng, "bed"), rng.uniform(-0.35, 0.35), spread(rng, 0.05, 0.2)
+
+        def signal(s: Situation) -> Array:
+            u = s.u(joint.name)
+            result: Array = warm(s) * (u - held + bow * u**2)
+            return result
+
+        return field({(joint.name, joint.name): signal})
+
+    name = symbol(joint.name, joint.name)
+    return Entry(f"thermal scale {joint.name}", 41, "thermal scale", joint.name, (name,), FAMILY, draw)
+
+
+def _bend(joint: Joint, component: str) -> Entry:
+    """A column warmer in front than behind leans: a rotation, so the lever decides."""
+
+    def draw(rng: Generator) -> Field:
+        warm, more = heated(rng, "column"), spread(rng, 0.0, 0.2)
+        return field({(joint.name, component): lambda s: warm(s) * (1 + more * s.u(joint.name))})
+
+    name = symbol(component, joint.name)
+    return Entry(f"thermal bend {name}", 42, "thermal bend", joint.name, (name,), FAMILY, draw)
+
+
+def _centre(machine: Machine, joint: Joint) -> Entry:
+    """The seat of a rotary axis grows out of the middle of what carries it."""
+    along = int(np.argmax(np.abs(np.asarray(joint.triad) @ np.asarray(joint.direction))))
+    letter = "XYZ"[(along + 1) % 3]
+
+    def draw(rng: Generator) -> Field:
+        return field({(joint.name, letter): heated(rng, "table")})
+
+    name = f"rotary centre drift {joint.name}"
+    return Entry(name, 43, "rotary centre drift", joint.name, (f"E{letter}0{joint.name}",), FAMILY, draw)
+
+
+def _artefact() -> Entry:
+    """The plate that carries the balls grows from its middle: the workpiece moves, in proportion to the place on it."""
+
+    def draw(rng: Generator) -> Field:
+        warm = heated(rng, "table")
+        parts = {("W", letter): _outward(warm, i) for i, letter in enumerate("XYZ")}
+        return field(parts)
+
+    return Entry("artefact growth", 47, "artefact growth", "", ("W",), FAMILY, draw)
+
+
+def _outward(warm: Callable[[Situation], Array], index: int) -> Callable[[Situation], Array]:
+    return lambda s: warm(s) * s.ball()[:, index]

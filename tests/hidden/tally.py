@@ -1,0 +1,177 @@
+"""Records to the table of the acceptance list: every line with its interval, what is required, and the prototype's
+figure.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .families import FAMILIES
+from .intervals import bootstrap, wilson
+from .score import CLOSE, Record
+
+BEGIN, END = "<!-- hidden-effect benchmark: begin -->", "<!-- hidden-effect benchmark: end -->"
+WORSE = 1.02
+Judge = Callable[[Record], bool | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One line of the table; `limit` is the least value wanted, or the most where `most`."""
+
+    title: str
+    count: int
+    value: float
+    interval: tuple[float, float]
+    limit: float | None = None
+    most: bool = False
+    prototype: str = ""
+
+    @property
+    def met(self) -> str:
+        """yes, no, or nothing where nothing is required or nothing was counted."""
+        if self.limit is None or self.count == 0:
+            return ""
+        good = self.value <= self.limit if self.most else self.value >= self.limit
+        return "yes" if good else "no"
+
+    def row(self) -> str:
+        """A row of a Markdown table."""
+        low, high = self.interval
+        wanted = "" if self.limit is None else f"{'at most' if self.most else 'at least'} {self.limit:g}"
+        value = f"{self.value:.3f} | {low:.3f} to {high:.3f}" if self.count else "not run | "
+        return f"| {self.title} | {self.count} | {value} | {wanted} | {self.met} | {self.prototype} |"
+
+
+def share(
+    title: str,
+    records: Iterable[Record],
+    judge: Judge,
+    limit: float | None = None,
+    most: bool = False,
+    prototype: str = "",
+) -> Line:
+    """A share of records with its Wilson interval; a record that is judged None does not count."""
+    answers = [a for a in map(judge, records) if a is not None]
+    hits = sum(answers)
+    return Line(title, len(answers), hits / max(len(answers), 1), wilson(hits, len(answers)), limit, most, prototype)
+
+
+def quantile(
+    title: str, values: Sequence[float], q: float, limit: float | None = None, most: bool = False, prototype: str = ""
+) -> Line:
+    """A quantile of values with its bootstrap interval."""
+    value = float(np.quantile(values, q)) if len(values) else float("nan")
+    return Line(title, len(values), value, bootstrap(values, q), limit, most, prototype)
+
+
+def mean(
+    title: str, values: Sequence[float], limit: float | None = None, most: bool = False, prototype: str = ""
+) -> Line:
+    """A mean with its normal interval."""
+    if not values:
+        return Line(title, 0, float("nan"), (float("nan"),) * 2, limit, most, prototype)
+    value, half = float(np.mean(values)), 1.96 * float(np.std(values)) / np.sqrt(len(values))
+    return Line(title, len(values), value, (value - half, value + half), limit, most, prototype)
+
+
+def removed(record: Record) -> float | None:
+    """Share of the excess gap that is gone: 1 - (after^2 - floor^2) / (before^2 - floor^2), not above 1."""
+    excess = record.gap_before_um**2 - record.floor_um**2
+    if record.gap_after_um is None or excess <= 0:
+        return None
+    return 1 - max(record.gap_after_um**2 - record.floor_um**2, 0.0) / excess
+
+
+def worse(record: Record) -> bool | None:
+    """Whether the machine file that came out is worse than the one that went in."""
+    return None if record.gap_after_um is None else record.gap_after_um > WORSE * record.gap_file_um
+
+
+def lines(records: Sequence[Record]) -> list[Line]:
+    """All lines, those of families that were not run too."""
+    of = {name: [r for r in records if r.family == name] for name in FAMILIES}
+    single, deleted = of["single"], of["deleted"]
+    far, near = ([r for r in deleted if (r.closest < CLOSE) == lone] for lone in (True, False))
+    gone = [x for x in map(removed, single) if x is not None]
+    false = [float(r.false_names) for r in single]
+    named: Judge = lambda r: bool(r.reported)  # noqa: E731
+    return [
+        share("one effect 5 to 20 um: first name right", single, lambda r: r.first_right, 0.97, prototype="0.98"),
+        share("one effect 5 to 20 um: true name in the set", single, lambda r: r.in_set, 0.99, prototype="0.99"),
+        mean("one effect 5 to 20 um: mean size of the set", [r.set_size for r in single if r.set_size], 1.3, True),
+        mean("one effect 5 to 20 um: wrong names a scenario", false, prototype="0.15 to 0.20"),
+        share("one effect 2.5 um: first name right", of["weak"], lambda r: r.first_right, 0.88, prototype="0.88"),
+        share("clean null: any name", of["clean"], named, 0.02, True, "0.038"),
+        share("null with 1 um clutter: any name", of["clutter"], named, 0.05, True, "0.04 to 0.10"),
+        share("foreign effect: said to be unknown", of["foreign"], unknown_or_right, 0.97, prototype="0.99"),
+        share("name deleted, no close relative: confident wrong name", far, confident, 0.05, True, "0.10"),
+        share("name deleted, a close relative: family right or unknown", near, family_or_unknown, 0.90),
+        share("software and set-up mistakes: named", of["mistake"], lambda r: r.first_right, 28 / 30),
+        share("two effects: both right", of["two"], lambda r: r.all_right, 0.90, prototype="0.90"),
+        share("three effects: all right", of["three"], lambda r: r.all_right, 0.85, prototype="0.95"),
+        quantile("excess gap removed: median", gone, 0.5, 0.97, prototype="0.986"),
+        quantile("excess gap removed: worst tenth", gone, 0.1, 0.90, prototype="0.96"),
+        share("gap made worse", single, worse, 0.01, True, "0"),
+        share("ambiguous pairs resolved by 12 poses proposed", of["pair"], lambda r: r.resolved, 0.7, prototype="0.45"),
+        share("ambiguous pairs resolved by 12 poses by chance", of["pair"], lambda r: r.resolved_by_random),
+        share("line error the file lacks: first name right", of["location"], lambda r: r.first_right),
+        share("poor design: true name in the set", of["poor"], lambda r: r.in_set),
+        share("110 rows: first name right", of["small"], lambda r: r.first_right, prototype="0.92"),
+        share("hidden from these poses: any other name", of["blind"], lambda r: r.false_names > 0),
+        quantile("seconds for one answer: median", [r.seconds for r in records], 0.5, 5.0, True),
+        quantile("seconds for one answer: 95 %", [r.seconds for r in records], 0.95),
+        share("no answer (fault, time out)", records, lambda r: bool(r.error), 0.0, True),
+    ]  # fmt: skip
+
+
+def confident(record: Record) -> bool:
+    """A name without a doubt: found, no unknown rest, no aliases beside it."""
+    return record.verdict == "found" and bool(record.reported) and not record.unknown and record.set_size == 1
+
+
+def unknown_or_right(record: Record) -> bool:
+    """Said to be unknown; or named, where even a foreign effect has a row in some catalogue (cable drag, slip)."""
+    return record.unknown or bool(record.first_right)
+
+
+def family_or_unknown(record: Record) -> bool:
+    """What is still right when the true name is not to be had."""
+    return record.unknown or bool(record.family_right)
+
+
+def markdown(records: Sequence[Record], run: str) -> str:
+    """The whole section: which run, the table, and the main figure by topology, kind of data and size."""
+    head = "| what | scenarios | value | 95 % interval | wanted | met | prototype |\n|---|---|---|---|---|---|---|"
+    rows = [line.row() for line in lines(records)]
+    return "\n".join([BEGIN, f"{run} {len(records)} scenarios.", "", head, *rows, "", *_breakdown(records), END])
+
+
+def _breakdown(records: Sequence[Record]) -> list[str]:
+    single = [r for r in records if r.family == "single"]
+    if not single:
+        return []
+    keys: list[Callable[[Record], str]] = [lambda r: r.topology, lambda r: r.kind, lambda r: f"{r.rms_um:.0f} um"]
+    parts = ["One effect, first name right:", "", "| group | scenarios | share | 95 % interval |", "|---|---|---|---|"]
+    for key in keys:
+        for name in sorted({key(r) for r in single}):
+            line = share(name, [r for r in single if key(r) == name], lambda r: r.first_right)
+            parts.append(
+                f"| {name} | {line.count} | {line.value:.3f} | {line.interval[0]:.3f} to {line.interval[1]:.3f} |"
+            )
+    missed = Counter(
+        (r.hidden[0], ", ".join(r.reported) or r.verdict or "no answer") for r in single if not r.first_right
+    )
+    listed = [f"- {true}: {said}" + (f" ({n} times)" if n > 1 else "") for (true, said), n in sorted(missed.items())]
+    return [*parts, "", "Missed:" if listed else "None missed.", "", *listed]
+
+
+def replaced(text: str, section: str) -> str:
+    """A document with its section between the marks replaced, or with the section at its end."""
+    if BEGIN in text and END in text:
+        return text[: text.index(BEGIN)] + section + text[text.index(END) + len(END) :]
+    return f"{text.rstrip()}\n\n{section}\n" if text.strip() else f"{section}\n"

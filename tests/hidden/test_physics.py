@@ -1,0 +1,140 @@
+"""The catalogue of effects: names, shapes that no library holds, sizes, signs."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from hidden import curves, workshop
+from hidden.chain import Machine
+from hidden.climate import BODIES, draw_climate, lagged
+from hidden.designs import FREE, lay_out
+from hidden.physics import catalogue, foreign, location
+from hidden.situation import Situation
+from hidden.visibility import first_order, sensitivities
+
+TOPOLOGIES = workshop.TOPOLOGIES
+GRID = np.linspace(-1, 1, 300)
+
+
+def situation(topology: str, seed: int = 3) -> Situation:
+    rng = np.random.default_rng(seed)
+    machine = workshop.draw_machine(rng, topology)
+    return lay_out(rng, machine, topology, draw_climate(rng), workshop.LENGTHS[topology], FREE)
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES)
+def test_at_least_fifty_names_each_once(topology: str) -> None:
+    machine = workshop.draw_machine(np.random.default_rng(1), topology)
+    names = [entry.name for entry in catalogue(machine)]
+    assert len(names) >= 50
+    assert max(Counter(names).values()) == 1
+    assert not set(names) & {entry.name for entry in foreign(machine)}
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES)
+def test_every_effect_moves_the_tip_and_two_draws_differ(topology: str) -> None:
+    s = situation(topology)
+    seen = sensitivities(s)
+    rng = np.random.default_rng(7)
+    for entry in (*catalogue(s.machine), *foreign(s.machine)):
+        first, second = (first_order(seen, entry.draw(rng)(s)) for _ in range(2))
+        assert np.all(np.isfinite(first)), entry.name
+        likeness = abs(np.sum(first * second)) / np.linalg.norm(first) / np.linalg.norm(second)
+        assert np.linalg.norm(first) > 0, entry.name
+        assert likeness < 1 - 1e-9, entry.name
+
+
+def share_left(values: np.ndarray, columns: np.ndarray) -> float:
+    rest = values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
+    return float(np.linalg.norm(rest) / np.linalg.norm(values))
+
+
+def test_smooth_curves_are_no_cubics() -> None:
+    rng = np.random.default_rng(0)
+    left = [share_left(curves.smooth(rng)(GRID), np.vander(GRID, 4)) for _ in range(200)]
+    assert np.median(left) > 0.15  # of the curve's rms: more than a cubic leaves out of a measured straightness
+    assert np.min(left) > 1e-3
+
+
+def test_curves_of_an_angle_are_not_two_harmonics() -> None:
+    rng = np.random.default_rng(0)
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    columns = np.stack([f(k * angle) for k in (0, 1, 2) for f in (np.cos, np.sin)], axis=1)
+    assert np.min([share_left(curves.turning(rng, 1)(angle), columns) for _ in range(100)]) > 5e-3
+
+
+def test_error_motions_have_no_mean_no_slope_and_size_one() -> None:
+    rng = np.random.default_rng(2)
+    for curve in (curves.smooth(rng), curves.bump(rng), curves.smooth(rng)):
+        values = curve(np.linspace(-1, 1, 401))
+        assert np.polyfit(np.linspace(-1, 1, 401), values, 1) == pytest.approx([0, 0], abs=1e-12)
+        assert np.sqrt(np.mean(values**2)) == pytest.approx(1, abs=1e-12)
+
+
+def test_play_follows_the_direction_and_the_place() -> None:
+    size = curves.play(np.random.default_rng(3))
+    ahead, back, still = (size(GRID, np.full_like(GRID, d)) for d in (1.0, -1.0, 0.0))
+    assert np.all(ahead > back)
+    assert np.ptp(ahead - back) > 0.05
+    assert not still.any()
+
+
+def test_pitch_is_a_little_off_the_stated_one() -> None:
+    wave = curves.pitch_wave(np.random.default_rng(1), 10.0)
+    far = np.array([0.0, 1000.0])
+    assert wave(far)[0] != pytest.approx(wave(far)[1], abs=1e-3)
+
+
+def test_sensors_are_late_and_bodies_later() -> None:
+    climate = draw_climate(np.random.default_rng(4))
+    time = np.linspace(0, 6 * 3600, 500)
+    for body in BODIES:
+        rise = climate.body(body, time)
+        shown = climate.sensor(body, time) - climate.level
+        assert 0.9 < np.corrcoef(rise, shown)[0, 1] < 1.0
+        assert rise[0] == 0
+    step = np.r_[np.zeros(5), np.ones(200)]
+    assert lagged(step, 600.0, 20.0)[5 + 30 - 1] == pytest.approx(1 - np.exp(-1), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("topology", "name"), [("wCBXFZYSt", "EA0C"), ("wXFYZCBSt", "EX0B"), ("wXFYZSt", "EC0Y"), ("wCAYFXZSt", "EY0A")]
+)
+def test_location_as_an_effect_is_the_location_of_the_chain(topology: str, name: str) -> None:
+    s = situation(topology)
+    size = 1e-6
+    twists = size * location.entry(s.machine, name).draw(np.random.default_rng(0))(s)
+    errors = s.machine.no_errors(len(s))
+    errors.located[s.machine.axes.index(name[3]), "XYZABC".index(name[1])] = size
+    exact = s.machine.tips(s.q, s.length, errors)[0]
+    # second order of 1e-6 with levers of 1000 mm
+    assert np.max(np.abs(s.machine.tips(s.q, s.length, s.machine.no_errors(len(s)).plus(twists))[0] - exact)) < 1e-8
+
+
+def own(machine: Machine, name: str) -> object:
+    return next(e for e in catalogue(machine) if e.name == name)
+
+
+def test_ten_micrometres_of_exx_show_as_ten_with_the_sign_of_the_side() -> None:
+    for topology, sign in (("wCAYFXZSt", 1), ("wXFYZSt", -1)):
+        s = situation(topology)
+        turn = (
+            s.machine.nominal(s.q, s.length)[1]
+            if topology == "wCAYFXZSt"
+            else np.broadcast_to(np.eye(3), (len(s), 3, 3))
+        )
+        field = own(s.machine, "EXX").draw(np.random.default_rng(1))(s)  # type: ignore[attr-defined]
+        size = field[:, s.machine.frames.index("X"), 0]
+        shown = first_order(sensitivities(s), 0.010 * field)
+        assert np.einsum("ni,ni->n", turn[:, :, 0], shown) == pytest.approx(sign * 0.010 * size, abs=1e-12)
+
+
+def test_growth_pushes_the_tip_along_the_tool() -> None:
+    s = situation("wXFYZCBSt")
+    grown = np.zeros((len(s), len(s.machine.frames), 6))
+    grown[:, s.machine.frames.index("S"), 2] = -0.010  # the spindle's nose moves down, towards the tip
+    along = s.machine.nominal(s.q, s.length)[1][:, :, 2]
+    assert np.einsum("ni,ni->n", along, first_order(sensitivities(s), grown)) == pytest.approx(-0.010, abs=1e-12)
