@@ -53,7 +53,7 @@ def _outcome(following: Following, path: str) -> Outcome:
     except NcfixError as error:
         console.tell(*error.messages)
         return Outcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
-    console.tell(*checked.findings)
+    console.tell_some(checked.findings)
     count = len(checked.findings)
     said = f"{count} finding{'s' if count != 1 else ''}" if count else "nothing found"
     console.say(f"{shown(path)}: {len(program)} blocks, {checked.moves} motions, {program.dialect.name}: {said}")

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from threading import Timer
@@ -18,6 +19,9 @@ from ncfix.files import unwritable
 
 SCHEMA = 1
 """Version of the objects that `--json` prints."""
+
+MOST = 20
+"""Messages of one code that are written out."""
 
 BUSY_AFTER_S = 2.0
 """Progress is shown for what takes longer, on a terminal."""
@@ -36,6 +40,18 @@ def tell(*messages: Message) -> None:
     """Coded messages, on standard error."""
     for message in messages:
         say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
+
+
+def tell_some(messages: Sequence[Message]) -> None:
+    """Coded messages, at most `MOST` of each code; how many more there are is said."""
+    seen: Counter[str] = Counter()
+    for message in messages:
+        seen[message.code] += 1
+        if seen[message.code] <= MOST:
+            tell(message)
+    for code, count in seen.items():
+        if count > MOST:
+            tell(Message(code, f"and {count - MOST} more like these", hint="--json lists all"))
 
 
 def put(data: str | bytes) -> None:

@@ -117,8 +117,7 @@ def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: d
 
 def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:
     entry: dict[str, Any] = fixed.report.as_dict()
-    console.tell(*fixed.report.warnings)
-    console.tell(*_refusals(target.source, entry["refused"]))
+    console.tell_some([*fixed.report.warnings, *_refusals(target.source, entry["refused"])])
     refused = bool(entry["refused"]) and not allow_refused
     if not refused:
         _write(fixed, target)

@@ -23,7 +23,9 @@ from ncfix.program.moves import Kind, Moves
 NEIGHBOURS = 3
 """Samples round which the nearest point is looked for."""
 STEPS = 4
-"""Newton steps towards it; each squares what is missing to it on a smooth path."""
+"""Most Newton steps towards it; each squares what is missing to it on a smooth path."""
+CLOSE = 1e-6
+"""mm: a step along the path that makes no difference to the distance."""
 INSTANT = 1e-5
 """Fraction of a motion over which its direction is taken."""
 ALONG = 0.02
@@ -124,7 +126,10 @@ def _on_motion(curve: Curve, sample: Index, points: Array) -> Array:
         slope = (curve.tip(rows, high) - curve.tip(rows, low)) / (high - low)[:, None]
         square = np.einsum("ij,ij->i", slope, slope)
         ahead = np.einsum("ij,ij->i", points - at, slope) / np.where(square > 0, square, 1.0)
-        fraction = np.clip(fraction + curve.drawn[rows] * ahead, 0.0, 1.0)
-        at = curve.tip(rows, fraction)
+        further = np.clip(fraction + curve.drawn[rows] * ahead, 0.0, 1.0)
+        step = np.abs(further - fraction) * np.sqrt(square)
+        fraction, at = further, curve.tip(rows, further)
+        if step.max(initial=0.0) < CLOSE:
+            break
     way = np.linalg.norm(at - curve.points[sample], axis=1) * np.sign(fraction - curve.fraction[sample])
     return np.column_stack([at, ALONG * (curve.length[sample] + way)])
