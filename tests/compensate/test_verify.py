@@ -1,0 +1,127 @@
+"""The proof of the path agrees with dense sampling of the tests' own, and says where and how much."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
+from compensate.motions import Arc, changed, dense_errors, motions
+from ncfix.compensate.assembly import untouched
+from ncfix.compensate.path import plan
+from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.verify import path_error
+from ncfix.machine import Effect, Machine
+from ncfix.machine.smooth import Polynomial
+from ncfix.program.moves import Kind, Rule
+
+TOLERANCE = 1e-3
+
+
+def bow(size: float = 0.05) -> Machine:
+    return perfect("w F X Y Z t").replace(effects=(Effect("EXX", (size,), Polynomial((2,)), 0.0, 250.0),))
+
+
+@pytest.mark.parametrize("tcp", [False, True], ids=["plain", "tcp"])
+def test_it_finds_what_dense_sampling_finds(tcp: bool) -> None:
+    rng = np.random.default_rng(3 + tcp)
+    machine = random_machine(rng, TOPOLOGIES["table-head"], SMOOTH, 30.0, 30.0)
+    poses = rng.uniform(-0.6, 0.6, (6, 5)) * np.where(machine.rotary, 1.0, 120.0)
+    moves = motions(machine, poses[0], [*poses, Arc((0, 0, 0), (1, 2, 2), 0.8)], tcp=tcp)
+    result = plan(machine, moves, get_strategy("position"), TOLERANCE)
+    rows = np.arange(len(moves)) > 0
+    error = path_error(machine, moves, result.pieces, result.start, rows=rows)
+    after = np.nanmax(dense_errors(machine, moves, result)[result.pieces.move > 0])
+    before = np.nanmax(dense_errors(machine, moves, untouched(moves, ~rows))[1:])
+    assert error.before.max == pytest.approx(before, rel=0.01)
+    assert error.after.max == pytest.approx(after, rel=0.02)
+    assert error.after.max < TOLERANCE
+    assert error.after.rms < error.after.max
+    assert error.move_after.max() == error.after.max
+    assert error.move_after[0] == 0.0
+
+
+def test_figures_of_a_case_that_can_be_worked_out_by_hand() -> None:
+    """An error of `size` u^2 along X from -250 to 250: at most `size` at the ends, rms size / sqrt(5)."""
+    machine, size = bow(), 0.05
+    moves = motions(machine, (-250, 0, 0), [(250, 0, 0)])
+    error = path_error(machine, moves, untouched(moves, np.zeros(1, dtype=bool)).pieces, density=400.0)
+    assert error.before.max == pytest.approx(size, rel=1e-9)
+    assert error.before.rms == pytest.approx(size / np.sqrt(5), rel=2e-3)
+    assert error.after == error.before
+    assert error.before.move == 0
+    assert error.before.tilt == 0.0
+
+
+def test_ways_count_by_their_length() -> None:
+    """A millimetre with a large error and 99 with none: the square mean is a tenth of the large one."""
+    step = Effect("EXX", (0.01,), Polynomial((1,)), 0.0, 1.0)
+    machine = perfect("w F X Y Z t").replace(effects=(Effect("EYX", (0.01,)),))
+    assert step.active
+    moves = motions(machine, (0, 0, 0), [(1, 0, 0), (100, 0, 0)])
+    pieces = untouched(moves, np.zeros(2, dtype=bool)).pieces
+    pieces.end[1, 1] = -0.01
+    start = moves.start.copy()
+    start[1, 1] = -0.01
+    error = path_error(machine, moves, pieces, start)
+    assert error.after.max == pytest.approx(0.01)
+    assert error.after.rms == pytest.approx(0.001, rel=1e-6)
+    assert error.before.rms == pytest.approx(0.01)
+
+
+def test_it_says_where() -> None:
+    machine = bow()
+    moves = motions(machine, (0, 0, 0), [(0, 10, 0), (200, 10, 0), (0, 10, 0)])
+    error = path_error(machine, moves, untouched(moves, np.zeros(3, dtype=bool)).pieces)
+    assert error.before.move == 1
+    assert error.before.fraction == 1.0
+    assert error.before.max == pytest.approx(0.05 * (200 / 250) ** 2)
+
+
+def test_rapids_cycles_and_kept_motions() -> None:
+    """Rapids and cycles count where they end, kept motions not at all unless asked for, dwells never."""
+    machine = bow()
+    kinds = [Kind.RAPID, Kind.FEED, Kind.CYCLE, Kind.DWELL]
+    moves = motions(machine, (-200, 0, 0), [(100, 0, 0), (200, 0, 0), (0, 0, 0), (0, 0, 0)], kinds)
+    moves = changed(moves, rule=np.array([Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT], dtype=np.int8))
+    result = plan(machine, moves, get_strategy("position"), TOLERANCE)
+    error = path_error(machine, moves, result.pieces, result.start)
+    assert error.samples == 2
+    assert error.before.max == pytest.approx(0.05 * (100 / 250) ** 2)
+    assert error.after.max < 1e-6
+    everything = path_error(machine, moves, result.pieces, result.start, rows=np.ones(4, dtype=bool))
+    assert everything.after.max == pytest.approx(0.05 * (200 / 250) ** 2)
+    assert everything.after.move == 1
+
+
+def test_tilt_of_the_tool() -> None:
+    machine = perfect(TOPOLOGIES["table-table"]).replace(effects=(Effect("EA0S", (40e-6,)), Effect("EBX", (30e-6,))))
+    b = machine.axis_names.index("B")
+    poses = np.zeros((4, 5))
+    poses[:, b] = [1.2, 1.3, 1.4, 1.5]
+    moves = motions(machine, poses[0], poses)
+    results = {name: plan(machine, moves, get_strategy(name), TOLERANCE) for name in ("position", "full")}
+    errors = {name: path_error(machine, moves, each.pieces, each.start) for name, each in results.items()}
+    for error in errors.values():
+        assert error.before.tilt == pytest.approx(50e-6, rel=1e-3)
+    assert errors["position"].after.tilt == pytest.approx(50e-6, rel=1e-3)
+    assert errors["full"].after.tilt < 1e-6
+
+
+def test_a_start_that_is_off_is_seen() -> None:
+    """After a kept motion the next block begins uncorrected; without a piece to take that up, that is its error."""
+    machine = bow()
+    moves = motions(machine, (-200, 0, 0), [(-200, 0, 0), (-200, 50, 0)])
+    keep = np.array([True, False])
+    result = plan(machine, moves, get_strategy("position"), TOLERANCE, keep=keep)
+    assert path_error(machine, moves, result.pieces, result.start).after.max < TOLERANCE
+    naive = untouched(moves, keep)
+    naive.pieces.end[1] = result.pieces.end[-1]
+    assert path_error(machine, moves, naive.pieces).after.max == pytest.approx(0.05 * 0.8**2, rel=1e-4)
+
+
+def test_an_empty_selection_has_no_error() -> None:
+    machine = bow()
+    moves = motions(machine, (0, 0, 0), [(1, 0, 0)])
+    error = path_error(machine, moves, untouched(moves, np.ones(1, dtype=bool)).pieces)
+    assert (error.before.max, error.before.move, error.samples) == (0.0, -1, 0)
