@@ -94,4 +94,24 @@ CODES = {
         "would be a guess.",
         "Give the value; `ncfix machine show` names the inputs of a machine.",
     ),
+    "NCF390": Code(
+        "symbolic formulas need sympy",
+        "The error equations are worked out with sympy, which is not among what ncfix always needs.",
+        'pip install "ncfix[symbolic]"',
+    ),
+    "NCF391": Code(
+        "a chain file that is wrong",
+        "A variable or a step of the chain cannot be understood, or an angle is not linear in the small variables.",
+        "The message names the key; examples/chains shows such a file.",
+    ),
+    "NCF392": Code(
+        "an order that there is not",
+        "Error equations are expanded to first order, second order and so on.",
+        "Ask for 1 or 2.",
+    ),
+    "NCF393": Code(
+        "an error that is not in the chain",
+        "A name or a pattern fits no error of the machine, or one symbol cannot stand for all effects of that name.",
+        "Name it as the machine file does, or with a pattern such as E?C.",
+    ),
 }
