@@ -8,7 +8,6 @@ Freeman and Ford (2003), section 4.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
 from typing import Any
 
 import sympy as sp
@@ -23,6 +22,8 @@ FINENESS = 2**90
 ROUNDING = 2**46
 """Factors below one part in this many are the rounding of the measured numbers, doubles of order one."""
 
+Powers = tuple[int, ...]
+"""Exponents of the generators."""
 Poly = Any
 """An element of the ring."""
 
@@ -41,23 +42,20 @@ class Algebra:
         self.roots = sorted((g for g in found if _is_root(g)), key=sp.default_sort_key)
         trig = {f(angle) for angle in self.angles for f in (sp.sin, sp.cos)}
         self.others = sorted(found - trig - set(self.roots), key=sp.default_sort_key)
-        self.ring = self._ring(sp.sin, sp.cos)
-        self.relations = self._relations(self.ring)
+        leading = [sp.sin(angle) for angle in self.angles] + self.roots
+        symbols = leading + [sp.cos(angle) for angle in self.angles] + self.others
+        self.ring = PolyRing(symbols or [sp.Dummy()], sp.QQ, lex)
+        self._squares = [self._one_minus(cosine) for _, cosine in self.pairs]
+        self._squares += [self.ring.from_expr(root.base) for root in self.roots]
 
-    def _ring(self, first: Any, last: Any) -> PolyRing:
-        leading = [first(angle) for angle in self.angles] + self.roots
-        symbols = leading + [last(angle) for angle in self.angles] + self.others
-        return PolyRing(symbols or [sp.Dummy()], sp.QQ, lex)
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """The indices of sine and cosine of each angle among the generators."""
+        cosines = len(self.angles) + len(self.roots)
+        return [(index, cosines + index) for index in range(len(self.angles))]
 
-    def _relations(self, ring: PolyRing) -> list[Poly]:
-        circles = [ring.from_expr(sp.sin(angle) ** 2 + sp.cos(angle) ** 2 - 1) for angle in self.angles]
-        return circles + [ring.from_expr(root) ** 2 - ring.from_expr(root.base) for root in self.roots]
-
-    @cached_property
-    def _swapped(self) -> tuple[PolyRing, list[Poly]]:
-        """The same with the cosines squared away instead of the sines."""
-        ring = self._ring(sp.cos, sp.sin)
-        return ring, self._relations(ring)
+    def _one_minus(self, index: int) -> Poly:
+        return 1 - self.ring.gens[index] ** 2
 
     def poly(self, expression: sp.Expr) -> Poly:
         """The polynomial of an expression, reduced."""
@@ -65,8 +63,15 @@ class Algebra:
 
     def reduced(self, poly: Poly) -> Poly:
         """The polynomial with the relations applied."""
-        poly = poly.rem(self.relations) if self.relations and poly else poly
+        for index, square in enumerate(self._squares):
+            poly = _replaced(poly, index, square)
         return _rounded(poly) if self.measured else poly
+
+    def with_sines(self, poly: Poly) -> Poly:
+        """The same function with the cosines squared away instead of the sines."""
+        for sine, cosine in self.pairs:
+            poly = _replaced(poly, cosine, self._one_minus(sine))
+        return poly
 
     def matrix(self, matrix: sp.Matrix) -> DomainMatrix:
         """A matrix over the ring."""
@@ -87,74 +92,10 @@ class Algebra:
         return rows
 
     def expression(self, poly: Poly) -> sp.Expr:
-        """The shortest way to write the polynomial that is found: sines or cosines squared away, factored or not."""
-        if not poly:
-            return sp.Integer(0)
-        if self.measured:
-            return self._collected(poly).replace(_is_measured, sp.Float)
-        return min(self._collected(poly), self._best(poly), key=sp.count_ops)
+        """A short way to write the polynomial."""
+        from ncfix.machine.symbolic.writing import written
 
-    def _written(self, poly: Poly) -> list[sp.Expr]:
-        other, relations = self._swapped
-        swapped = poly.set_ring(other).rem(relations) if relations else poly
-        forms = [self._merged(poly), poly, swapped]
-        return [way(form) for form in forms if len(form) <= len(poly) for way in (_as_sum, _as_product)]
-
-    def _collected(self, poly: Poly) -> sp.Expr:
-        """Dimensions with the same function of the angles in brackets: (Z - tool_length) sin(C) + ..."""
-        start = 2 * len(self.angles) + len(self.roots)
-        functions: dict[tuple[int, ...], Poly] = {}
-        for monomial, coefficient in poly.items():
-            lengths, angles = (0,) * start + monomial[start:], monomial[:start] + (0,) * (len(monomial) - start)
-            term = poly.new({angles: coefficient})
-            functions[lengths] = functions[lengths] + term if lengths in functions else term
-        groups: dict[Poly, Poly] = {}
-        for lengths, function in functions.items():
-            leading = function.LC
-            brackets = poly.new({lengths: leading})
-            same = function.quo_ground(leading)
-            groups[same] = groups[same] + brackets if same in groups else brackets
-        return sp.Add(*(sp.Mul(*self._brackets(b), *sp.Mul.make_args(self._best(same))) for same, b in groups.items()))
-
-    def _brackets(self, poly: Poly) -> list[sp.Expr]:
-        return [poly.as_expr()] if self.measured else _factors(poly)
-
-    def _best(self, poly: Poly) -> sp.Expr:
-        return poly.as_expr() if self.measured else min(self._written(poly), key=sp.count_ops)
-
-    def _merged(self, poly: Poly) -> Poly:
-        """Pairs a m - a m cos^2 become a m sin^2."""
-        sines, cosines = 0, len(self.angles) + len(self.roots)
-        for i in range(len(self.angles)):
-            poly = _squares_merged(poly, sines + i, cosines + i)
-        return poly
-
-
-def _squares_merged(poly: Poly, sine: int, cosine: int) -> Poly:
-    found = dict(poly)
-    for monomial in sorted(poly, key=lambda monomial: -monomial[cosine]):
-        base = _raised(monomial, cosine, -2)
-        if monomial[cosine] >= 2 and monomial in found and found.get(base) == -found[monomial]:
-            del found[monomial]
-            found[_raised(base, sine, 2)] = found.pop(base)
-    return poly.new(found)
-
-
-def _raised(monomial: tuple[int, ...], index: int, by: int) -> tuple[int, ...]:
-    return (*monomial[:index], monomial[index] + by, *monomial[index + 1 :])
-
-
-def _as_sum(poly: Poly) -> sp.Expr:
-    return poly.as_expr()
-
-
-def _as_product(poly: Poly) -> sp.Expr:
-    return sp.Mul(*_factors(poly))
-
-
-def _factors(poly: Poly) -> list[sp.Expr]:
-    factor, factors = poly.factor_list()
-    return [sp.sympify(factor), *(base.as_expr() ** power for base, power in factors)]
+        return written(self, poly)
 
 
 def generators(expression: sp.Expr) -> set[sp.Expr]:
@@ -172,13 +113,23 @@ def _is_root(expression: sp.Expr) -> bool:
     return bool(expression.is_Pow and expression.exp == sp.Rational(1, 2) and expression.base.is_Integer)
 
 
+def _replaced(poly: Poly, index: int, square: Poly) -> Poly:
+    """The polynomial with a generator's square replaced wherever it occurs."""
+    while any(powers[index] >= 2 for powers in poly):
+        low = {powers: factor for powers, factor in poly.items() if powers[index] < 2}
+        high = {raised(powers, index, -2): factor for powers, factor in poly.items() if powers[index] >= 2}
+        poly = poly.new(low) + poly.new(high) * square
+    return poly
+
+
+def raised(powers: Powers, index: int, by: int) -> Powers:
+    """The exponents with one of them changed."""
+    return (*powers[:index], powers[index] + by, *powers[index + 1 :])
+
+
 def _rounded(poly: Poly) -> Poly:
     field = poly.ring.domain
     limit = field(1, ROUNDING)
     kept = {powers: factor for powers, factor in poly.items() if abs(factor) > limit}
     fine = {powers: factor.numerator * FINENESS // factor.denominator for powers, factor in kept.items()}
     return poly.new({powers: field(factor, FINENESS) for powers, factor in fine.items()})
-
-
-def _is_measured(expression: sp.Expr) -> bool:
-    return bool(expression.is_Rational and expression.q > SIMPLE)
