@@ -60,9 +60,9 @@ def test_a_reversal_with_play_takes_one_piece_to_take_it_up() -> None:
     assert counts.tolist() == [2, 1, 2, 1]
     taking_up = np.flatnonzero(result.pieces.fraction < 1e-6)
     np.testing.assert_allclose(result.pieces.end[taking_up[1], 0] - 20, 0.005, atol=1e-5)
-    shares = np.bincount(result.pieces.move, result.share)
+    shares = np.bincount(result.pieces.move, result.pieces.share)
     np.testing.assert_allclose(shares, 1.0)
-    assert (result.share > 1e-6).all(), "no feed runs away in inverse time"
+    assert (result.pieces.share > 1e-6).all(), "no feed runs away in inverse time"
 
 
 def test_within_the_tolerance_nothing_is_split() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from ncfix.compensate.grids import Split
     from ncfix.compensate.segments import Segments
 
+LEAST_SHARE = 1e-6
+"""Of a motion's time, for a piece that goes nowhere: inverse-time feed is divided by it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -24,7 +27,6 @@ class Plan:
 
     pieces     the corrected path, one row or more per motion
     start      (n, n_axes) the command at which each motion really starts, NaN where not known
-    share      (m,) each piece's share of its motion's time, for inverse-time feed; the shares of a motion add up to 1
     deviation  (n,) mm: how far the tip was found to leave the intended path, before rounding; 0 where not looked at
     oriented   (n,) the tool direction is corrected too, without damping or limits
     findings   what is wrong, by motion; `pieces.kept` tells what was left as it was
@@ -32,7 +34,6 @@ class Plan:
 
     pieces: Pieces
     start: Array
-    share: Array
     deviation: Array
     oriented: Mask
     findings: tuple[Finding, ...]
@@ -42,7 +43,7 @@ def untouched(moves: Moves, kept: Mask) -> Plan:
     """The plan that changes nothing."""
     n = len(moves)
     pieces = Pieces(np.arange(n), np.ones(n), moves.end.copy(), moves.kind == Kind.ARC, moves.centre.copy(), kept)
-    return Plan(pieces, moves.start.copy(), np.ones(n), np.zeros(n), np.ones(n, dtype=bool), ())
+    return Plan(pieces, moves.start.copy(), np.zeros(n), np.ones(n, dtype=bool), ())
 
 
 def assembled(
@@ -66,7 +67,8 @@ def assembled(
         fraction[at], end[at], arc[at] = parts.fraction, parts.end, False
     centre = np.where(arc[:, None], real.centre[move], np.nan)
     pieces = Pieces(move, fraction, end, arc, centre, kept[move])
-    return Plan(pieces, real.start, _shares(pieces, real, counts), deviation, oriented, findings)
+    pieces = replace(pieces, share=_shares(pieces, real, counts))
+    return Plan(pieces, real.start, deviation, oriented, findings)
 
 
 def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
@@ -84,6 +86,6 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     start[first] = real.start
     way = np.linalg.norm(pieces.end - start, axis=1)
     whole = np.repeat(sums(way, counts), counts)
-    share = np.where(jumps, way / np.maximum(whole, 1e-300), span)
+    share = np.where(jumps, np.maximum(way / np.maximum(whole, 1e-300), LEAST_SHARE), span)
     result: Array = share / np.repeat(sums(share, counts), counts)
     return result

@@ -20,6 +20,8 @@ class Pieces:
     arc       (m,) the piece is an arc (its motion is an arc and stays one), else straight
     centre    (m, 3) centre of an arc piece in command coordinates, mm, NaN elsewhere
     kept      (m,) the motion is left as it was
+    share     (m,) the piece's share of its motion's time, for inverse-time feed; None: that of the fraction. They
+              differ for pieces that only take up a jump (play, a step): these have next to no fraction, but a way
     """
 
     move: NDArray[np.int64]
@@ -28,6 +30,7 @@ class Pieces:
     arc: NDArray[np.bool_]
     centre: NDArray[np.float64]
     kept: NDArray[np.bool_]
+    share: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.move)
