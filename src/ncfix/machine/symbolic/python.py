@@ -21,7 +21,8 @@ def to_python(derivation: Derivation) -> str:
     chain = derivation.chain
     title = f"{chain.name}: errors to {ordinal(derivation.order)} order. mm, rad."
     table = "\n".join(variable_table(chain.variables))
-    head = f'"""{title}\n\n{table}\n"""\n\nimport numpy as np\n'
+    told = f"{title}\n\n{table}\n".replace("\\", "/").replace('"', "'")
+    head = f'"""{told}"""\n\nimport numpy as np\n'
     large, small = (*chain.axes, *chain.dimensions), chain.smalls
     nominal = [derivation.nominal[name] for name in (*POSITION, *DIRECTION)]
     error = list(derivation.error.values())
@@ -64,9 +65,9 @@ def _wrapped(head: str, parts: Iterable[str], tail: str, indent: str) -> list[st
 
 def _parameters(large: Sequence[Variable], small: Sequence[Variable]) -> Iterator[str]:
     yield from (variable.name for variable in large if variable.value is None)
-    yield "*"
-    yield from (f"{variable.name}={variable.value!r}" for variable in large if variable.value is not None)
-    yield from (f"{variable.name}=0.0" for variable in small)
+    keywords = [f"{variable.name}={variable.value!r}" for variable in large if variable.value is not None]
+    keywords += [f"{variable.name}=0.0" for variable in small]
+    yield from ("*", *keywords) if keywords else ()
 
 
 def _assignments(formulas: dict[str, sp.Expr], variables: Sequence[Variable]) -> Iterator[tuple[str, str]]:

@@ -51,7 +51,7 @@ class Variable:
     sign: int = 1
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier() or self.name in RESERVED:
+        if self.name in RESERVED or not all(name.isidentifier() for name in (self.name, *self.arguments)):
             hint = "letters, digits and underscores; no word that Python reserves, no name of a result such as x or dx"
             raise ConfigError.of("NCF391", f"{self.name!r} cannot be the name of a variable", hint=hint)
 
