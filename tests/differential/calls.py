@@ -8,14 +8,16 @@ from itertools import zip_longest
 
 import numpy as np
 
-from differential.canon import Canon
-from differential.canon_text import Call
+from differential import paths
+from differential.canon import ARC, RAPID, Canon
+from differential.canon_text import Call, Floats
 from differential.segment import Fate, Segments
 
 STAMP = "ncfix"
 OFFSETS = {"SET_G92_OFFSET", "SET_G5X_OFFSET"}
-FEED_SLACK = 2e-3
-"""Relative: an F of inverse time is written with few digits, and a corrected block is a little longer or shorter."""
+FEED_SLACK = 1e-3
+"""Relative, of the time of a block: what the design allows an F of inverse time with few digits."""
+PRINTED = 1e-4  # of a feed
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,21 +75,38 @@ def _same_arguments(one: Call, two: Call, original: Canon, fixed: Canon) -> bool
 
 
 def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
-    """Each piece runs at the feed of its motion; with inverse time to the accuracy of its F and its length."""
-    wanted, given, inverse = _feed_of(original)[0], *_feed_of(fixed)
+    """Each piece runs at the feed of its motion; with inverse time all the pieces together take its time."""
+    wanted, before = _feed_of(original)
+    given, after = _feed_of(fixed)
+    old, new = _length(original), _length(fixed)
     for k, (first, last) in enumerate(zip(segments.first, segments.last, strict=True)):
-        if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or not original.kind[k]:
+        if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or original.kind[k] == RAPID:
             continue
-        for j in range(first, last + 1):
-            slack = _inverse_slack(fixed, j) if inverse[j] else 1e-9
-            if abs(given[j] - wanted[k]) > slack * max(abs(wanted[k]), 1e-9) + 1e-4:
-                yield int(original.line[k]), f"feed {wanted[k]:g} became {given[j]:g}"
-                break
+        pieces = range(first, last + 1)
+        if any(after[j] != before[k] for j in pieces):
+            yield int(original.line[k]), "the feed mode changed"
+        elif not before[k]:
+            other = next((given[j] for j in pieces if abs(given[j] - wanted[k]) > 1e-4), None)
+            if other is not None:
+                yield int(original.line[k]), f"feed {wanted[k]:g} became {other:g}"
+        elif min(wanted[k], *(given[j] for j in pieces)) > 0:
+            time, total = old[k] / wanted[k], sum(new[j] / given[j] for j in pieces)
+            if abs(total - time) > time * (FEED_SLACK + sum(PRINTED / given[j] for j in pieces)):
+                yield int(original.line[k]), f"{time * 60:g} s of inverse time became {total * 60:g} s"
 
 
-def _inverse_slack(fixed: Canon, j: int) -> float:
-    length = float(np.linalg.norm(fixed.end[j] - fixed.start[j]))
-    return FEED_SLACK + 0.2 / max(length, 1e-3)
+def _length(canon: Canon) -> Floats:
+    """(n,) what the control takes for the length of a motion: along X Y Z, or if it has none, the angle turned."""
+    rows = np.arange(len(canon))
+    way = canon.end - canon.start
+    linear, turn = np.linalg.norm(way[:, :3], axis=1), np.linalg.norm(way[:, 3:6], axis=1)
+    arcs = rows[canon.kind == ARC]
+    if arcs.size:
+        radius = np.linalg.norm(np.cross(canon.start[arcs, :3] - canon.centre[arcs], canon.normal[arcs]), axis=1)
+        height = np.sum(way[arcs, :3] * canon.normal[arcs], axis=1)
+        linear[arcs] = np.hypot(radius * paths.sweep(canon, arcs), height)
+    length: Floats = np.where(linear > 1e-9, linear, turn)
+    return length
 
 
 def _feed_of(canon: Canon) -> tuple[list[float], list[bool]]:

@@ -102,13 +102,15 @@ def interpret(
     with tempfile.TemporaryDirectory(prefix="canon-") as name:
         home = Path(name)
         source = home / "program.ngc"
-        source.write_bytes(program if isinstance(program, bytes) else program.read_bytes())
+        content = program if isinstance(program, bytes) else program.read_bytes()
+        source.write_bytes(content)
         text, error = _run_rs274(home, source, controls, folder, timeout)
         rows = _run_extension(home, source, controls, folder, timeout)
     printed = canon_text.parse(text)
     rows = None if rows is None else canon_text.splines_joined(printed, rows)
     exact = rows is not None and canon_text.agrees(printed, rows)
     rows = rows if rows is not None and exact else printed.rows
+    rows[rows[:, 0] > 0, 0] += _lines_before_tape(content)
     return _canon(rows, printed.calls, controls, error, exact)
 
 
@@ -134,6 +136,12 @@ def _canon(rows: Floats, calls: tuple[Call, ...], controls: Controls, error: str
         turns=integer[:, 5],
         calls=calls,
     )
+
+
+def _lines_before_tape(content: bytes) -> int:
+    """The interpreter counts lines from the `%` that starts a tape."""
+    head = content[: len(content) - len(content.lstrip())]
+    return head.count(b"\n") if content.lstrip().startswith(b"%") else 0
 
 
 # -- running ----------------------------------------------------------------------------------------------------------

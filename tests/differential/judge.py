@@ -115,10 +115,9 @@ class _Judge:
         if not (self.original.accepted and self.fixed.accepted):
             self.verdict.complain(0, f"the control refuses: {self.original.error or self.fixed.error}")
             return self.verdict
-        near = 2 * self.half
-        segments, self.seen = match(
-            self.original, self.fixed, self.machine, self.length, near, max(near, self.terms.rotary)
-        )
+        linear, rotary = 2 * self.half, max(2 * self.half, self.terms.rotary)
+        near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3)
+        segments, self.seen = match(self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance)
         for k, text in segments.complaints:
             self.verdict.complain(int(self.original.line[k]), text)
         self.started = self.machine.embedded(self.fixed.start, self.length) if len(self.fixed) else self.seen

@@ -1,7 +1,8 @@
 """What may differ in the text: numbers of motion words, and inserted words and blocks. No dialect is known here.
 
 A line without any axis or arc word must come back as it was, in the same order. Everything else that is not a motion
-word (comments, N S T M words, parameters, expressions) must be there as often as before.
+word (comments, N S T M words, parameters, assignments) must be there as often as before; only the sign of block skip
+may be repeated, on the pieces of its block.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def complaints(original: bytes, fixed: bytes) -> list[str]:
     found += _missing(before, after)
     old, new = _tokens(before), _tokens(after)
     found += [f"lost {count} of {token!r}" for token, count in (old - new).items()]
-    found += [f"added {count} of {token!r}" for token, count in (new - old).items()]
+    found += [f"added {count} of {token!r}" for token, count in (new - old).items() if token != b"/"]
     return found
 
 

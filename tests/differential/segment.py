@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from differential import paths
-from differential.canon import ARC, FEED, PROBE, SPLINE, TAP, Canon
+from differential.canon import ARC, FEED, PROBE, RAPID, SPLINE, TAP, Canon
 from differential.errors import Machine
 
 Floats = NDArray[np.float64]
 
 LOOKAHEAD = 4000  # pieces that one motion may have
 FAR = 1.0  # mm, degree: a piece farther from the original path than this belongs to something else
+LINEAR = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
+SMALL = 0.3  # mm: as large as a correction may be
 CYCLES = {730, 760, *range(810, 900, 10)}
 
 
@@ -59,6 +61,7 @@ class _Matcher:
     fixed: Canon
     seen: Floats
     near: Floats
+    tolerance: float
     fate: list[int] = field(default_factory=list)
     first: list[int] = field(default_factory=list)
     last: list[int] = field(default_factory=list)
@@ -110,7 +113,8 @@ class _Matcher:
         """The tool gets where the original takes it, to a step; probing, tapping and splines never are corrected."""
         if self.original.kind[k] in (PROBE, TAP, SPLINE):
             return False
-        return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= self.near))
+        near = self.near + (self.tolerance * LINEAR if self.original.kind[k] == ARC else 0.0)
+        return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= near))
 
     def progress(self, k: int, j: int, before: Floats) -> Floats:
         """(1,) the fraction of the original motion that a piece ends at, NaN if it ends far from the path."""
@@ -119,6 +123,11 @@ class _Matcher:
         near = np.all(np.abs(paths.at(self.original, row, fraction) - point) <= FAR)
         return fraction if near else np.full(1, np.nan)
 
+    def rises(self, k: int, stop: int) -> bool:
+        """Somewhere before its hole the corrected cycle has a motion along Z that is no longer than a correction."""
+        length = np.abs(self.fixed.end[self.j : self.j + 2] - self.fixed.start[self.j : self.j + 2])
+        return bool(np.any((length.max(axis=1) < SMALL) & (self.fixed.kind[self.j : self.j + 2] == RAPID)))
+
     def describe(self, k: int) -> str:
         j = min(self.j, len(self.fixed) - 1)
         off = self.seen[j] - self.original.end[k]
@@ -126,8 +135,13 @@ class _Matcher:
         return f"ends {off[axis]:+.4f} off in {'XYZABCUVW'[axis]} (kinds {self.original.kind[k]}, {self.fixed.kind[j]})"
 
     def block(self, k: int, fate: Fate) -> int:
-        """Match a block that the control expands: as many motions on both sides, or a complaint."""
+        """Match a block that the control expands: as many motions on both sides, or a complaint.
+
+        A cycle that is called a few um below its R plane first rises to it: such a motion may come or go.
+        """
         stop, end = _same_line(self.original, k), _same_line(self.fixed, self.j)
+        if stop - k + 1 == end - self.j and self.rises(k, stop):
+            self.j += 1
         pairs = min(stop - k, end - self.j)
         for n in range(k, stop):
             self.fate.append(fate)
@@ -163,13 +177,13 @@ def _turned(vector: Floats, angle: float) -> Floats:
 
 
 def match(
-    original: Canon, fixed: Canon, machine: Machine, length: Floats, linear: float, rotary: float
+    original: Canon, fixed: Canon, machine: Machine, length: Floats, near: Floats, tolerance: float
 ) -> tuple[Segments, Floats]:
     """The segments, and (m, 9) where the corrected motions end as the machine with errors does them.
 
-    length          (m,) tool length of the corrected motions, mm
-    linear, rotary  mm, degree: how near an end must be to count as reached; the judge looks closer afterwards
+    length     (m,) tool length of the corrected motions, mm
+    near       (9,) mm, degree: how near an end must be to count as reached; the judge looks closer afterwards
+    tolerance  mm: added for the ends of arcs
     """
     seen = machine.embedded(fixed.end, length) if len(fixed) else fixed.end
-    near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3)
-    return _Matcher(original, fixed, seen, near).run(), seen
+    return _Matcher(original, fixed, seen, near, tolerance).run(), seen

@@ -9,14 +9,34 @@ from pathlib import Path
 
 import pytest
 
-from differential import corpus, locality, product
-from differential.canon import Canon
-from differential.errors import Machine
+from differential import corpus, locality, product, setups
+from differential.canon import Canon, Controls
+from differential.errors import LETTERS, Machine
 from differential.judge import Terms, Verdict, judge
 
 READABLE = ("linuxcnc", "iso", "fanuc")
 MACHINES = {"": ("three", "table", "three"), "A": ("four_a",), "AC": ("five_ac",)}
-EVERY = {"rotary-then-linear": 1, "position": 5}  # which share of the files a strategy is tried on
+MOVES_A_WITHOUT_TURNING_IT = ("LinuxCNC__310482_test.ngc",)  # the manifest lists the axes that really turn
+SETUP = Controls(
+    offsets={"G54": (110.0, -45.0, 60.5, 12.0, 0.0, -30.0), "G55": (-20.0, 30.25, 7.0), "G56": (3.0, 5.0, -9.0)},
+    tools={number: (40.0 + 3.5 * number, 6.0) for number in range(1, 31)},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """How the corpus is corrected: by which strategy, every so many files, and with what on the machine."""
+
+    strategy: str
+    every: int
+    controls: Controls
+
+
+VARIANTS = {
+    "rotary-then-linear, all offsets zero": Variant("rotary-then-linear", 1, Controls()),
+    "position, with work offsets and tools": Variant("position", 4, SETUP),
+    "full": Variant("full", 9, Controls()),
+}
 REFUSED_SHARE = 0.02
 
 
@@ -65,9 +85,9 @@ class Total:
         return "\n".join(lines)
 
 
-@pytest.mark.parametrize("strategy", EVERY)
+@pytest.mark.parametrize("name", VARIANTS)
 def test_every_program_is_corrected_as_predicted(
-    strategy: str,
+    name: str,
     shared: Callable[[str], Path],
     rs274: Callable[..., Canon],
     machine: Callable[[str], Machine],
@@ -75,33 +95,42 @@ def test_every_program_is_corrected_as_predicted(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    total = Total()
+    variant, total = VARIANTS[name], Total()
     wanted = [e for e in corpus.entries(shared("corpus")) if e.accepted and e.motions and e.dialect in READABLE]
-    wanted = wanted[:: EVERY[strategy]]
+    wanted = wanted[:: variant.every]
     for number, entry in enumerate(wanted):
-        names = MACHINES[entry.rotary]
-        name = names[number % len(names)]
-        options = ("--strategy", strategy, "--assume-zero", "--allow-refused")
-        outcome = product.fix(entry.path, machine_file(name), tmp_path, *options)
-        original, source = rs274(entry.path), entry.path.read_bytes()
+        names = MACHINES["A" if entry.path.name in MOVES_A_WITHOUT_TURNING_IT else entry.rotary]
+        which = names[number % len(names)]
+        model, source = machine(which), entry.path.read_bytes()
+        options = ("--strategy", variant.strategy, "--allow-refused", *_setup(variant, model, tmp_path))
+        outcome = product.fix(entry.path, machine_file(which), tmp_path, *options)
+        original = rs274(entry.path, variant.controls)
         if outcome.text is None:
             total.give_up(entry.path.name, outcome, len(original))
             continue
-        fixed = rs274(outcome.text, folder=entry.path.parent)
+        fixed = rs274(outcome.text, variant.controls, entry.path.parent)
         total.wrong += [f"{entry.path.name}: {text}" for text in locality.complaints(source, outcome.text)[:3]]
-        total.add(
-            entry.path.name, outcome, judge(original, fixed, machine(name), _terms(entry, outcome, machine(name)))
-        )
+        terms = _terms(entry, outcome, model, variant)
+        total.add(entry.path.name, outcome, judge(original, fixed, model, terms))
     with capsys.disabled():
-        print(f"\ndifferential, {strategy}: {total}")
+        print(f"\ndifferential, {name}: {total}")
     assert not total.wrong, "\n".join(total.wrong)
     assert total.blocks["refused"] < REFUSED_SHARE * sum(total.blocks.values())
 
 
-def _terms(entry: corpus.Entry, outcome: product.Outcome, machine: Machine) -> Terms:
+def _setup(variant: Variant, model: Machine, folder: Path) -> tuple[object, ...]:
+    if not variant.controls.offsets:
+        return ("--assume-zero",)
+    axes = "".join(LETTERS[column] for column in (*model.linear, *model.rotary))
+    return "--setup", setups.write(folder, variant.controls, axes)
+
+
+def _terms(entry: corpus.Entry, outcome: product.Outcome, machine: Machine, variant: Variant) -> Terms:
     return Terms(
         step=machine.linear_step,
         rotary_step=machine.rotary_step,
         refused=outcome.refused,
         passed=corpus.passed_by_rule(entry.path.read_bytes()),
+        rotary=0.5 if variant.strategy == "full" and machine.rotary else 0.0,
+        tool_length={number: length for number, (length, _) in variant.controls.tools.items()},
     )
