@@ -18,7 +18,7 @@ from ncfix.program.layout import Layout, has_free_text, layout_of
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
-from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Retract, Target
+from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.writer import Edit
 
@@ -105,10 +105,9 @@ class _Emitter:
         self.eol = _line_end(program.source)
         self.layouts: dict[int, Layout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
-        self.modal = -1
-        self.modal_block = -1
+        self.replaced: int | None = None
+        self.replaced_by = -1
         self.cycle_end: FloatArray | None = None
-        self.retract = np.nan
         self.written: dict[int, Rendered] = {}
         self.conflicts: dict[int, str] = {}
         self.end = pieces.end.copy()
@@ -121,7 +120,6 @@ class _Emitter:
             self._resync(row)
             self.start[row] = self.position
             if self.pieces.kept[self.first_piece[row]]:
-                self.retract = np.nan
                 self._keep(row)
             else:
                 self._write(row)
@@ -150,19 +148,6 @@ class _Emitter:
         back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
         self.position = np.where(back, self.start[row], self.position)
         self.jumps[row + 1] &= ~back
-        if not np.isnan(self.retract):
-            self._stand_at_r(row)
-
-    def _stand_at_r(self, row: int) -> None:
-        """Where the control goes back to R only, it stands at R as written."""
-        moves, frame = self.moves, self.frames[self.reading.frame[row]]
-        index = int(np.argmax(np.abs(frame.frame.rotation.T @ moves.normal[row])))
-        column = self.spatial[index]
-        if self.jumps[row + 1][column]:
-            there = frame.program(self.position.copy())
-            there[column] = self.retract
-            self.position = frame.command(there)
-            self.jumps[row + 1][list(self.spatial)] = False
 
     def _keep(self, row: int) -> None:
         moves = self.moves
@@ -172,7 +157,6 @@ class _Emitter:
         if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
             return
         self._check_code(row)
-        self._set_modal(row, int(moves.modal[row]))
 
     def _kept_end(self, row: int) -> FloatArray:
         moves = self.moves
@@ -183,17 +167,18 @@ class _Emitter:
         return np.asarray(moves.end[row])
 
     def _check_code(self, row: int) -> None:
-        block = int(self.moves.block[row])
-        layout = self._layout(block)
-        code = int(self.moves.modal[row])
-        lost = code in STRAIGHT_AND_ARCS and self.modal not in (-1, code) and (layout is None or layout.motion is None)
-        if lost and self.modal_block not in self.conflicts:
-            self.conflicts[self.modal_block] = MODE_LOST
+        """A motion that is kept must not rely on a code that was replaced."""
+        layout = self._layout(int(self.moves.block[row]))
+        lost = self.replaced not in (None, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
+        if lost and self.replaced_by not in self.conflicts:
+            self.conflicts[self.replaced_by] = MODE_LOST
+        self.replaced = None
 
-    def _set_modal(self, row: int, code: int) -> None:
-        if code != self.modal:
-            self.modal_block = int(self.moves.block[row])
-        self.modal = code
+    def _note_code(self, row: int, code: int) -> None:
+        """Note the motion code in force where it is not the program's own."""
+        own = int(self.moves.modal[row])
+        self.replaced = code if code != own and code in STRAIGHT_AND_ARCS else None
+        self.replaced_by = int(self.moves.block[row])
 
     # -- writing a motion ---------------------------------------------------------------------------------------------
 
@@ -215,8 +200,7 @@ class _Emitter:
             self.end[rows.stop - 1], np.array(rendered.ends)[-1], target, self._before(row)
         )
         self.end[rows.stop - 1] = self.position
-        self._set_modal(row, target.code)
-        self.retract = rendered.retract
+        self._note_code(row, target.code)
         earlier = self.written.setdefault(block, rendered)
         if earlier is not rendered and earlier.text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
@@ -235,7 +219,7 @@ class _Emitter:
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
-        is_cycle = bool(moves.kind[row] == Kind.CYCLE)
+        is_cycle = moves.kind[row] == Kind.CYCLE
         modal = int(moves.modal[row])
         straight = modal if modal in (0, 10) or is_cycle else 10
         fractions = pieces.fraction[rows]
@@ -255,25 +239,11 @@ class _Emitter:
             diameter=frame.frame.diameter,
             incremental=bool(moves.incremental[row]),
             centre_absolute=bool(moves.arc_absolute[row]),
-            retract=self._retract_target(row, frame, as_programmed) if is_cycle else None,
-            shares=np.diff(fractions, prepend=0.0),
+            shares=np.diff(fractions, prepend=0.0) if pieces.share is None else pieces.share[rows],
             inverse_time=moves.feed_mode[row] == FeedMode.INVERSE_TIME and modal != 0,
             code=modal if arc else straight,
-            active_code=modal if self.modal == -1 else self.modal,
+            active_code=modal if self.replaced is None else self.replaced,
         )
-
-    def _retract_target(self, row: int, frame: FrameMap, as_programmed: FrameMap) -> Retract | None:
-        """R goes where the correction at the bottom of the hole takes it."""
-        moves = self.moves
-        if np.isnan(moves.centre[row]).any() or -1 in self.spatial:
-            return None
-        index = int(np.argmax(np.abs(frame.frame.rotation.T @ moves.normal[row])))
-        columns = list(self.spatial)
-        shift = self.pieces.end[self.first_piece[row]][columns] - moves.end[row][columns]
-        wanted = frame.program_point(moves.centre[row] + shift, moves.axes)[index]
-        original = as_programmed.program_point(moves.centre[row], moves.axes)[index]
-        in_force = self.retract if self.cycle_end is not None else original
-        return Retract(index, float(original), float(wanted), float(in_force))
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""

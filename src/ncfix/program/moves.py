@@ -104,8 +104,8 @@ class Moves:
     tool_length  (n,) mm, spindle reference to tip; NaN where not known
     feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`; NaN where none is set, in mm
     feed_mode    (n,) `FeedMode`
-    centre       (n, 3) mm, as commands: the centre of an arc; of a cycle, the point over the hole at R; else NaN
-    normal       (n, 3) unit normal of an arc's plane, about which the sweep is right-handed; the axis of a cycle's hole
+    centre       (n, 3) of arcs: centre in command coordinates (mm), NaN elsewhere
+    normal       (n, 3) of arcs: unit normal of the plane; the sweep is right-handed about it
     sweep        (n,) of arcs: signed angle, full turns included, rad
     modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
     frames       the frames that occur

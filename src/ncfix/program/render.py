@@ -24,16 +24,6 @@ STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 
 
 @dataclass(frozen=True, slots=True)
-class Retract:
-    """The R plane of a canned cycle, program numbers along the axis of that index of X Y Z."""
-
-    index: int
-    original: float
-    wanted: float
-    in_force: float
-
-
-@dataclass(frozen=True, slots=True)
 class Target:
     """What one motion shall become, in program numbers.
 
@@ -51,7 +41,6 @@ class Target:
     spatial      columns of X Y Z (-1: not an axis of the machine)
     diameter     X is a diameter; centres and radii are not
     incremental, centre_absolute   how words are meant
-    retract      R of a canned cycle as programmed, as it shall be, and as it is in force; None for other motions
     shares       (k,) fraction of the block's time in each piece, for G93
     inverse_time the block's F is the time of the block
     code         motion code the pieces need, tenths
@@ -73,7 +62,6 @@ class Target:
     diameter: bool
     incremental: bool
     centre_absolute: bool
-    retract: Retract | None
     shares: FloatArray
     inverse_time: bool
     code: int
@@ -88,7 +76,6 @@ class Rendered:
     lines: list[str] = field(default_factory=list)
     ends: list[FloatArray] = field(default_factory=list)
     centre: FloatArray | None = None
-    retract: float = np.nan
 
     @property
     def text(self) -> tuple[object, ...]:
@@ -136,8 +123,6 @@ class BlockRenderer:
             else:
                 self._present_axis(position, column, end[column], word)
         self._arc_words(base, position)
-        if self.target.retract is not None:
-            self.out.retract = self._retract_word(self.target.retract)
         if self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
             self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
         return position
@@ -176,7 +161,7 @@ class BlockRenderer:
         if self.target.arc:
             self._kept_arc(start, end)
             return
-        if self.target.retract is None and np.isfinite(self.target.original_centre).any():
+        if np.isfinite(self.target.original_centre).any():
             for word in (*self.layout.centre.values(), self.layout.radius, self.layout.turns):
                 if word is not None:
                     self._remove(word)
@@ -240,23 +225,6 @@ class BlockRenderer:
         if self.target.diameter:
             values[0] /= 2
         return values
-
-    # -- canned cycles ------------------------------------------------------------------------------------------------
-
-    def _retract_word(self, retract: Retract) -> float:
-        """R moves with the bottom of the hole; where it is not written, the one in force counts."""
-        column = self.target.spatial[retract.index]
-        decimals, word = int(self.target.decimals[column]), self.layout.radius
-        if word is None:
-            if not abs(retract.wanted - retract.in_force) >= self.half[column]:
-                return retract.in_force
-            text = f"{retract.wanted:.{decimals}f}"
-            self._add("R", text)
-            return float(text)
-        original = self._value(word, retract.original)
-        if not abs(retract.wanted - original) >= self.half[column]:
-            return original
-        return self._rewrite(word, retract.wanted, decimals)
 
     # -- further pieces -----------------------------------------------------------------------------------------------
 

@@ -6,11 +6,8 @@ counts from where the series of holes began, and a block without R or Z repeats 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import Block, Control, Unknown
 from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, dot
 from ncfix.program.rs274.faults import Fault
@@ -38,7 +35,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
     clear = r if modal.retract_to_r else max(initial, r)
     for _ in range(repeats(control, block)):
         place_hole(control, block, program)
-        drill(control, block, code, program, Heights(r, depth, clear))
+        drill(control, block, code, program, depth, clear)
 
 
 def check_cycle(control: Control, block: Block, code: int) -> None:
@@ -107,38 +104,18 @@ def place_hole(control: Control, block: Block, program: Vector) -> None:
             program[index] = step + control.scale[index] * block.values[letter]
 
 
-class Heights(NamedTuple):
-    """Along the axis across the plane, mm: where drilling begins (R), the bottom, and where the control goes after."""
-
-    r: float
-    depth: float
-    clear: float
-
-
-def drill(control: Control, block: Block, code: int, program: Vector, heights: Heights) -> None:
-    """One hole: a motion to its bottom, after which the control stands clear above it."""
+def drill(control: Control, block: Block, code: int, program: Vector, depth: float, clear: float) -> None:
+    """One hole: a motion to its bottom, after which the control stands at `clear` above it."""
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
     height = control.unknown.get(across)
-    program[across] = heights.r
-    above = over_hole(control, command(control, block, program))
-    program[across] = heights.depth
-    control.move(Kind.CYCLE, block.axes, command(control, block, program), unknown, code, refusal=refusal, arc=above)
-    program[across] = heights.clear
+    program[across] = depth
+    control.move(Kind.CYCLE, block.axes, command(control, block, program), unknown, code, refusal=refusal)
+    program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not control.modal.retract_to_r:
         control.unknown = {**unknown, across: height}
-
-
-def over_hole(control: Control, position: Vector) -> Arc | None:
-    """The point over the hole at R and the axis of the hole, in command coordinates."""
-    across = control.modal.plane.across
-    if across > 2:
-        return None
-    x, y, z = position[:3]
-    i, j, k = (row[across] for row in control.rotation)
-    return Arc((x, y, z), (i, j, k), 0.0)
 
 
 def hole_unknown(control: Control, block: Block) -> Unknown:
