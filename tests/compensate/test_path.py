@@ -209,3 +209,15 @@ def test_two_machines_of_one_name_are_told_apart_by_their_axes() -> None:
     other = perfect("w F X Z Y t").replace(effects=(Effect("EXX", (0.01,)),))
     with pytest.raises(ValueError, match="axes"):
         plan(other, moves, get_strategy("position"), TOLERANCE)
+
+
+def test_programs_without_anything_to_correct() -> None:
+    """No motion at all; and none whose end is known."""
+    machine = bent()
+    strategy = get_strategy("rotary-then-linear")
+    assert len(plan(machine, motions(machine, (0, 0, 0), []), strategy, TOLERANCE).pieces) == 0
+    lost = motions(machine, (0, 0, 0), [(np.nan, 0, 0), (np.nan, 1, 0)])
+    for name in STRATEGIES:
+        result = plan(machine, lost, get_strategy(name), TOLERANCE)
+        assert result.pieces.kept.all()
+        assert [finding.code for finding in result.findings] == ["NCF408"]

@@ -10,9 +10,14 @@ from ncfix.compensate import arcs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.compensate.ragged import slices
 from ncfix.compensate.rates import Path
 from ncfix.compensate.standing import standing
+from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
+
+BATCH = 32_768
+"""Ends corrected at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +45,7 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
     named = np.isfinite(moves.end[rows]).all(axis=1)
     fit = np.isfinite(q).all(axis=1) & np.isfinite(lengths)
     good = rows[fit]
-    path = along(intent, good, ones[fit]) if strategy.corrects_orientation else None
-    result = strategy.solve(intent.machine, q[fit], intent.states(good, ones[fit]), path)
+    result = _solved(intent, strategy, good, q[fit])
     wanted = moves.end.copy()
     wanted[good] = as_commands(intent, good, moves.end[good], q[fit], result.q)
     failed, oriented = np.zeros(len(moves), dtype=bool), np.zeros(len(moves), dtype=bool)
@@ -59,6 +63,21 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
         _finding("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
     )
     return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)))
+
+
+def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correction:
+    """The correction of ends q (k, n_axes) of motions; limits on rates need all of them at once."""
+    ones = np.ones(len(rows))
+    if strategy.corrects_orientation:
+        return strategy.solve(intent.machine, q, intent.states(rows, ones), along(intent, rows, ones))
+    parts = []
+    for part in slices(len(rows), BATCH):
+        parts.append(strategy.solve(intent.machine, q[part], intent.states(rows[part], ones[part])))
+    return Correction(
+        np.concatenate([part.q for part in parts]),
+        np.concatenate([part.converged for part in parts]),
+        np.concatenate([part.oriented for part in parts]),
+    )
 
 
 def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, corrected: Array) -> Array:

@@ -8,7 +8,7 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import largest, owners
+from ncfix.compensate.ragged import largest, owners, slices
 from ncfix.compensate.sampling import interior, merged
 from ncfix.compensate.segments import Segments
 
@@ -46,8 +46,7 @@ def _look(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: f
         counts, fraction = merged(len(rows), (owners(counts), fraction), extra)
     move = rows[owners(counts)]
     off = np.empty(len(move))
-    for start in range(0, len(move), BATCH):
-        part = slice(start, start + BATCH)
+    for part in slices(len(move), BATCH):
         off[part] = distance(intent, real, move[part], fraction[part])
     return largest(off, counts)
 

@@ -13,12 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.compensate.findings import Array, Index, Mask, pose_error
+from ncfix.compensate.ragged import slices
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
 
 SPATIAL = ("X", "Y", "Z")
 PROBE = 256.0
 """mm; a power of two, so that dividing by it rounds nothing."""
+BATCH = 16_384
+"""Poses worked on at a time."""
 FLAT = 1e-6
 """The volume spanned by the tip's motions per mm of X, Y and Z below which they do not reach every point."""
 
@@ -48,12 +51,15 @@ def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tupl
     length = np.asarray(tool_length, dtype=np.float64)
     if len(q) > 1 and length.ndim == 0 and (still == still[0]).all():
         still = still[:1]
-    probes = np.repeat(still[None], 4, axis=0)
-    for k, column in enumerate(columns):
-        probes[k + 1, :, column] = PROBE
-    tips = machine.tip(probes, length)
-    maps: Array = np.moveaxis(tips[1:] - tips[0], 0, -1) / PROBE
-    return maps, tips[0]
+    maps, offset = np.empty((len(still), 3, 3)), np.empty((len(still), 3))
+    for part in slices(len(still), BATCH):
+        probes = np.repeat(still[None, part], 4, axis=0)
+        for k, column in enumerate(columns):
+            probes[k + 1, :, column] = PROBE
+        tips = machine.tip(probes, length if length.ndim == 0 else length[part])
+        maps[part] = np.moveaxis(tips[1:] - tips[0], 0, -1) / PROBE
+        offset[part] = tips[0]
+    return maps, offset
 
 
 def solve(maps: Array, tips: Array) -> Array:

@@ -53,3 +53,8 @@ def batches(sizes: Index, most: int) -> list[NDArray[np.intp]]:
     marks = np.searchsorted(ends, np.arange(most, int(ends[-1]) + most, most), side="right")
     cuts = np.unique(np.concatenate([[0], np.maximum(marks, 1), [len(sizes)]]))
     return [np.arange(a, b) for a, b in pairwise(cuts.tolist())]
+
+
+def slices(n: int, most: int) -> list[slice]:
+    """Rows 0 to n in runs of at most `most`; one empty run if there are none."""
+    return [slice(start, min(start + most, n)) for start in range(0, max(n, 1), most)]
