@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
+from compensate.motions import motions
+from ncfix.compensate import ends
 from ncfix.compensate.findings import PoseError
+from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.piecewise import Step
+from ncfix.program.moves import Kind
 
 POSES = 1000
 NANOMETRE = 1e-6
@@ -139,3 +143,15 @@ def test_order_of_poses_does_not_matter_and_batches_do_not_either() -> None:
         whole = get_strategy(name).correct(machine, q, state)
         parts = [get_strategy(name).correct(machine, q[i : i + 7], state) for i in range(0, 300, 7)]
         np.testing.assert_allclose(np.concatenate(parts), whole, rtol=0, atol=2 * NANOMETRE)
+
+
+def test_a_plan_of_very_many_points_is_that_of_the_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ends are corrected in batches, which must not show: not even where the thesis leaves its first point alone."""
+    machine = random_machine(np.random.default_rng(9), "w C B F X Y Z t", ("polynomial",))
+    q = np.random.default_rng(10).uniform(-0.5, 0.5, (50, 5)) * np.where(machine.rotary, 1.0, 200.0)
+    moves = motions(machine, q[0], q, Kind.RAPID)
+    for name, strategy in strategies().items():
+        whole = plan(machine, moves, strategy, 1e-3).pieces.end
+        with monkeypatch.context() as patch:
+            patch.setattr(ends, "BATCH", 7)
+            np.testing.assert_array_equal(plan(machine, moves, strategy, 1e-3).pieces.end, whole, err_msg=name)

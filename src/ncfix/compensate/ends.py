@@ -66,10 +66,12 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
 
 
 def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correction:
-    """The correction of ends q (k, n_axes) of motions; limits on rates need all of them at once."""
+    """The correction of ends q (k, n_axes) of motions; where one depends on others, of all of them at once."""
     ones = np.ones(len(rows))
     if strategy.corrects_orientation:
         return strategy.solve(intent.machine, q, intent.states(rows, ones), along(intent, rows, ones))
+    if not strategy.follows_path:
+        return strategy.solve(intent.machine, q, intent.states(rows, ones))
     parts = []
     for part in slices(len(rows), BATCH):
         parts.append(strategy.solve(intent.machine, q[part], intent.states(rows[part], ones[part])))
