@@ -22,6 +22,8 @@ VERBS = (
     "trace",
     "verify",
     "simulate",
+    "plan",
+    "calibrate",
     "machine",
     "effects",
     "dialects",

@@ -1,0 +1,112 @@
+"""`ncfix calibrate`: the errors of a machine from measurements."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import force_option, json_option, load_machine, machine_option
+from ncfix.cli.targets import STREAM, read, shown, targets
+from ncfix.diagnostics import ExitCode
+
+if TYPE_CHECKING:
+    from ncfix.measure.calibrate import Calibration
+
+LOSSES = ("auto", "none", "huber", "tukey")
+
+
+@click.command()
+@click.argument("measured", nargs=-1, required=True)
+@machine_option
+@click.option("-o", "--output", metavar="FILE", required=True, help="Where to write the calibrated machine (TOML).")
+@click.option("--effects", metavar="LIST", help="Names or patterns like EC0Y,E?X; all; or a model like esmaeili-13-bc.")
+@click.option(
+    "--loss",
+    type=click.Choice(LOSSES),
+    default="auto",
+    show_default=True,
+    help="What far-off values count: auto gives gross outliers no weight and names them.",
+)
+@click.option(
+    "--prune",
+    type=click.FloatRange(0.5, 1.0, min_open=True, max_open=True),
+    metavar="LEVEL",
+    help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
+)
+@force_option
+@json_option
+def calibrate(
+    measured: tuple[str, ...],
+    machine_path: str,
+    output: str,
+    effects: str | None,
+    loss: str,
+    prune: float | None,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Estimate the errors of a machine from measurements and write the machine with them.
+
+    Without --effects those of the machine file are estimated; of a machine without effects, all that can be.
+    """
+    from ncfix.machine import dumps
+    from ncfix.measure.calibrate import calibrate as calibrated
+    from ncfix.measure.reader import reads
+
+    target = targets([measured[0]], output, False, force, (machine_path, *measured[1:]))[0]
+    machine = load_machine(machine_path)
+    data = [reads(read(path), machine, shown(path)) for path in measured]
+    with console.busy("calibrating"):
+        found = calibrated(data, machine, effects, loss, prune)
+    console.tell(*found.remarks)
+    target.write(dumps(found.machine).encode())
+    if as_json:
+        console.put_json(**_as_dict(found), output=target.path)
+    elif output != STREAM:
+        _print(found)
+    return ExitCode.DONE
+
+
+def _as_dict(found: Calibration) -> dict[str, Any]:
+    from ncfix.measure.residuals import residuals, rms_by_set
+
+    diagnosis = residuals(found.problem, found.estimate)
+    sigma, covariance = found.sigma, found.covariance
+    return {
+        "parameters": [
+            {"name": label, "value": value, "sigma": deviation, "held": bool(deviation != deviation)}
+            for label, value, deviation in zip(
+                found.labels, found.estimate.coefficients.tolist(), sigma.tolist(), strict=True
+            )
+        ],
+        "covariance": covariance,
+        "set_up": _set_up(found),
+        "chi_square": found.chi_square,
+        "freedom": found.freedom,
+        "condition": found.estimate.solution.condition,
+        "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
+        "largest_cook": float(diagnosis.cook.max(initial=0.0)),
+        "remarks": [message.as_dict() for message in found.remarks],
+    }
+
+
+def _set_up(found: Calibration) -> dict[str, float]:
+    labels = [label for each in found.problem.observations for label in each.unknowns.labels]
+    return dict(zip(labels, found.estimate.unknowns.tolist(), strict=False))
+
+
+def _print(found: Calibration) -> None:
+    rows = []
+    for label, value, deviation in zip(
+        found.labels, found.estimate.coefficients.tolist(), found.sigma.tolist(), strict=True
+    ):
+        factor, unit = (1e6, "urad") if label[1] in "ABC" else (1e3, "um")
+        known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
+        rows.append((label, f"{factor * value:.4g}", known, unit))
+    console.table(("coefficient", "value", "sigma", "unit"), rows)
+    console.say(
+        f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
+        f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
+    )

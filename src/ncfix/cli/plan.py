@@ -1,0 +1,104 @@
+"""`ncfix plan`: the poses that tell most about a machine's errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import force_option, json_option, load_machine, machine_option, table_option
+from ncfix.cli.targets import STREAM, read, shown, targets
+
+if TYPE_CHECKING:
+    from ncfix.measure.candidates import Room
+
+KINDS = ("tcp", "tcp6", "probe", "length")
+
+
+@click.command()
+@machine_option
+@click.option("--kind", type=click.Choice(KINDS), default="tcp", show_default=True, help="What will be measured.")
+@click.option("--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
+@click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
+@click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
+@click.option("--existing", metavar="FILE", help="A measurement that the new poses complete.")
+@click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
+@click.option("--tool-length", "lengths", multiple=True, type=float, metavar="MM", help="Tools there are (repeatable).")
+@click.option("--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands (kind probe).")
+@click.option("--gcode", metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
+@table_option
+@force_option
+@json_option
+def plan(
+    machine_path: str,
+    kind: str,
+    count: int,
+    effects: str | None,
+    separate: str | None,
+    existing: str | None,
+    ranges: tuple[str, ...],
+    lengths: tuple[float, ...],
+    balls: tuple[str, ...],
+    gcode: str | None,
+    seed: int,
+    output: str,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Choose the poses to be measured, and write them as a measurement file to be filled in."""
+    from ncfix.measure.plan import plan as planned
+    from ncfix.measure.program import skeleton
+    from ncfix.measure.reader import reads
+    from ncfix.measure.writer import dumps
+
+    inputs = () if existing is None else (existing,)
+    target = targets([machine_path], output, False, force, inputs)[0]
+    program = targets([machine_path], gcode, False, force, inputs)[0] if gcode else None
+    machine = load_machine(machine_path)
+    before = reads(read(existing), machine, shown(existing)) if existing else None
+    names = [name.strip() for name in separate.split(",")] if separate else []
+    room = _room(ranges, lengths, balls, machine.axis_names)
+    with console.busy("choosing poses"):
+        found = planned(machine, kind, count, room, effects, names, before, seed)
+    empty = found.plan.form.measured if kind != "probe" else ()
+    text = dumps(found.plan, empty)
+    if program:
+        program.write(skeleton(found.plan, machine).encode())
+    figures = {"worst_um": found.worst_um, "mean_um": found.mean_um, "determined": len(found.seen)}
+    if as_json:
+        console.put_json(kind=kind, count=count, **figures, unseen=found.unseen, output=output)
+    if not as_json or output != STREAM:
+        target.write(text.encode())
+    if found.unseen:
+        console.say(f"no pose of this kind tells {', '.join(found.unseen)} from the rest")
+    if not separate:
+        console.say(f"tip error known to {found.worst_um:.2f} um at worst per um of noise, {found.mean_um:.2f} um rms")
+
+
+def _room(ranges: tuple[str, ...], lengths: tuple[float, ...], balls: tuple[str, ...], axes: tuple[str, ...]) -> Room:
+    from ncfix.measure.candidates import Room
+
+    limits = {}
+    for text in ranges:
+        name, values = _named(text, 2, "--range")
+        if name not in axes:
+            raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(axes)}", param_hint="--range")
+        limits[name] = (values[0], values[1])
+    places = {}
+    for text in balls:
+        name, values = _named(text, 3, "--ball")
+        places[name] = (values[0], values[1], values[2])
+    return Room(limits, lengths or (100.0,), places)
+
+
+def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
+    name, equals, rest = text.partition("=")
+    try:
+        values = [float(part) for part in rest.split(",")]
+    except ValueError:
+        values = []
+    if not equals or len(values) != count:
+        raise click.BadParameter(f"{text!r} is not NAME= and {count} numbers", param_hint=option)
+    return name.strip(), values

@@ -1,0 +1,111 @@
+"""Poses from which a plan chooses: spread over the travels without a common step, and their ends.
+
+Positions come from a Halton sequence, so no axis is sampled at even distances: an error that repeats with a screw's
+pitch cannot hide (Soons, section 2.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import qmc
+
+from ncfix.diagnostics import UsageError
+from ncfix.machine import Machine
+from ncfix.machine.axis import Axis
+from ncfix.measure.measurement import Array, Measurement
+
+DECIMALS = 3
+CORNERS = 0.25
+"""Share of candidates of which each axis stands at one of its ends or in the middle."""
+UNLIMITED_MM = 100.0
+"""Half the travel that is taken for a linear axis without a range."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """Where measuring is possible.
+
+    ranges        axis -> (low, high) mm or degree; those of the machine where not given
+    tool_lengths  mm, the tools that there are
+    balls         ball -> place in the workpiece frame, mm (kind probe)
+    """
+
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    tool_lengths: Sequence[float] = (100.0,)
+    balls: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+
+    def of(self, axis: Axis) -> tuple[float, float]:
+        """The range of an axis, mm or degree."""
+        if axis.name in self.ranges:
+            return self.ranges[axis.name]
+        low, high = (limit / axis.unit for limit in axis.range)
+        if np.isfinite([low, high]).all():
+            return low, high
+        return (0.0, 360.0) if axis.rotary else (-UNLIMITED_MM, UNLIMITED_MM)
+
+
+def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
+    """A plan of so many poses of this kind; fewer where probing cannot reach. Raises `UsageError` NCF636."""
+    random = np.random.default_rng(seed)
+    unit = _spread(len(machine.axes), count, random)
+    columns = {}
+    for axis, share in zip(machine.axes, unit.T, strict=True):
+        low, high = room.of(axis)
+        columns[axis.name] = np.round(low + (high - low) * share, DECIMALS)
+    columns |= {f"dir_{axis.name}": random.choice([-1.0, 1.0], count) for axis in machine.axes}
+    columns["tool_length"] = random.choice(np.asarray(room.tool_lengths, dtype=np.float64), count)
+    if kind in ("tcp", "tcp6"):
+        return Measurement(kind, (), columns, {"set": ("1",) * count})
+    if kind == "probe":
+        return _reachable(machine, columns, room, random)
+    if kind == "length":
+        return _lengths(machine, columns, unit, room)
+    raise UsageError.of("NCF636", f"there are no plans of kind {kind!r}", hint="tcp, tcp6, probe or length")
+
+
+def _spread(axes: int, count: int, random: np.random.Generator) -> Array:
+    """Shares of the ranges, (count, axes)."""
+    unit: Array = qmc.Halton(axes, rng=random).random(count)
+    ends = random.random(count) < CORNERS
+    unit[ends] = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes))
+    return unit
+
+
+def _reachable(machine: Machine, columns: dict[str, Array], room: Room, random: np.random.Generator) -> Measurement:
+    """Poses with the stylus in one of the balls, those that the travels allow."""
+    names = list(machine.axis_names)
+    linear = [names.index(axis) for axis in "XYZ"]
+    balls = room.balls or _default_balls(machine, room)
+    keys = list(balls)
+    which = random.integers(len(keys), size=len(columns["X"]))
+    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    places = np.array([balls[key] for key in keys])[which]
+    by_axes = np.linalg.inv(machine.axis_jacobian(q, columns["tool_length"])[:, :3, linear])
+    gap = machine.tip(q, columns["tool_length"]) - places
+    q[:, linear] -= np.einsum("nij,nj->ni", by_axes, gap)
+    limits = np.array([room.of(machine.axes[k]) for k in linear])
+    inside = ((q[:, linear] >= limits[:, 0]) & (q[:, linear] <= limits[:, 1])).all(axis=1)
+    if inside.sum() < 2:
+        raise UsageError.of("NCF636", "no ball can be reached within the travels", hint="--ball NAME=X,Y,Z, --range")
+    columns |= dict(zip(("mx", "my", "mz"), np.round(q[:, linear], DECIMALS).T, strict=True))
+    kept = {name: values[inside] for name, values in columns.items() if name not in "XYZ"}
+    return Measurement("probe", (), kept, {"ball": tuple(keys[k] for k in which[inside])})
+
+
+def _default_balls(machine: Machine, room: Room) -> dict[str, tuple[float, float, float]]:
+    """Four balls of different height round the point where the tip is in the middle of the travels."""
+    middle = [sum(room.of(axis)) / 2 * axis.unit if not axis.rotary else 0.0 for axis in machine.axes]
+    x, y, z = machine.tip(np.array([middle]), float(np.mean(room.tool_lengths)))[0].tolist()
+    arms = ((60, 0, -20), (0, 60, 20), (-60, 0, 40), (0, -60, 0))
+    return {str(k + 1): (x + a, y + b, z + c) for k, (a, b, c) in enumerate(arms)}
+
+
+def _lengths(machine: Machine, columns: dict[str, Array], unit: Array, room: Room) -> Measurement:
+    """Distances between two places, the second taken from another row."""
+    found = {name: values for name, values in columns.items() if name not in "XYZ"}
+    found |= {f"a{axis.lower()}": columns[axis] for axis in "XYZ"}
+    found |= {f"b{axis.lower()}": np.roll(columns[axis], 1) for axis in "XYZ"}
+    return Measurement("length", (), found, {"set": ("1",) * len(unit)})

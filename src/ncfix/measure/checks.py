@@ -1,0 +1,140 @@
+"""Is a well-formed measurement plausible? What cannot be is an error, what is odd is a remark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.diagnostics import ConfigError, Message
+from ncfix.machine import Machine
+from ncfix.machine.effect import COMPONENTS, NAME
+from ncfix.measure.measurement import Array, Measurement, groups
+
+LARGE_MM, LARGE_RAD = 2.0, 0.02
+"""Errors of which half the rows exceed this are in another unit."""
+ROUND_DEG = 1e-6
+BEYOND = 1e-6
+"""How far outside its range a position may be, for numbers that were rounded: mm, rad."""
+
+
+def checked(measurement: Measurement, machine: Machine) -> Measurement:
+    """The measurement with its remarks; raises `ConfigError` with all of NCF610 ... NCF612."""
+    faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine)]
+    if faults:
+        raise ConfigError.collected(faults)
+    remarks = [
+        *_twice(measurement),
+        *_radians(measurement, machine),
+        *_ranges(measurement, machine),
+        *_micrometres(measurement),
+    ]
+    return replace(measurement, remarks=(*measurement.remarks, *remarks))
+
+
+def _directions(measurement: Measurement) -> Iterator[Message]:
+    for name, values in measurement.columns.items():
+        if name.startswith("dir_") or name == "direction":
+            for row in np.flatnonzero(~np.isin(values, (-1, 0, 1))):
+                text = f"{name} is {values[row]:g}, it can be -1, 0 or 1"
+                yield Message("NCF612", text, measurement.place(int(row)))
+
+
+def _clock(measurement: Measurement) -> Iterator[Message]:
+    if "time_s" not in measurement.columns:
+        return
+    time_s = measurement.columns["time_s"]
+    _, sets = groups(measurement.sets)
+    for index in np.unique(sets):
+        rows = np.flatnonzero(sets == index)
+        for at in np.flatnonzero(np.diff(time_s[rows]) < 0)[:1]:
+            row = int(rows[at + 1])
+            text = f"time goes backwards: {time_s[row]:g} s after {time_s[rows[at]]:g} s"
+            yield Message("NCF611", text, measurement.place(row), "a set of its own for what came after")
+
+
+def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    if measurement.kind != "axis":
+        return
+    for row, (axis, component) in enumerate(
+        zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
+    ):
+        if axis not in machine.axis_names:
+            has = " ".join(machine.axis_names)
+            yield Message("NCF610", f"the machine has no axis {axis}, only {has}", measurement.place(row))
+        elif component_of(axis, component) is None:
+            text = f"{component!r} is no error motion of {axis}"
+            yield Message("NCF612", text, measurement.place(row), f"for example E{COMPONENTS[0]}{axis}")
+
+
+def component_of(axis: str, component: str) -> str | None:
+    """The ISO 230-1 name of a component given as `EYX` or as `Y`; None if it is none of this axis."""
+    name = f"E{component}{axis}" if component in tuple(COMPONENTS) else component
+    match = NAME.fullmatch(name)
+    return name if match and match[3] == axis and not match[2] else None
+
+
+def _twice(measurement: Measurement) -> Iterator[Message]:
+    """Rows of one state in one set: repeats if a column says so, else worth a word."""
+    if "repeat" in measurement.labels or "run" in measurement.columns:
+        return
+    commanded = [name for name in measurement.columns if name not in measurement.measured]
+    first: dict[tuple[object, ...], int] = {}
+    for row in range(len(measurement)):
+        numbers = tuple(float(measurement.columns[name][row]) for name in commanded)
+        key = (measurement.sets[row], *(each[row] for each in measurement.labels.values()), *numbers)
+        before = first.setdefault(key, row)
+        if before != row:
+            yield _repeated(measurement, before, row)
+
+
+def _repeated(measurement: Measurement, before: int, row: int) -> Message:
+    where = measurement.place(before).line
+    same = all(measurement.columns[n][row] == measurement.columns[n][before] for n in measurement.measured)
+    what = "with the same values: was it copied?" if same and measurement.measured else "taken as a repeat"
+    return Message("NCF613", f"the pose of line {where} once more, {what}", measurement.place(row))
+
+
+def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    for axis in machine.axes:
+        if axis.rotary and axis.name in measurement.columns:
+            values = measurement.columns[axis.name]
+            travel = (axis.range[1] - axis.range[0]) / axis.unit
+            if travel > 45 and _looks_like_radians(values):
+                spread = f"{values.min():g} ... {values.max():g}"
+                text = f"the positions of {axis.name}, {spread}, look like radians: degrees are asked for"
+                yield Message("NCF614", text, measurement.place(int(np.abs(values).argmax())))
+
+
+def _looks_like_radians(values: Array) -> bool:
+    moved = np.unique(values[np.abs(values) > ROUND_DEG])
+    if len(moved) < 3 or np.abs(moved).max() > 2 * np.pi + ROUND_DEG or np.abs(moved).max() < 0.1:
+        return False
+    uneven = np.abs(moved - np.round(moved, 1)) > ROUND_DEG
+    even_in_degrees = np.abs(np.rad2deg(moved) - np.round(np.rad2deg(moved))) < 0.05
+    return bool(uneven.mean() > 0.5 and even_in_degrees.mean() > 0.5)
+
+
+def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
+    for axis in machine.axes:
+        if axis.name not in measurement.columns:
+            continue
+        values = measurement.columns[axis.name] * axis.unit
+        outside = np.flatnonzero((values < axis.range[0] - BEYOND) | (values > axis.range[1] + BEYOND))
+        if outside.size:
+            low, high = (limit / axis.unit for limit in axis.range)
+            found = measurement.columns[axis.name][outside[0]]
+            text = f"{axis.name} = {found:g} is outside its range {low:g} ... {high:g}, {outside.size} rows are"
+            yield Message("NCF615", text, measurement.place(int(outside[0])), "are columns swapped?")
+
+
+def _micrometres(measurement: Measurement) -> Iterator[Message]:
+    if measurement.kind not in ("tcp", "tcp6"):
+        return
+    for names, limit, unit in (("dx", "dy", "dz"), LARGE_MM, "mm"), (("rx", "ry", "rz"), LARGE_RAD, "rad"):
+        for name in (each for each in names if each in measurement.columns):
+            size = float(np.median(np.abs(measurement.columns[name])))
+            if size > limit:
+                text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
+                yield Message("NCF616", text, measurement.place(0), "divide by 1000?")

@@ -1,0 +1,129 @@
+"""What the message codes of measurements mean: files (NCF600 ... NCF619), calibration and plans (NCF630 ... NCF649)."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+FORMATS = "docs/formats.md, section 3, describes the measurement file."
+
+CODES = {
+    "NCF600": Code(
+        "not a measurement file",
+        "The file begins with comment lines `# key: value`, one of them `# ncfix-measurement: 1`; or it is the file of "
+        "an instrument that ncfix can read, which this is not.",
+        FORMATS,
+    ),
+    "NCF601": Code("an unknown kind of measurement", "`# kind:` says what was measured; this kind is none.", FORMATS),
+    "NCF602": Code(
+        "an unknown header line",
+        "A header line that ncfix does not know would be ignored in silence. Free notes go under instrument, date, "
+        "origin, operator or note.",
+        FORMATS,
+    ),
+    "NCF603": Code("a header line that cannot be read", "Its value is not of the form that the key asks for.", FORMATS),
+    "NCF604": Code(
+        "an unknown column",
+        "Each column is an axis of the machine, a state (dir_X, time_s, temp_..., load_kg, tool_length, set) or a "
+        "measured value of this kind.",
+        FORMATS,
+    ),
+    "NCF605": Code("a column is missing", "This kind of measurement cannot be used without it.", FORMATS),
+    "NCF606": Code(
+        "a wrong number of cells",
+        "The row has more or fewer cells than there are columns. A decimal comma makes two cells of one number.",
+        "Numbers have a decimal point; commas stand between cells.",
+    ),
+    "NCF607": Code(
+        "an empty cell",
+        "A gap would have to be guessed or its row left out, and ncfix does neither. What was not measured at all has "
+        "no column.",
+        "Fill the gap, or remove the row or the column yourself.",
+    ),
+    "NCF608": Code("a cell that is no number", "The cell cannot be read as a finite number with a decimal point."),
+    "NCF609": Code("no rows", "The file has a header but nothing was measured."),
+    "NCF610": Code(
+        "an axis that the machine does not have",
+        "A column, or a direction, is of an axis that is not in the machine file's topology.",
+        "Is it the right machine file?",
+    ),
+    "NCF611": Code(
+        "time goes backwards",
+        "Within one set a row is earlier than the one before it. Drift and lags would be worked out from a clock that "
+        "cannot have run so.",
+        "Give a set of its own to what was measured after the clock was set back.",
+    ),
+    "NCF612": Code(
+        "a label that is none",
+        "Axis, component, ball or target of a row does not exist, or a direction is none of -1, 0 and 1.",
+    ),
+    "NCF613": Code(
+        "a pose was measured twice",
+        "Two rows of one set have the same state. That is fine for repeats, which tell the noise; with the very same "
+        "values it looks like a row copied by mistake.",
+        "A column `repeat` says that it is meant.",
+    ),
+    "NCF614": Code(
+        "degrees look like radians",
+        "All positions of a rotary axis lie within one turn in radians and not on any round degree, while the axis can "
+        "do far more. Rotary positions are in degrees.",
+    ),
+    "NCF615": Code(
+        "a position outside the range of its axis",
+        "The machine cannot have been there: swapped columns, another machine, or a range that is wrong.",
+    ),
+    "NCF616": Code(
+        "measured errors look like micrometres",
+        "The values are larger than a machine tool's errors in mm can be. They are given in mm (rotations in rad).",
+    ),
+    "NCF617": Code(
+        "measured columns look swapped",
+        "With two columns exchanged, or the sign of one changed, the model explains the measurements far better.",
+        "Check which way the instrument's axes point.",
+    ),
+    "NCF618": Code("an instrument's file that cannot be read", "A line is not what that format has at this place."),
+    "NCF630": Code(
+        "too few rows for the unknowns",
+        "There are more unknowns (errors, and the set-up of the instrument) than measured values, or just as many: "
+        "nothing would be left to tell noise from error.",
+        "Measure more poses, or estimate fewer effects: `--effects`.",
+    ),
+    "NCF631": Code(
+        "errors that these measurements cannot tell apart",
+        "Different values of these coefficients explain the measurements equally well. Some of them are held at what "
+        "the machine file says; the message says which combination was found.",
+        "`ncfix plan --separate` finds poses that tell two effects apart.",
+    ),
+    "NCF632": Code(
+        "an error that these measurements do not see",
+        "It changes nothing that was measured, or only what the unknown set-up changes as well. It is held at what the "
+        "machine file says.",
+    ),
+    "NCF633": Code(
+        "an outlier",
+        "The value is further from the model than noise can explain. It is named and given no weight; the file is as "
+        "it was. `--loss none` gives every value its full weight.",
+        "Look at that row: a typing error, dirt, a missed touch?",
+    ),
+    "NCF634": Code(
+        "the residuals are larger than the noise",
+        "What the model leaves is more than the noise that was given or that repeats show: an effect is missing, or "
+        "the noise is underestimated. Uncertainties are widened accordingly.",
+        "`ncfix diagnose` looks for what is missing.",
+    ),
+    "NCF635": Code(
+        "an effect that cannot be estimated",
+        "No effect of the machine has this name, and it is neither an ISO 230-1 component of one of its axes nor the "
+        "name of a model.",
+        "`ncfix effects` lists the names.",
+    ),
+    "NCF636": Code("a plan that cannot be made", "The numbers asked for leave no poses to choose from."),
+    "NCF637": Code(
+        "the estimation did not converge",
+        "The exact model and its linearisation do not agree: values far larger than errors, or a wrong machine.",
+    ),
+    "NCF638": Code(
+        "several values depend on nearly the same combination",
+        "The condition number of the scaled problem is large: small errors of measurement become large errors of some "
+        "coefficients, though not of the predicted error where it was measured.",
+    ),
+}

@@ -1,0 +1,151 @@
+"""Kind `axis`: one error motion of one axis, read directly (interferometer, autocollimator, straightedge, level).
+
+What is read is the component at the point where it was measured, in the sense of the body's motion, whatever it
+carries. Without `# point:` that is the point that the effect itself refers to. The instrument's zero is not known, nor
+is how a straightness instrument's line is aligned: a constant, and a slope across a linear axis, per set and component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.machine import Effect, Machine
+from ncfix.machine.axis import Axis
+from ncfix.machine.error_model import compile_effects, unit_motion
+from ncfix.machine.linear import functions, switched_on
+from ncfix.machine.signals import with_lags
+from ncfix.machine.state import State, flatten
+from ncfix.measure.checks import component_of
+from ncfix.measure.measurement import Array, Index, Measurement, groups
+from ncfix.measure.observation import LEVER, Observation, Unknowns
+
+ANGLE = 1e-4
+"""rad: how far an angle instrument's zero may be off, in simulations."""
+
+
+class DirectReading(Observation):
+    """Rows of axis, component, position, value."""
+
+    def __init__(self, measurement: Measurement, machine: Machine) -> None:
+        super().__init__(measurement, machine)
+        names = list(machine.axis_names)
+        pairs = zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
+        self.names = tuple(component_of(axis, component) or "" for axis, component in pairs)
+        self.axis_index = np.array([names.index(axis) for axis in measurement.labels["axis"]])
+        each = np.arange(len(measurement))
+        units = np.array([axis.unit for axis in machine.axes])
+        self.q[each, self.axis_index] = measurement.columns["position"] * units[self.axis_index]
+        self.state = self._with_direction(self.state)
+        texts = [f"{name} in set {group}" for name, group in zip(self.names, measurement.sets, strict=True)]
+        self.series, self.series_index = groups(texts)
+        point = measurement.header("point")
+        self.point = np.array([float(part) for part in point.split()]) if point else None
+
+    def _with_direction(self, state: State) -> State:
+        if "direction" not in self.measurement.columns:
+            return state
+        direction = np.array(np.broadcast_to(state.direction, self.q.shape), dtype=np.float64)
+        direction[np.arange(len(self.q)), self.axis_index] = self.measurement.columns["direction"]
+        return replace(state, direction=direction)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """One value a row."""
+        return ("value",)
+
+    @cached_property
+    def sigma(self) -> Array:
+        """As for others, but that each row says for itself whether it is an angle."""
+        lengths = super().sigma
+        angles = self.measurement.noise[1]
+        return np.where(self.rotational, lengths / LEVER if angles is None else angles, lengths)
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Zero, and slope where that is the alignment of the instrument."""
+        if self.measurement.header("setup") == "none":
+            return Unknowns.joined([])
+        first = [int(np.flatnonzero(self.series_index == k)[0]) for k in range(len(self.series))]
+        spread = np.where(self.rotational[first], ANGLE, ANGLE * LEVER)
+        zero = Unknowns(tuple(f"zero of {name}" for name in self.series), np.zeros(len(first)), spread)
+        sloped = [self.series[k] for k in self._sloped]
+        slope = Unknowns(
+            tuple(f"slope of {name}" for name in sloped), np.zeros(len(sloped)), np.full(len(sloped), ANGLE)
+        )
+        return Unknowns.joined([zero, slope])
+
+    def predict(self, machine: Machine, unknowns: Array) -> Array:
+        """See `Observation`; the errors of one joint act linearly."""
+        effects = [effect for effect in machine.effects if effect.active]
+        coefficients = np.concatenate([np.zeros(0), *(effect.coefficients for effect in effects)])
+        read: Array = self.design(effects) @ coefficients + self.unknown_design(unknowns) @ unknowns
+        return read
+
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """See `Observation`."""
+        parts = [np.zeros((len(self.measurement), 0)), *(self._columns(effect) for effect in effects)]
+        return np.concatenate(parts, axis=1)
+
+    def unknown_design(self, unknowns: Array) -> Array:
+        """See `Observation`."""
+        if not len(unknowns):
+            return np.zeros((len(self.measurement), 0))
+        zero = (self.series_index[:, None] == np.arange(len(self.series))).astype(np.float64)
+        position = self.q[np.arange(len(self.q)), self.axis_index]
+        return np.concatenate([zero, zero[:, self._sloped] * position[:, None]], axis=1)
+
+    @property
+    def rotational(self) -> NDArray[np.bool_]:
+        """Which rows are angles."""
+        return np.array([name[1] in "ABC" for name in self.names])
+
+    @cached_property
+    def _sloped(self) -> Index:
+        """The series that are straightness of a linear axis."""
+        rotary = {axis.name: axis.rotary for axis in self.machine.axes}
+        straight = [name[1] in "XYZ" and name[1] != name[2] and not rotary[name[2]] for name in self.series_names]
+        return np.flatnonzero(straight)
+
+    @property
+    def series_names(self) -> list[str]:
+        """The component of each series."""
+        return [name.split()[0] for name in self.series]
+
+    def _columns(self, effect: Effect) -> Array:
+        """What the coefficients of one effect change in each row: (n, k)."""
+        shares = self._shares(effect)
+        if not shares.any():
+            return np.zeros((len(self.measurement), effect.basis.size))
+        model = compile_effects(self.machine.axes, self.machine.tool, [switched_on(effect)])
+        _, poses = flatten(self.q, self.state, self.machine.axes, model.inputs)
+        return shares[:, None] * functions(self.machine.axes, effect, with_lags(poses, model.signals)).T
+
+    def _shares(self, effect: Effect) -> Array:
+        """How much of an effect of size one is in each row's component, (n,)."""
+        same = np.array([name == effect.name for name in self.names], dtype=np.float64)
+        if self.point is None or effect.location or effect.joint not in self.machine.axis_names:
+            return same
+        joint = self.machine.axis_names.index(effect.joint)
+        shares = np.zeros(len(self.names))
+        for name in {each for each in self.names if each[2] == effect.joint}:
+            rows = np.array([each == name for each in self.names])
+            shares[rows] = self._share(effect, name, self.machine.axes[joint], self.q[rows, joint])
+        return shares
+
+    def _share(self, effect: Effect, name: str, axis: Axis, position: Array) -> Array:
+        component = "XYZABC".index(name[1])
+        motion = unit_motion(self.machine.axes, effect)
+        along = np.asarray(axis.error_axes[component % 3])
+        if component >= 3:
+            return np.full(len(position), along @ motion[3:])
+        reference = effect.reference if effect.reference is not None else axis.reference
+        arm = np.broadcast_to(np.asarray(self.point) - np.asarray(reference), (len(position), 3))
+        if axis.rotary and not axis.moving_frame:
+            arm = np.einsum("nij,nj->ni", axis.motion(position)[:, :3, :3], arm)
+        shifted: Array = (motion[:3] + np.cross(motion[3:], arm)) @ along
+        return shifted

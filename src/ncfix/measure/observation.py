@@ -1,0 +1,174 @@
+"""What an instrument sees of a machine: the one interface through which calibration, plans and simulation look.
+
+An observation has `values` (m,), the numbers that were read, one after another: all components of the first row, then
+of the second. `predict` says what they would be for a machine and a guess of what is unknown about the set-up; `design`
+and `unknown_design` are its derivatives to first order, by the coefficients of effects and by those unknowns. The
+design matrix `projection(q) . Jacobian(q) . basis(state)` is made here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ncfix.machine import Effect, Machine, State
+from ncfix.measure.measurement import Array, Index, Measurement, groups
+
+LEVER = 100.0
+"""mm: noise of an angle, where only that of a length is given, is that of a length at this distance."""
+DEFAULT_NOISE = 1e-3
+"""mm, where neither a header nor repeats tell; only the ratio of noises matters then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknowns:
+    """What is unknown about a set-up besides the machine's errors.
+
+    labels  (k) in words
+    start   (k,) first guess, mm or rad
+    spread  (k,) how far from it the truth is likely to be: used to make up set-ups for simulations
+    """
+
+    labels: tuple[str, ...]
+    start: Array
+    spread: Array
+
+    @staticmethod
+    def joined(parts: Sequence[Unknowns]) -> Unknowns:
+        """Several one after another."""
+        labels = tuple(label for part in parts for label in part.labels)
+        start = np.concatenate([np.zeros(0), *(part.start for part in parts)])
+        return Unknowns(labels, start, np.concatenate([np.zeros(0), *(part.spread for part in parts)]))
+
+    @staticmethod
+    def vectors(what: str, names: Sequence[str], start: Array | float = 0.0, spread: float = 0.05) -> Unknowns:
+        """Vectors of three, one for each name: `what` name, x y z."""
+        labels = tuple(f"{what}{name} {axis}" for name in names for axis in "xyz")
+        found = np.broadcast_to(np.asarray(start, dtype=np.float64), (len(names), 3)).reshape(-1)
+        return Unknowns(labels, np.array(found), np.full(len(labels), spread))
+
+
+class Observation(ABC):
+    """One measurement, as seen by one kind of instrument."""
+
+    def __init__(self, measurement: Measurement, machine: Machine) -> None:
+        self.measurement = measurement
+        self.machine = machine
+        self.q = measurement.positions(machine)
+        self.state = measurement.state(machine)
+
+    # -- what was read ------------------------------------------------------------------------------------------------
+
+    @property
+    @abstractmethod
+    def components(self) -> tuple[str, ...]:
+        """The names of the values of one row."""
+
+    @property
+    @abstractmethod
+    def unknowns(self) -> Unknowns:
+        """What is unknown about the set-up."""
+
+    @abstractmethod
+    def predict(self, machine: Machine, unknowns: Array) -> Array:
+        """What the instrument would read, exactly, shape (m,)."""
+
+    @abstractmethod
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """The derivative of `predict` by the effects' coefficients at zero error, shape (m, p)."""
+
+    @abstractmethod
+    def unknown_design(self, unknowns: Array) -> Array:
+        """The derivative of `predict` by the unknowns, shape (m, k)."""
+
+    @cached_property
+    def values(self) -> Array:
+        """What was read, shape (m,); NaN where nothing was yet."""
+        rows = np.full((len(self.measurement), len(self.components)), np.nan)
+        for index, name in enumerate(self.components):
+            if name in self.measurement.columns:
+                rows[:, index] = self.measurement.columns[name]
+        return np.concatenate([rows.ravel(), self.extra_values])
+
+    @property
+    def extra_values(self) -> Array:
+        """Values that belong to no row: calibrated distances."""
+        return np.zeros(0)
+
+    @property
+    def extra_sigma(self) -> Array:
+        """Their standard deviations."""
+        return np.zeros(0)
+
+    @cached_property
+    def rows(self) -> Index:
+        """The row of each value; -1 for extra values."""
+        own = np.repeat(np.arange(len(self.measurement)), len(self.components))
+        return np.concatenate([own, np.full(len(self.extra_values), -1)])
+
+    @property
+    def angular(self) -> tuple[bool, ...]:
+        """Which components are angles."""
+        return tuple(name in ("rx", "ry", "rz") for name in self.components)
+
+    @cached_property
+    def sigma(self) -> Array:
+        """The standard deviation of each value, mm or rad: from the header, else from repeats, else 1 um."""
+        lengths, angles = self.measurement.noise
+        if lengths is None:
+            lengths = repeatability(self.measurement, self.components, self.angular) or DEFAULT_NOISE
+        each = np.where(self.angular, lengths / LEVER if angles is None else angles, lengths)
+        return np.concatenate([np.tile(each, len(self.measurement)), self.extra_sigma])
+
+    @property
+    def noise_known(self) -> bool:
+        """Whether the noise was given or can be told from repeats."""
+        return (
+            self.measurement.noise[0] is not None
+            or repeatability(self.measurement, self.components, self.angular) is not None
+        )
+
+    def with_values(self, values: Array) -> Measurement:
+        """The measurement with these values read."""
+        rows = values[: len(self.measurement) * len(self.components)].reshape(-1, len(self.components))
+        return self.measurement.with_columns(dict(zip(self.components, rows.T, strict=True)))
+
+    # -- for those that look at the tip -------------------------------------------------------------------------------
+
+    def tip_state(self) -> State:
+        """The state of each row."""
+        return self.state
+
+
+def repeatability(measurement: Measurement, components: tuple[str, ...], angular: tuple[bool, ...]) -> float | None:
+    """The pooled standard deviation of lengths over repeats of a state, mm; None with fewer than 10 degrees of freedom.
+
+    Repeats are rows of one set, pose, direction and tool; time and temperatures may differ.
+    """
+    names = [name for name in measurement.columns if not _varies(name) and name not in measurement.measured]
+    found = [name for name, turn in zip(components, angular, strict=True) if name in measurement.columns and not turn]
+    if not found:
+        return None
+    labels = [value for name, value in measurement.labels.items() if name != "repeat"]
+    numbers = [tuple(measurement.columns[name].tolist()) for name in names]
+    keys = [str(key) for key in zip(*labels, *numbers, strict=True)] if labels or numbers else []
+    if not keys:
+        return None
+    _, group = groups(keys)
+    counts = np.bincount(group)
+    freedom = (counts - 1).clip(0).sum() * len(found)
+    if freedom < 10:
+        return None
+    squares = 0.0
+    for name in found:
+        mean = np.bincount(group, measurement.columns[name]) / counts
+        squares += float(((measurement.columns[name] - mean[group]) ** 2).sum())
+    return float(np.sqrt(squares / freedom)) or None
+
+
+def _varies(name: str) -> bool:
+    return name in ("time_s", "run") or name.startswith("temp_")

@@ -1,0 +1,192 @@
+"""Measurement files: text to `Measurement`, with every fault of the file named at once.
+
+The text is split into a head (comment lines), the names of the columns, and rows of cells; each is read with its
+faults noted. What is well formed but odd is looked at afterwards, in `ncfix.measure.checks`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from ncfix import files
+from ncfix.diagnostics import ConfigError, Place
+from ncfix.machine import Machine
+from ncfix.machine.fields import did_you_mean
+from ncfix.measure import checks, headers
+from ncfix.measure.kinds import KINDS, STATES, Kind
+from ncfix.measure.lines import Cell, Text
+from ncfix.measure.measurement import Array, Measurement
+
+SCHEMA = "ncfix-measurement"
+COMMA = re.compile(r"[-+]?\d+,\d+")
+LABELS = ("set", "repeat")
+"""Columns of labels that any kind may have."""
+
+
+def read(path: str, machine: Machine, plan: bool = False) -> Measurement:
+    """The measurement in a file; see `reads`. Raises `SourceError` NCF002 if it cannot be read."""
+    return reads(files.read_bytes(path), machine, path, plan)
+
+
+def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bool = False) -> Measurement:
+    """The measurement in a text, of this machine.
+
+    plan  the file is a plan to be filled in: measured columns may be missing or empty and are then left out.
+
+    Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Instruments' own formats are recognised by what
+    they look like, see `ncfix.measure.foreign`.
+    """
+    from ncfix.measure import foreign
+
+    text = _decoded(source, path)
+    if not text.startswith(f"# {SCHEMA}") and not text.startswith("#"):
+        found = foreign.recognised(text, machine, path)
+        if found is not None:
+            return found
+    lines = Text(path, text.splitlines())
+    measurement = _measurement(lines, machine, plan)
+    return checks.checked(measurement, machine)
+
+
+def _decoded(source: bytes, path: str) -> str:
+    if b"\0" in source:
+        raise ConfigError.of("NCF600", "not a text file", Place(path), "a measurement file is comma-separated text")
+    try:
+        return source.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return source.decode("latin-1")
+
+
+def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
+    pairs = headers.read(text)
+    kind = headers.kind_of(text, pairs)
+    text.stop()
+    form = KINDS[kind]
+    headers.check(text, pairs, kind)
+    start = next((i for i, line in enumerate(text.lines) if line.strip() and not line.startswith("#")), None)
+    if start is None:
+        text.note("NCF609", "there are no columns and no rows", len(text.lines))
+        text.stop()
+    assert start is not None
+    names = _cells(text.lines[start], start + 1)
+    _check_names(text, names, form, machine, plan)
+    rows = _rows(text, names, start)
+    text.stop()
+    columns, labels = _columns(text, [name.text for name in names], rows, form, plan)
+    text.stop()
+    found = np.array([row[0].line for row in rows], dtype=np.int64)
+    notes = tuple((key.text, value.text) for key, value in pairs)
+    return Measurement(kind, notes, columns, labels, found, text.path)
+
+
+def _cells(line: str, number: int) -> list[Cell]:
+    """The cells of a line with their columns."""
+    cells, column = [], 1
+    for part in line.split(","):
+        cells.append(Cell(part.strip(), number, column + len(part) - len(part.lstrip())))
+        column += len(part) + 1
+    return cells
+
+
+def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, plan: bool) -> None:
+    known = {*machine.axis_names, *form.columns, *form.labels, *LABELS, *machine.inputs, "tool_length", "time_s"}
+    known |= {f"dir_{axis}" for axis in machine.axis_names}
+    seen: set[str] = set()
+    for name in names:
+        if name.text in seen:
+            text.note("NCF604", f"column {name.text!r} is there twice", name.line, name.column)
+        seen.add(name.text)
+        if name.text not in known and not STATES.fullmatch(name.text):
+            _unknown_name(text, name, known, form, machine)
+    if form.name == "length":
+        _check_length_form(text, seen, names[0].line)
+    wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
+    for missing in [each for each in wanted if each not in seen]:
+        text.note("NCF605", f"kind {form.name} has a column {missing!r}", names[0].line, 0, _semicolons(names))
+    if form.any_of and not plan and not seen & set(form.measured):
+        one = ", ".join(form.measured)
+        text.note("NCF605", f"kind {form.name} has at least one of {one}", names[0].line, 0, _semicolons(names))
+
+
+def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: Machine) -> None:
+    axis = name.text.removeprefix("dir_")
+    if len(axis) == 1 and axis.isalpha() and axis.isupper():
+        has = " ".join(machine.axis_names)
+        text.note("NCF610", f"the machine has no axis {axis}, only {has}", name.line, name.column)
+        return
+    hint = did_you_mean(name.text, known) or f"kind {form.name} has {', '.join(form.columns)}"
+    text.note("NCF604", f"unknown column {name.text!r}", name.line, name.column, hint)
+
+
+def _semicolons(names: list[Cell]) -> str:
+    several = len(names) == 1 and any(mark in names[0].text for mark in ";\t")
+    return "cells are separated by commas, numbers have a decimal point" if several else ""
+
+
+def _check_length_form(text: Text, seen: set[str], line: int) -> None:
+    gauge, bar = {"ax", "ay", "az", "bx", "by", "bz"}, {"cx", "cy", "cz", "radius"}
+    if gauge <= seen and not bar & seen:
+        return
+    if bar <= seen and not gauge & seen:
+        return
+    forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
+    text.note("NCF605", f"kind length has the columns {forms}", line)
+
+
+def _rows(text: Text, names: list[Cell], start: int) -> list[list[Cell]]:
+    rows = []
+    for number, line in enumerate(text.lines[start + 1 :], start + 2):
+        if not line.strip() or line.startswith("#"):
+            continue
+        cells = _cells(line, number)
+        if len(cells) != len(names):
+            hint = "a number has a decimal point, not a comma" if COMMA.search(line) and len(cells) > len(names) else ""
+            text.note("NCF606", f"{len(cells)} cells, there are {len(names)} columns", number, 0, hint)
+        rows.append(cells)
+    if not rows:
+        text.note("NCF609", "there are columns but no rows", start + 1)
+    return rows
+
+
+def _columns(
+    text: Text, names: list[str], rows: list[list[Cell]], form: Kind, plan: bool
+) -> tuple[dict[str, Array], dict[str, tuple[str, ...]]]:
+    columns: dict[str, Array] = {}
+    labels: dict[str, tuple[str, ...]] = {}
+    for index, name in enumerate(names):
+        cells = [row[index] for row in rows]
+        if plan and name in form.measured and not any(cell.text for cell in cells):
+            continue
+        if name in (*LABELS, *form.labels):
+            labels[name] = tuple(_label(text, cell, name) for cell in cells)
+        else:
+            columns[name] = _numbers(text, cells, name)
+    return columns, labels
+
+
+def _label(text: Text, cell: Cell, name: str) -> str:
+    if not cell.text:
+        text.note("NCF607", f"column {name!r} is empty in this row", cell.line, cell.column)
+    return cell.text
+
+
+def _numbers(text: Text, cells: Iterable[Cell], name: str) -> Array:
+    return np.array([_number(text, cell, name) for cell in cells])
+
+
+def _number(text: Text, cell: Cell, name: str) -> float:
+    if not cell.text:
+        text.note("NCF607", f"column {name!r} is empty in this row", cell.line, cell.column)
+        return math.nan
+    try:
+        value = float(cell.text.replace("_", "?"))
+    except ValueError:
+        text.note("NCF608", f"column {name!r}: {cell.text!r} is not a number", cell.line, cell.column)
+        return math.nan
+    if not math.isfinite(value):
+        text.note("NCF608", f"column {name!r}: {cell.text} is not a finite number", cell.line, cell.column)
+    return value

@@ -1,0 +1,84 @@
+"""What the residuals of a calibration say: their size per set, their order, and which values carry the result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from ncfix.diagnostics import Place
+from ncfix.measure.measurement import Array, Index
+
+if TYPE_CHECKING:
+    from ncfix.measure.calibrate import Estimate, Problem
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """One entry per value, (m,).
+
+    observation   which of the measurements, row of it (-1: a calibrated distance), and component
+    value         mm or rad, actual minus predicted
+    studentised   divided by its own standard deviation
+    cook          Cook's distance: how far all estimates move if this value is left out
+    """
+
+    observation: Index
+    row: Index
+    component: tuple[str, ...]
+    value: Array
+    studentised: Array
+    cook: Array
+
+
+def residuals(problem: Problem, estimate: Estimate) -> Residuals:
+    """The residuals with their diagnostics; those without weight are studentised as new values would be."""
+    solution, weight = estimate.solution, estimate.weight
+    freedom = max(int((weight > 0).sum()) - solution.rank, 1)
+    size = estimate.residual / problem.sigma
+    scale = np.sqrt(float((weight * size**2).sum()) / freedom) or 1.0
+    leverage = np.where(weight > 0, solution.leverage, 0.0).clip(0.0, 1 - 1e-9)
+    studentised = size / (scale * np.sqrt(1 - leverage))
+    cook = studentised**2 * leverage / ((1 - leverage) * max(solution.rank, 1))
+    which = np.repeat(np.arange(len(problem.observations)), [len(each.values) for each in problem.observations])
+    rows = np.concatenate([each.rows for each in problem.observations])
+    names: list[str] = []
+    for each in problem.observations:
+        names += [*each.components * len(each.measurement), *["distance"] * len(each.extra_values)]
+    return Residuals(which, rows, tuple(names), estimate.residual, studentised, cook)
+
+
+def place(problem: Problem, found: Residuals, index: int) -> Place:
+    """Where a value stands in its file."""
+    measurement = problem.observations[int(found.observation[index])].measurement
+    row = int(found.row[index])
+    return Place(measurement.path) if row < 0 else measurement.place(row)
+
+
+def runs_test(values: Array) -> float:
+    """The probability of so few runs of one sign, in order, by chance (Wald and Wolfowitz); 1 for too few values."""
+    signs = np.sign(values[np.abs(values) > 0])
+    up, down = int((signs > 0).sum()), int((signs < 0).sum())
+    n = up + down
+    if min(up, down) < 8:
+        return 1.0
+    runs = 1 + int((np.diff(signs) != 0).sum())
+    mean = 1 + 2 * up * down / n
+    variance = (mean - 1) * (mean - 2) / (n - 1)
+    return float(stats.norm.cdf((runs - mean) / np.sqrt(variance)))
+
+
+def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:
+    """The rms of lengths in um, per file and set."""
+    sizes: dict[str, float] = {}
+    for index, each in enumerate(problem.observations):
+        mine = (found.observation == index) & (found.row >= 0)
+        lengths = np.array([name[0] != "r" for name in found.component])
+        for name in dict.fromkeys(each.measurement.sets):
+            rows = np.flatnonzero(np.array(each.measurement.sets) == name)
+            chosen = found.value[mine & lengths & np.isin(found.row, rows)]
+            if chosen.size:
+                sizes[f"{each.measurement.path} set {name}"] = float(1e3 * np.sqrt((chosen**2).mean()))
+    return sizes

@@ -1,0 +1,137 @@
+"""From the end of an iteration to a calibrated machine and what has to be said about it."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from ncfix.diagnostics import Message
+from ncfix.machine import Effect, Machine
+from ncfix.measure import words
+from ncfix.measure.calibrate import UNLIKELY, Calibration, Estimate, Problem, noise_scale
+from ncfix.measure.measurement import Array
+from ncfix.measure.observation import Observation
+from ncfix.measure.residuals import Residuals, place, residuals
+from ncfix.measure.solve import orthonormal, without
+
+BETTER = 0.2
+"""Squares left after exchanging columns, of those before, from which on the columns look exchanged."""
+NAMED = 20
+"""Outliers that are named one by one."""
+SMALLEST = 1e-18
+
+
+def result(problem: Problem, estimate: Estimate, loss: str) -> Calibration:
+    """The calibrated machine, with covariances and provenance."""
+    freedom = max(int((estimate.weight > 0).sum()) - estimate.solution.rank, 1)
+    chi_square = float((estimate.weight * (estimate.residual / problem.sigma) ** 2).sum() / freedom)
+    scale = noise_scale(problem, chi_square, freedom)
+    found = residuals(problem, estimate)
+    remarks = [each for seen in problem.observations for each in seen.measurement.remarks]
+    remarks += words.remarks(estimate.solution, problem.selection.labels)
+    remarks += _outliers(problem, estimate, found)
+    remarks += _noise(problem, chi_square, freedom)
+    remarks += [message for each in _swapped(problem, estimate) for message in each]
+    before, after = _rms_before(problem), _rms(problem, estimate.residual, estimate.weight > 0)
+    machine = _machine(problem, estimate, scale, {"rms_before_um": before, "rms_after_um": after, "loss": loss})
+    return Calibration(machine, problem, estimate, scale, tuple(remarks), before, after)
+
+
+def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[str, Any]) -> Machine:
+    machine = problem.selection.machine(problem.machine, estimate.coefficients.tolist())
+    kept = estimate.solution.kept
+    p = len(estimate.coefficients)
+    covariance = np.full((p, p), np.nan)
+    covariance[np.ix_(kept, kept)] = estimate.solution.covariance * scale**2
+    effects, start = [], 0
+    for effect, free in zip(machine.effects, problem.selection.free, strict=True):
+        stop = start + (effect.basis.size if free else 0)
+        effects.append(_known(effect, covariance[start:stop, start:stop]) if free else effect)
+        start = stop
+    sources = ", ".join(dict.fromkeys(each.measurement.path for each in problem.observations))
+    notes = {"date": datetime.date.today(), "source": sources, "calibrated_from": problem.machine.hash}
+    rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in figures.items()}
+    return machine.replace(effects=tuple(effects), provenance={**problem.machine.provenance, **notes, **rounded})
+
+
+def _known(effect: Effect, covariance: Array) -> Effect:
+    """The effect with its covariance, if all of its coefficients were estimated."""
+    if not np.isfinite(covariance).all():
+        return replace(effect, covariance=None)
+    even = (covariance + covariance.T) / 2
+    return replace(effect, covariance=tuple(tuple(float(value) for value in row) for row in even))
+
+
+def _outliers(problem: Problem, estimate: Estimate, found: Residuals) -> Iterator[Message]:
+    aside = np.flatnonzero(estimate.weight == 0)
+    for index in aside[np.argsort(-np.abs(found.studentised[aside]))][:NAMED]:
+        text = f"{found.component[index]} is {_size(found, index)} from the model: an outlier, given no weight"
+        yield Message("NCF633", text, place(problem, found, int(index)), "look at that row; --loss none keeps it")
+    if len(aside) > NAMED:
+        yield Message("NCF633", f"{len(aside) - NAMED} more outliers")
+
+
+def _size(found: Residuals, index: int) -> str:
+    angle = found.component[index][0] == "r"
+    return f"{found.value[index] * (1e6 if angle else 1e3):+.1f} {'urad' if angle else 'um'}"
+
+
+def _noise(problem: Problem, chi_square: float, freedom: int) -> Iterator[Message]:
+    if problem.noise_known and stats.chi2.sf(chi_square * freedom, freedom) < UNLIKELY:
+        factor = np.sqrt(chi_square)
+        text = f"the residuals are {factor:.2f} times the noise: an effect is missing, or the noise is larger"
+        yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")
+
+
+def _rms(problem: Problem, values: Array, keep: NDArray[np.bool_]) -> float:
+    """The rms of lengths, um."""
+    turns = np.concatenate([np.tile(each.angular, len(each.measurement)) for each in problem.observations])
+    rows = np.concatenate([each.rows for each in problem.observations]) >= 0
+    lengths = np.zeros(len(values), dtype=bool)
+    lengths[np.flatnonzero(rows)] = ~turns.astype(bool)
+    chosen = values[lengths & keep]
+    return float(1e3 * np.sqrt((chosen**2).mean())) if chosen.size else 0.0
+
+
+def _rms_before(problem: Problem) -> float:
+    """The same about the machine as it was, with the set-up fitted."""
+    residual = problem.residual(problem.selection.start, problem.start) / problem.sigma
+    basis = orthonormal(problem.nuisance(problem.start) / problem.sigma[:, None])
+    return _rms(problem, without(basis, residual) * problem.sigma, np.ones(len(residual), dtype=bool))
+
+
+def _swapped(problem: Problem, estimate: Estimate) -> Iterator[list[Message]]:
+    """Whether exchanged or reversed columns would explain much more."""
+    if len(problem.observations) != 1 or problem.observations[0].measurement.kind != "tcp":
+        return
+    seen = problem.observations[0]
+    columns = np.concatenate([estimate.solution.orthogonal, estimate.solution.nuisance], axis=1)
+    rows = (problem.values / problem.sigma).reshape(-1, len(seen.components))
+    weight = np.sqrt(estimate.weight).reshape(rows.shape)
+    known = problem.values - problem.residual(problem.selection.start, problem.start)
+    known = (known / problem.sigma).reshape(rows.shape)
+
+    def left(order: tuple[int, ...], signs: tuple[int, ...]) -> float:
+        changed = ((rows[:, order] * signs - known) * weight).ravel()
+        return float((without(columns, changed) ** 2).sum())
+
+    size = len(seen.components)
+    straight = left(tuple(range(size)), (1,) * size)
+    tried = {key: left(*key) for key in product(permutations(range(size)), product((1, -1), repeat=size))}
+    order, signs = min(tried, key=lambda key: tried[key])
+    clear = tried[order, signs] < BETTER * straight and straight > 4 * len(problem.values)
+    if clear:
+        yield [_look_swapped(seen, order, signs)]
+
+
+def _look_swapped(seen: Observation, order: tuple[int, ...], signs: tuple[int, ...]) -> Message:
+    names = [f"{'-' if sign < 0 else ''}{seen.components[k]}" for k, sign in zip(order, signs, strict=True)]
+    text = f"the columns {', '.join(seen.components)} look exchanged: {', '.join(names)} fit much better"
+    return Message("NCF617", text, seen.measurement.place(0), "which way do the instrument's axes point?")

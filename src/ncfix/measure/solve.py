@@ -1,0 +1,139 @@
+"""Weighted linear least squares with unknowns of no interest eliminated, and which of the rest can be told.
+
+Everything here is in units of the noise: rows were divided by their standard deviations before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from ncfix.measure.measurement import Array, Index
+
+NUISANCE_RANK = 1e-10
+"""Singular values of the scaled nuisance columns below this are zero."""
+VISIBLE = 1e-6
+"""A column of which less than this is left after the set-up was eliminated is not seen."""
+RANK = 1e-6
+"""Scaled columns nearer than this to a combination of others are that combination."""
+SIGNIFICANT = 0.02
+"""Share from which on a column is named as part of such a combination."""
+
+
+@dataclass(frozen=True, slots=True)
+class Combination:
+    """A column that equals a combination of others: raising `held` by 1 is raising each of `others` by its factor."""
+
+    held: int
+    others: tuple[int, ...]
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What least squares say of p coefficients.
+
+    change       (p,) what is to be added; zero for those held
+    kept         (r,) indices of those that were estimated
+    unseen       those that change nothing that was measured
+    set_up       those that change only what the unknown set-up changes too
+    combinations those that are held because others do the same
+    covariance   (r, r) of the kept, for a noise of one
+    orthogonal   (m, r) orthonormal columns of the kept after elimination
+    nuisance     (m, s) orthonormal columns of the set-up
+    residual     (m,) what is left
+    condition    of the kept columns, scaled to one
+    """
+
+    change: Array
+    kept: Index
+    unseen: tuple[int, ...]
+    set_up: tuple[int, ...]
+    combinations: tuple[Combination, ...]
+    covariance: Array
+    orthogonal: Array
+    nuisance: Array
+    residual: Array
+    condition: float
+
+    @property
+    def leverage(self) -> Array:
+        """How much each value determines its own prediction, (m,)."""
+        squares: Array = (self.orthogonal**2).sum(1) + (self.nuisance**2).sum(1)
+        return squares
+
+    @property
+    def rank(self) -> int:
+        """How many numbers were determined, set-up included."""
+        return int(self.orthogonal.shape[1] + self.nuisance.shape[1])
+
+
+def orthonormal(columns: Array) -> Array:
+    """An orthonormal basis of what the columns span, (m, k) -> (m, rank)."""
+    size = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, size > 0] / size[size > 0]
+    if not scaled.shape[1]:
+        return np.zeros((len(columns), 0))
+    left, values, _ = np.linalg.svd(scaled, full_matrices=False)
+    basis: Array = left[:, values > NUISANCE_RANK * values[0]]
+    return basis
+
+
+def without(basis: Array, columns: Array) -> Array:
+    """The part of the columns that is orthogonal to the basis; done twice, for the last digits."""
+    once = columns - basis @ (basis.T @ columns)
+    twice: Array = once - basis @ (basis.T @ once)
+    return twice
+
+
+def solve(design: Array, nuisance: Array, target: Array) -> Solution:
+    """Least squares of `design @ change + nuisance @ anything = target`.
+
+    design (m, p), nuisance (m, k), target (m,), all divided by the noise.
+    """
+    basis = orthonormal(nuisance)
+    left, wanted = without(basis, design), without(basis, target)
+    before, after = np.linalg.norm(design, axis=0), np.linalg.norm(left, axis=0)
+    seen = np.flatnonzero(after > VISIBLE * np.maximum(before, 1e-300))
+    scaled = left[:, seen] / after[seen]
+    kept, orthogonal, triangle, combinations = _independent(scaled, seen, after)
+    change = np.zeros(design.shape[1])
+    projected = orthogonal.T @ wanted
+    inverse = solve_triangular(triangle, np.eye(len(kept))) / after[kept, None] if len(kept) else np.zeros((0, 0))
+    change[kept] = inverse @ projected
+    blind = np.setdiff1d(np.arange(design.shape[1]), seen)
+    values = np.linalg.svd(triangle, compute_uv=False) if len(kept) else np.ones(1)
+    return Solution(
+        change,
+        kept,
+        tuple(int(k) for k in blind if before[k] == 0),
+        tuple(int(k) for k in blind if before[k] > 0),
+        combinations,
+        inverse @ inverse.T,
+        orthogonal,
+        basis,
+        wanted - orthogonal @ projected,
+        float(values[0] / values[-1]),
+    )
+
+
+def _independent(scaled: Array, seen: Index, size: Array) -> tuple[Index, Array, Array, tuple[Combination, ...]]:
+    """A largest set of independent columns, their QR factors, and what the others are made of."""
+    if not scaled.shape[1]:
+        return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), ()
+    _, triangle, order = qr(scaled, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(triangle))
+    rank = int((diagonal > RANK * diagonal[0]).sum())
+    chosen = np.sort(order[:rank])
+    orthogonal, upper = np.linalg.qr(scaled[:, chosen])
+    kept = seen[chosen]
+    combinations = []
+    for column in np.sort(order[rank:]):
+        shares = solve_triangular(upper, orthogonal.T @ scaled[:, column])
+        others = np.flatnonzero(np.abs(shares) > SIGNIFICANT * np.abs(shares).max())
+        factors = shares[others] * size[seen[column]] / size[kept[others]]
+        names = tuple(int(k) for k in kept[others])
+        combinations.append(Combination(int(seen[column]), names, tuple(float(f) for f in factors)))
+    return kept, orthogonal, upper, tuple(combinations)

@@ -1,0 +1,162 @@
+"""Kind `points`: targets on the spindle head or the table, seen from an instrument that stands on the foundation.
+
+A laser tracker reads x = Q (B p) + s: p the target's place on its body, B the body's real pose in the base frame, Q and
+s how the instrument stands. Places and stand are unknown. Three or more targets show all six errors of a body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from ncfix.machine import Effect, Machine, State, se3
+from ncfix.measure.geometry import TOOL, WORKPIECE, best_rotation, branch
+from ncfix.measure.measurement import Array, Measurement, groups
+from ncfix.measure.observation import Observation, Unknowns
+
+READ = ("x", "y", "z")
+ROUNDS = 200
+"""Steps of the first guess of stand and places, each nearer than the one before."""
+STOOD = 0.02
+"""rad: how far the instrument may be turned against the base, in simulations."""
+
+
+class Targets(Observation):
+    """Rows of target, x y z."""
+
+    def __init__(self, measurement: Measurement, machine: Machine) -> None:
+        super().__init__(measurement, machine)
+        self.side = measurement.header("carried_by")
+        self.body, self.axes = branch(machine, self.side)
+        self.own = self.q[:, self.axes]
+        direction = np.asarray(self.state.direction)[:, self.axes]
+        self.own_state = State(0.0, direction, {**self._other_axes(), **self.state.inputs})
+        self.poses = self._base_from_body(self.body.nominal(self.own, 0.0))
+        self.names, self.index = groups(measurement.labels["target"])
+        self.set_names, self.set_index = groups(measurement.sets)
+        self.stands, self.places = self._first_guess()
+
+    def _other_axes(self) -> dict[str, Array]:
+        """The axes of the other branch, which errors of this one may depend on, as inputs in the file's units."""
+        others = [k for k in range(len(self.machine.axes)) if k not in self.axes]
+        return {self.machine.axes[k].name: self.q[:, k] / self.machine.axes[k].unit for k in others}
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The instrument's x y z."""
+        return READ
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Places of the targets on their body; stand of the instrument per set, as a shift and a small turn."""
+        return Unknowns.joined(
+            [
+                Unknowns.vectors("place of target ", self.names, self.places, spread=1.0),
+                Unknowns.vectors("place of the instrument in set ", self.set_names, self.stands[:, :3, 3], spread=50.0),
+                Unknowns.vectors("turn of the instrument in set ", self.set_names, spread=STOOD),
+            ]
+        )
+
+    def predict(self, machine: Machine, unknowns: Array) -> Array:
+        """See `Observation`."""
+        places, shifts, turns = self._parts(unknowns)
+        body, _ = branch(machine, self.side)
+        poses = self._base_from_body(body.actual(self.own, self.own_state))
+        base = np.einsum("nij,nj->ni", poses[:, :3, :3], places[self.index]) + poses[:, :3, 3]
+        turned = se3.rotation(turns) @ self.stands[:, :3, :3]
+        seen: Array = np.einsum("nij,nj->ni", turned[self.set_index], base) + shifts[self.set_index]
+        return seen.ravel()
+
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """See `Observation`; the errors of the other branch are not seen."""
+        joints = {axis.name for axis in self.body.axes} | ({"S"} if self.side == TOOL else set())
+        parts = [np.zeros((3 * len(self.measurement), 0))]
+        for effect in effects:
+            seen = effect.joint in joints
+            size = effect.basis.size
+            parts.append(self._columns(effect) if seen else np.zeros((3 * len(self.measurement), size)))
+        return np.concatenate(parts, axis=1)
+
+    def unknown_design(self, unknowns: Array) -> Array:
+        """See `Observation`."""
+        n, t, s = len(self.measurement), len(self.names), len(self.set_names)
+        places, _, turns = self._parts(unknowns)
+        turned = (se3.rotation(turns) @ self.stands[:, :3, :3])[self.set_index]
+        base = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.index]) + self.poses[:, :3, 3]
+        arms = -se3.skew(np.einsum("nij,nj->ni", turned, base))
+        columns, each = np.zeros((n, 3, 3 * (t + 2 * s))), np.arange(n)
+        carried = turned @ self.poses[:, :3, :3]
+        for k in range(3):
+            columns[each, :, 3 * self.index + k] = carried[:, :, k]
+            columns[each, k, 3 * (t + self.set_index) + k] = 1.0
+            columns[each, :, 3 * (t + s + self.set_index) + k] = arms[:, :, k]
+        result: Array = columns.reshape(3 * n, -1)
+        return result
+
+    def _parts(self, unknowns: Array) -> tuple[Array, Array, Array]:
+        t, s = len(self.names), len(self.set_names)
+        parts = np.split(unknowns.reshape(-1, 3), [t, t + s])
+        return parts[0], parts[1], parts[2]
+
+    def _base_from_body(self, poses: Array) -> Array:
+        """base_from_body; the tool branch's zero pose is made the identity."""
+        if self.side == WORKPIECE:
+            return se3.inverse(poses)
+        tip = self.machine.tool.tip(np.zeros(()))
+        return poses @ se3.shift(-np.asarray(tip))
+
+    def _columns(self, effect: Effect) -> Array:
+        """What one effect moves, seen from the instrument at its first guess: (m, k)."""
+        error = self.body.design(self.own, self.own_state, [effect])
+        places = self.places[self.index]
+        if self.side == WORKPIECE:
+            at = self.body.nominal(self.own, 0.0)[:, :3, 3]
+            moved = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(places - at), error[:, 3:])
+            base = -np.einsum("nij,njk->nik", self.poses[:, :3, :3], moved)
+        else:
+            at = self.body.nominal(self.own, 0.0)[:, :3, 3]
+            points = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places) + self.poses[:, :3, 3]
+            base = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(points - at), error[:, 3:])
+        seen = np.einsum("nij,njk->nik", self.stands[self.set_index][:, :3, :3], base)
+        result: Array = seen.reshape(-1, seen.shape[-1])
+        return result
+
+    def _first_guess(self) -> tuple[Array, Array]:
+        """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
+        places = np.zeros((len(self.names), 3))
+        for text in self.measurement.all_headers("target"):
+            name, *numbers = text.split()
+            if name in self.names:
+                places[self.names.index(name)] = [float(each) for each in numbers]
+        stands = np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy()
+        if not all(name in self.measurement.columns for name in READ):
+            return stands, places
+        seen = self.measurement.stacked(*READ)
+        for _ in range(ROUNDS):
+            before = places
+            stands = self._stands(seen, places)
+            places = self._placed(seen, stands)
+            if np.abs(places - before).max() < 1e-6:
+                break
+        return stands, places
+
+    def _stands(self, seen: Array, places: Array) -> Array:
+        """How the instrument stands, for targets that are there."""
+        base = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.index]) + self.poses[:, :3, 3]
+        stands = np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy()
+        for k in range(len(self.set_names)):
+            rows = self.set_index == k
+            middle, center = seen[rows].mean(0), base[rows].mean(0)
+            if self.measurement.header("frame") != "base":
+                stands[k, :3, :3] = best_rotation(seen[rows] - middle, base[rows] - center)
+            stands[k, :3, 3] = middle - stands[k, :3, :3] @ center
+        return stands
+
+    def _placed(self, seen: Array, stands: Array) -> Array:
+        """Where the targets are, for an instrument that stands like this."""
+        local = np.einsum("nji,nj->ni", stands[self.set_index][:, :3, :3], seen - stands[self.set_index][:, :3, 3])
+        body = np.einsum("nji,nj->ni", self.poses[:, :3, :3], local - self.poses[:, :3, 3])
+        counts = np.bincount(self.index)
+        return np.stack([np.bincount(self.index, body[:, k]) / counts for k in range(3)], axis=-1)

@@ -1,0 +1,190 @@
+"""Calibration gives back what was put in, and says what it cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.poses import machine, perfect, plan
+from ncfix.diagnostics import UsageError
+from ncfix.machine import dumps, loads
+from ncfix.measure.calibrate import Calibration, calibrate
+from ncfix.measure.measurement import Measurement
+from ncfix.measure.selection import Selection
+from ncfix.measure.synthetic import Faults, simulate
+
+KINDS = ("tcp", "tcp6", "probe", "gauge", "bar", "tool", "axis")
+
+
+def identifiable(known, kind, count):
+    """The machine, with only those coefficients free that this measurement can tell."""
+    first = calibrate([simulate(plan(known, kind, count), known, Faults(noise_um=0.01))], perfect(known))
+    kept = set(np.flatnonzero(np.isfinite(first.sigma)).tolist())
+    free, at = [], 0
+    for effect in known.effects:
+        free.append(all(at + k in kept for k in range(effect.basis.size)))
+        at += effect.basis.size
+    return Selection(known.effects, tuple(free))
+
+
+def coefficients(effects) -> np.ndarray:
+    return np.array([value for effect in effects for value in effect.coefficients])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["three_axis", "wCBXFZYSt"])
+def test_estimates_are_within_their_uncertainty(name, kind):
+    known = machine(name)
+    chosen = identifiable(known, kind, 250)
+    start = chosen.machine(known, np.zeros(len(chosen.start)).tolist())
+    data = simulate(plan(known, kind, 250), known, Faults(noise_um=1.0), seed=7)
+    found = calibrate([data], start, Selection(start.effects, chosen.free))
+    error = (found.estimate.coefficients - coefficients(chosen.estimated)) / found.sigma
+    assert np.isfinite(error).all()
+    # normal errors: 4.5 sigma is passed once in 2,000 draws of 80 parameters; chi-square has 150 and more freedoms
+    assert np.abs(error).max() < 4.5
+    assert 0.7 < found.chi_square < 1.4
+
+
+def test_without_noise_the_machine_comes_back():
+    known = machine("wCBXFZYSt")
+    chosen = identifiable(known, "tcp6", 200)
+    start = chosen.machine(known, np.zeros(len(chosen.start)).tolist())
+    data = simulate(plan(known, "tcp6", 200), known, Faults(), seed=1).with_header("noise_um", "1")
+    found = calibrate([data], start, Selection(start.effects, chosen.free))
+    gap = found.machine.error(data.positions(known), data.state(known)) - known.error(
+        data.positions(known), data.state(known)
+    )
+    # what differs is a rigid shift of ball and stylus at most; the model of tilts is first order: 1e-4 squared x 300 mm
+    assert np.abs(gap - gap.mean(axis=0)).max() < 2e-4
+
+
+def test_the_result_reads_back_with_its_covariance():
+    known = machine("three_axis")
+    data = simulate(plan(known, "tcp", 150), known, Faults(noise_um=1.0), seed=3)
+    found = calibrate([data], perfect(known))
+    again = loads(dumps(found.machine))
+    assert again.effects == found.machine.effects
+    assert again.provenance["source"] == data.path
+    assert any(effect.covariance for effect in again.effects)
+
+
+def test_squarenesses_of_two_axes_are_one_angle():
+    known = machine("three_axis").replace(effects=())
+    data = simulate(plan(known, "tcp", 60), known, Faults(noise_um=1.0), seed=3)
+    data = data.with_header("setup", "rigid")
+    found = calibrate([data], known, "EC0X,EC0Y")
+    assert any("only their" in str(message) for message in found.remarks if message.code == "NCF631")
+    assert np.isnan(found.sigma).sum() == 1
+
+
+def test_what_is_not_seen_is_said():
+    known = machine("three_axis").replace(effects=())
+    poses = plan(known, "tcp", 60)
+    flat = poses.with_columns({"Z": np.zeros(60)})
+    data = simulate(flat, known, Faults(noise_um=1.0), seed=3)
+    found = calibrate([data], known, "EZZ,EC0Y")
+    held = [str(message) for message in found.remarks if message.code == "NCF632"]
+    assert any("EZZ" in text for text in held)
+    assert not any("EC0Y" in text for text in held)
+
+
+def test_one_setting_of_an_axis_hides_its_location():
+    known = machine("wCBXFZYSt").replace(effects=())
+    poses = plan(known, "tcp", 60)
+    still = poses.with_columns({"B": np.zeros(60), "C": np.zeros(60)})
+    found = calibrate([simulate(still, known, Faults(noise_um=1.0))], known, "EX0C,EC0Y")
+    codes = {message.code for message in found.remarks}
+    assert "NCF632" in codes
+    assert np.isnan(found.sigma).tolist() == [True, False]
+
+
+def test_too_few_rows_are_refused():
+    known = machine("three_axis")
+    data = simulate(plan(known, "tcp", 10), known, Faults(noise_um=1.0))
+    with pytest.raises(UsageError) as caught:
+        calibrate([data], known)
+    assert caught.value.code == "NCF630"
+    assert "30 values" in str(caught.value)
+
+
+def outlying(size_mm: float) -> tuple[Calibration, Calibration, Measurement]:
+    known = machine("three_axis")
+    clean = simulate(plan(known, "tcp", 150), known, Faults(noise_um=1.0), seed=4)
+    wrong = clean.columns["dy"].copy()
+    wrong[42] += size_mm
+    spoilt = replace(clean.with_columns({"dy": wrong}), lines=np.arange(150) + 5)
+    return calibrate([clean], perfect(known)), calibrate([spoilt], perfect(known)), spoilt
+
+
+@pytest.mark.parametrize("size_mm", [0.5, -0.05])
+def test_an_outlier_is_named_and_has_no_weight(size_mm):
+    clean, spoilt, _ = outlying(size_mm)
+    named = [message for message in spoilt.remarks if message.code == "NCF633"]
+    assert len(named) == 1
+    assert named[0].place is not None
+    assert named[0].place.line == 47
+    assert not [message for message in clean.remarks if message.code == "NCF633"]
+    moved = np.abs(spoilt.estimate.coefficients - clean.estimate.coefficients) / clean.sigma
+    assert np.nanmax(moved) < 1.0
+
+
+def test_loss_none_keeps_an_outlier():
+    _, _, data = outlying(0.5)
+    found = calibrate([data], perfect(machine("three_axis")), loss="none")
+    assert (found.estimate.weight == 1).all()
+    assert found.after_um > 10
+
+
+@pytest.mark.parametrize("loss", ["huber", "tukey"])
+def test_robust_losses_hold_an_outlier_down(loss):
+    clean, _, data = outlying(0.5)
+    found = calibrate([data], perfect(machine("three_axis")), loss=loss)
+    moved = np.abs(found.estimate.coefficients - clean.estimate.coefficients) / clean.sigma
+    assert np.nanmax(moved) < 2.0
+
+
+def test_exchanged_columns_are_suspected():
+    known = machine("wCBXFZYSt")
+    data = simulate(plan(known, "tcp", 150), known, Faults(noise_um=0.5, setup=0.1), seed=4)
+    swapped = data.with_columns({"dx": data.columns["dy"], "dy": data.columns["dx"]})
+    assert "NCF617" in {message.code for message in calibrate([swapped], perfect(known)).remarks}
+    assert "NCF617" not in {message.code for message in calibrate([data], perfect(known)).remarks}
+
+
+def test_more_than_noise_is_said_and_widens_uncertainty():
+    known = machine("three_axis")
+    data = simulate(plan(known, "tcp", 150), known, Faults(noise_um=1.0), seed=4)
+    optimist = data.with_header("noise_um", "0.3")
+    found = calibrate([optimist], perfect(known))
+    assert "NCF634" in {message.code for message in found.remarks}
+    honest = calibrate([data], perfect(known))
+    ratio = found.sigma / honest.sigma
+    assert np.nanmax(np.abs(ratio - ratio[np.isfinite(ratio)][0])) < 1e-6
+    assert 0.8 < ratio[np.isfinite(ratio)][0] < 1.25
+
+
+def test_pruning_leaves_what_matters():
+    known = machine("three_axis").replace(effects=())
+    known = calibrate([simulate(plan(known, "tcp", 200), known, Faults(noise_um=1.0))], known, "EXX,EC0Y,EYY").machine
+    values = {"EXX": (0.02, 0.0, 0.0), "EYY": (0.0, 0.0, 0.0), "EC0Y": (5e-5,)}
+    real = known.replace(effects=tuple(replace(e, coefficients=values[e.name]) for e in known.effects))
+    data = simulate(plan(real, "tcp", 200), real, Faults(noise_um=1.0), seed=2)
+    found = calibrate([data], perfect(real), prune=0.9999)
+    assert set(found.labels) == {"EXX u^1", "EC0Y"}
+
+
+def test_the_uncertainty_of_a_prediction_covers_its_error():
+    known = machine("three_axis")
+    places = plan(known, "tcp", 100, seed=99)
+    inside = []
+    for seed in range(5):
+        data = simulate(plan(known, "tcp", 200), known, Faults(noise_um=1.0), seed=seed).with_header("setup", "rigid")
+        found = calibrate([data], perfect(known))
+        q, state = places.positions(known), places.state(known)
+        design = known.design(q, state, found.problem.selection.estimated)[:, :3]
+        sigma = found.uncertainty(design)
+        inside.append(sigma.mean())
+    assert 0 < np.mean(inside) < 2e-3
