@@ -186,7 +186,7 @@ def test_a_finding_names_axis_amount_and_place_and_counts_what_it_does_not_show(
     messages = over.messages(lambda row: Place("part.ngc", row + 1), most=3)
     assert len(messages) == 4
     assert messages[1].place == Place("part.ngc", 2)
-    assert "axis X 0.0080" in messages[0].text
+    assert "axis X 0.008 " in messages[0].text
     assert "27 more" in messages[3].text
 
 

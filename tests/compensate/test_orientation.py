@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -143,4 +145,21 @@ def test_a_machine_without_rotary_axes_is_corrected_in_position() -> None:
     q = np.random.default_rng(5).uniform(-100, 100, (50, 3))
     result = Full().solve(machine, q, State(50.0))
     assert off(machine, result.q, q, State(50.0)).max() < NANOMETRE
+    assert not result.oriented.any()
+
+
+def test_an_axis_at_the_end_of_its_travel_is_held_there() -> None:
+    """B from 0 to 120 degrees; at 0 it would have to go below, at -1e-3 the program itself does."""
+    machine = tilting(-20e-6)
+    b = machine.axis_names.index("B")
+    stop = dataclasses.replace(machine.axes[b], range=(0.0, 2.0))
+    machine = machine.replace(axes=(*machine.axes[:b], stop, *machine.axes[b + 1 :]))
+    q = np.zeros((360 * 3, 5))
+    q[:, machine.axis_names.index("C")] = np.tile(np.deg2rad(np.arange(360.0)), 3)
+    q[:, b] = np.repeat([0.0, 1e-5, -1e-3], 360)
+    result = Full().solve(machine, q, State(100.0))
+    assert (result.q[:720, b] >= 0.0).all()
+    assert (result.q[720:, b] >= -1e-3).all()
+    assert (result.q[:360, b] == 0.0).all()
+    assert off(machine, result.q, q, State(100.0)).max() < NANOMETRE
     assert not result.oriented.any()

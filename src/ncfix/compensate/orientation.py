@@ -32,6 +32,8 @@ class Full(Strategy):
     most      largest correction of a rotary axis, rad; None: the machine's `max_correction`
     per_mm    how much a rotary correction may change per mm of the tip's way, rad/mm
     per_rad   and per rad of the rotary axes' way
+
+    A correction never takes a rotary axis out of the travel that the program keeps to; the tip is held all the same.
     """
 
     name = "full"
@@ -55,11 +57,11 @@ class Full(Strategy):
             return self._known_only(machine, q, state, path, known)
         most = machine.max_correction[1] if self.most is None else self.most
         corrected, free = self._tilted(machine, q, state, most)
-        if path is not None and machine.rotary.any():
-            wanted = corrected[:, machine.rotary] - q[:, machine.rotary]
-            held = limited(wanted, path, self.per_mm, self.per_rad)
-            free &= (np.abs(held - wanted) < SETTLED).all(axis=1)
-            corrected[:, machine.rotary] = q[:, machine.rotary] + held
+        rotary = machine.rotary
+        wanted = corrected[:, rotary] - q[:, rotary]
+        held = wanted if path is None or not rotary.any() else limited(wanted, path, self.per_mm, self.per_rad)
+        corrected[:, rotary] = _within_travel(machine, q[:, rotary], held)
+        free &= (np.abs(corrected[:, rotary] - q[:, rotary] - wanted) < SETTLED).all(axis=1)
         target = machine.tip(q, state.tool_length)
         corrected, arrived = steer(machine, corrected, target, state)
         return Correction(corrected, arrived, free)
@@ -99,6 +101,12 @@ class Full(Strategy):
             if np.max(np.abs(turn - before), initial=0.0) < SETTLED:
                 break
         return corrected, free
+
+
+def _within_travel(machine: Machine, q: Array, turn: Array) -> Array:
+    """Corrected rotary positions (n, n_rotary), held at the end of the travel that the program keeps to, rad."""
+    low, high = machine.ranges[machine.rotary].T
+    return np.clip(q + turn, np.minimum(low, q), np.maximum(high, q))
 
 
 def apply(matrices: Array, vectors: Array) -> Array:
