@@ -22,17 +22,19 @@ AXIS = re.compile(r"[XYZABCUVW]")
 class Assignment(click.ParamType):  # type: ignore[type-arg]
     """`KEY=VALUE`; the value as `convert_value` makes it, which raises ValueError with what is wrong."""
 
-    def __init__(self, metavar: str, convert_value: Callable[[str, str], Any]) -> None:
+    def __init__(self, metavar: str, convert_value: Callable[[str, str], Any], upper: bool = True) -> None:
         self.name = metavar
         self.convert_value = convert_value
+        self.upper = upper
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The key in upper case and the value."""
+        """The key, in upper case where case means nothing, and the value."""
         key, equals, text = str(value).partition("=")
+        key = key.strip().upper() if self.upper else key.strip()
         if not equals:
             self.fail(f"{value!r} has no =; it reads like {self.name}", param, ctx)
         try:
-            return key.strip().upper(), self.convert_value(key.strip().upper(), text)
+            return key, self.convert_value(key, text)
         except ValueError as error:
             self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)
 
@@ -104,6 +106,13 @@ OPTIONS = (
     ),
     click.option("--tool-table", "tool_table", metavar="FILE", help="The control's own tool table."),
     click.option("--initial", type=Position(), help="Where the axes are at the start, machine coordinates."),
+    click.option(
+        "--input",
+        "inputs",
+        type=Assignment("temp_spindle=24.5", lambda key, text: number(text), upper=False),
+        multiple=True,
+        help="What the machine's errors depend on besides its axes.",
+    ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
 )
 
@@ -117,6 +126,7 @@ class SetupOptions:
     tools: tuple[tuple[str, tuple[float, ...]], ...] = ()
     tool_table: str | None = None
     initial: dict[str, float] | None = None
+    inputs: tuple[tuple[str, float], ...] = ()
     assume_zero: bool = False
 
     @property
@@ -140,6 +150,7 @@ class SetupOptions:
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
             tools=tools,
             initial={**setup.initial, **(self.initial or {})},
+            inputs={**setup.inputs, **dict(self.inputs)},
             assume_zero=setup.assume_zero or self.assume_zero,
         )
 
@@ -155,10 +166,11 @@ def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
         tools: tuple[tuple[str, tuple[float, ...]], ...],
         tool_table: str | None,
         initial: dict[str, float] | None,
+        inputs: tuple[tuple[str, float], ...],
         assume_zero: bool,
         **others: Any,
     ) -> Any:
-        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, assume_zero)
+        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, inputs, assume_zero)
         return command(*arguments, given=given, **others)
 
     for option in reversed(OPTIONS):

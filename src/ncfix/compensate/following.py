@@ -63,9 +63,9 @@ def kinematics_of(machine: Machine) -> Kinematics | None:
 
 
 def placed(machine: Machine, setup: Setup) -> Machine:
-    """The machine with the workpiece where the setup has it."""
+    """The machine with the workpiece where the setup has it, under the conditions that the setup gives."""
     x, y, z = (a + b for a, b in zip(machine.workpiece_offset, setup.workpiece_offset, strict=True))
-    return machine.replace(workpiece_offset=(x, y, z))
+    return machine.replace(workpiece_offset=(x, y, z), conditions=dict(setup.inputs))
 
 
 def rotary_names(machine: Machine) -> frozenset[str]:

@@ -92,7 +92,7 @@ CODES = {
         "an input of the error model is not given",
         "An effect depends on a temperature, a time or the like. Without its value the error is not known, and zero "
         "would be a guess.",
-        "Give the value; `ncfix machine show` names the inputs of a machine.",
+        "`--input temp_spindle=24.5`, or [inputs] in the setup file; a column of that name in measurements.",
     ),
     "NCF390": Code(
         "symbolic formulas need sympy",

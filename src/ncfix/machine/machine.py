@@ -42,6 +42,7 @@ class Machine:
     max_correction    (mm, rad) corrections above it are refused
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     provenance        where the errors come from; free keys
+    conditions        inputs of the error model that a `State` need not give, by name
 
     Positions `q` have shape (..., n_axes) in mm and rad; states and positions broadcast. The workpiece frame rides on
     the last body of the workpiece branch; the tool frame has its origin at the tip and is parallel to the base axes
@@ -58,6 +59,7 @@ class Machine:
     max_correction: tuple[float, float] = DEFAULT_CORRECTION
     workpiece_offset: Vector = ORIGIN
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
     # -- what it is ---------------------------------------------------------------------------------------------------
 
@@ -200,6 +202,8 @@ class Machine:
         """The common leading shape, and the poses with all the signals that the model needs."""
         if model is None:
             return flatten(q, state, self.axes, frozenset())
+        if self.conditions:
+            state = dataclasses.replace(state, inputs={**self.conditions, **state.inputs})
         shape, poses = flatten(q, state, self.axes, model.inputs)
         return shape, with_lags(poses, model.signals)
 

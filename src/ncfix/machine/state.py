@@ -84,7 +84,7 @@ def _input(state: State, name: str) -> Array:
         raise UsageError.of(
             "NCF340",
             f"the machine's errors depend on {name!r}, which is not given",
-            hint=f"give a value for {name}: a column of the measurements, or State(inputs={{{name!r}: ...}})",
+            hint=f"--input {name}=VALUE or [inputs] in the setup file; with measurements, a column of that name",
         )
     return np.asarray(values, dtype=np.float64)
 

@@ -23,6 +23,7 @@ class Setup:
     initial           axis letter -> start position, machine axes, mm or degree
     references        "G28" | "G30" -> axis letter -> machine position
     variables         "#100" or "#<name>" -> value
+    inputs            what the errors of the machine depend on besides its axes: "temp_spindle" -> 24.5
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     tcp               X Y Z are tool-tip coordinates from the start of the program
     assume_zero       what is not given is zero (named in warnings and in the stamp), else it is an error
@@ -34,6 +35,7 @@ class Setup:
     initial: Mapping[str, float] = field(default_factory=dict)
     references: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     variables: Mapping[str, float] = field(default_factory=dict)
+    inputs: Mapping[str, float] = field(default_factory=dict)
     workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tcp: bool = False
     assume_zero: bool = False

@@ -66,6 +66,7 @@ class Reading:
             "initial": self.position,
             "references": lambda name, table: self.each(name, table, self.reference),
             "variables": lambda name, table: self.each(name, table, self.variable),
+            "inputs": lambda name, table: self.each(name, table, self.number),
             "workpiece_offset": self.triple,
             "tcp": self.flag,
             "assume_zero": self.flag,

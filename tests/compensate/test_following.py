@@ -1,0 +1,69 @@
+"""A program followed on a machine: its kinematics under tool-centre-point control, and the conditions it runs under."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import fix_program
+from ncfix.compensate.following import follow, kinematics_of
+from ncfix.diagnostics import UsageError
+from ncfix.machine import loads
+from ncfix.program.moves import Rule, TcpState
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup, Tool
+
+ROTARY_TABLE = """
+ncfix = 1
+name = "table"
+topology = "w C F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0] }
+axis.Y = { type = "linear", direction = [0, 1, 0] }
+axis.Z = { type = "linear", direction = [0, 0, 1] }
+axis.C = { type = "rotary", direction = [0, 0, -1], point = [0, 0, 0] }
+tool = { direction = [0, 0, 1], point = [0, 0, 0] }
+"""
+GROWTH = """
+[[effect]]
+name = "EZS"
+basis = "polynomial"
+input = "temp_spindle"
+center = 20.0
+degree = [1]
+coefficients = [0.004]
+"""
+SETUP = Setup(assume_zero=True, tools={0: Tool(0.0), 1: Tool(100.0)})
+
+
+def test_switching_tcp_off_with_the_table_turned_is_followed() -> None:
+    """At C = 90 the point (10, 0) of the part stands at (0, -10) of a table that turns about -z."""
+    program = read(b"G90 G0 G43.4 H1 X10. Y0. Z5. C90.\nG49\nG0 Z200.\nM2\n", "a.nc", "iso")
+    moves = follow(program, loads(ROTARY_TABLE), SETUP).trace.moves
+    x, y, z = (moves.axes.index(letter) for letter in "XYZ")
+    assert (moves.rule == Rule.CORRECT).all()
+    # exact arithmetic but for cos 90 degrees, 6e-17, times 10 mm and the 256 mm probes of the affine map
+    np.testing.assert_allclose(moves.end[-1, [x, y, z]], [0.0, -10.0, 200.0], atol=1e-9)
+
+
+def test_kinematics_say_a_command_there_and_back() -> None:
+    convert = kinematics_of(loads(ROTARY_TABLE))
+    assert convert is not None
+    on, off = TcpState(True, 80.0), TcpState(False, 80.0)
+    command = [0.7, 12.0, -7.0, 30.0]
+    np.testing.assert_allclose(convert(convert(command, on, off), off, on), command, atol=1e-9)
+
+
+def test_a_machine_without_three_linear_axes_has_no_such_kinematics() -> None:
+    text = ROTARY_TABLE.replace("F X Y Z", "F X Z").replace('axis.Y = { type = "linear", direction = [0, 1, 0] }\n', "")
+    assert kinematics_of(loads(text)) is None
+
+
+def test_conditions_of_the_setup_reach_the_error_model() -> None:
+    machine = loads(ROTARY_TABLE + GROWTH)
+    program = read(b"G90 G21\nG0 X0 Y0 Z5 C0\nM2\n", "a.nc", "iso")
+    warm = fix_program(program, machine, replace(SETUP, inputs={"temp_spindle": 25.0}))
+    assert b"Z4.98 C0\n" in warm.text
+    cool = fix_program(program, machine, replace(SETUP, inputs={"temp_spindle": 20.0}))
+    assert cool.text == program.source
+    with pytest.raises(UsageError, match="temp_spindle"):
+        fix_program(program, machine, SETUP)
