@@ -10,6 +10,10 @@ SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""
 
 
+def _where(message: Message) -> tuple[int, int]:
+    return (message.place.line, message.place.column) if message.place else (0, 0)
+
+
 @dataclass(slots=True)
 class Text:
     """The lines of a file and what is wrong with them."""
@@ -26,6 +30,7 @@ class Text:
     def stop(self) -> None:
         """Raise what was noted, if anything."""
         if self.messages:
+            self.messages.sort(key=_where)
             more = len(self.messages) - SHOWN
             rest = [Message(self.messages[0].code, f"{more} more faults", Place(self.path))] if more > 0 else []
             raise ConfigError.collected([*self.messages[:SHOWN], *rest])

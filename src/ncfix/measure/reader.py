@@ -43,7 +43,7 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
     from ncfix.measure import foreign
 
     text = _decoded(source, path)
-    if not text.startswith(f"# {SCHEMA}") and not text.startswith("#"):
+    if not text.startswith("#"):
         found = foreign.recognised(text, machine, path)
         if found is not None:
             return found

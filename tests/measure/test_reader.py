@@ -1,0 +1,170 @@
+"""Measurement files: what is written reads back, and every fault is named with its line and column."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from measure.poses import machine, plan
+from ncfix.diagnostics import ConfigError
+from ncfix.measure.reader import read, reads
+from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.writer import dumps
+
+HEAD = "# ncfix-measurement: 1\n# kind: tcp\n# noise_um: 1.5\n"
+GOOD = HEAD + "set,X,Y,Z,dir_X,time_s,tool_length,dx,dy,dz\n1,100.0,50.0,-20.0,1,0.0,160.0,0.0012,-0.0003,0.0041\n"
+THREE = machine("three_axis")
+FIVE = machine("wCBXFZYSt")
+
+
+def faults(text: str, known=THREE) -> list[tuple[str, int, int]]:
+    with pytest.raises(ConfigError) as caught:
+        reads(text.encode(), known, "m.csv")
+    return [(m.code, m.place.line if m.place else 0, m.place.column if m.place else 0) for m in caught.value.messages]
+
+
+def test_a_row_is_what_it_says():
+    found = reads(GOOD.encode(), THREE)
+    assert found.positions(THREE).tolist() == [[100.0, 50.0, -20.0]]
+    assert found.noise == (pytest.approx(1.5e-3), None)
+    assert found.measured == ("dx", "dy", "dz")
+    assert found.place(0).line == 5
+    assert not found.remarks
+
+
+def test_degrees_become_radians():
+    found = reads((HEAD + "B,dx\n90,0.001\n").encode(), FIVE)
+    assert found.positions(FIVE)[0, FIVE.axis_names.index("B")] == pytest.approx(np.pi / 2)
+
+
+@pytest.mark.parametrize("kind", ["tcp", "tcp6", "probe", "gauge", "bar", "tool", "axis"])
+def test_what_is_written_reads_back(kind):
+    data = simulate(plan(FIVE, kind, 30), FIVE, Faults(noise_um=1.0), seed=1)
+    again = reads(dumps(data).encode(), FIVE)
+    assert again.labels == data.labels
+    for name, values in data.columns.items():
+        assert np.abs(again.columns[name] - values).max() <= 0.5e-9, name
+
+
+def test_a_plan_has_empty_columns():
+    poses = plan(THREE, "tcp", 10)
+    text = dumps(poses, ("dx", "dy", "dz"))
+    assert reads(text.encode(), THREE, plan=True).measured == ()
+    assert {code for code, *_ in faults(text)} == {"NCF607"}
+
+
+BAD = {
+    "no version": (GOOD.replace("# ncfix-measurement: 1\n", ""), ("NCF600", 1, 0)),
+    "newer version": (GOOD.replace("measurement: 1", "measurement: 7"), ("NCF600", 1, 22)),
+    "unknown kind": (GOOD.replace("kind: tcp", "kind: tpc"), ("NCF601", 2, 9)),
+    "unknown header": (GOOD.replace("# noise_um", "# noise_nm"), ("NCF602", 3, 3)),
+    "negative noise": (GOOD.replace("1.5", "-1.5"), ("NCF603", 3, 13)),
+    "bad frame": (GOOD.replace("# noise_um: 1.5", "# frame: machine"), ("NCF603", 3, 10)),
+    "unknown column": (GOOD.replace(",dz", ",ddz"), ("NCF604", 4, 42)),
+    "column twice": (GOOD.replace("dy,dz", "dy,dy"), ("NCF604", 4, 42)),
+    "no values": (HEAD + "X,Y\n1,2\n", ("NCF605", 4, 0)),
+    "short row": (GOOD.replace(",0.0041", ""), ("NCF606", 5, 0)),
+    "decimal comma": (GOOD.replace("100.0", "100,0"), ("NCF606", 5, 0)),
+    "empty cell": (GOOD.replace("-0.0003", ""), ("NCF607", 5, 39)),
+    "not a number": (GOOD.replace("-0.0003", "-O.0003"), ("NCF608", 5, 39)),
+    "nan": (GOOD.replace("-0.0003", "nan"), ("NCF608", 5, 39)),
+    "infinite": (GOOD.replace("-0.0003", "inf"), ("NCF608", 5, 39)),
+    "no rows": (GOOD[: GOOD.index("1,100.0")], ("NCF609", 4, 0)),
+    "foreign axis": (GOOD.replace("Z,dir", "W,dir"), ("NCF610", 4, 9)),
+    "foreign direction": (GOOD.replace("dir_X", "dir_C"), ("NCF610", 4, 11)),
+    "half a direction": (GOOD.replace("-20.0,1,", "-20.0,0.5,"), ("NCF612", 5, 0)),
+    "time backwards": (GOOD + "1,101.0,50.0,-20.0,1,-3.0,160.0,0.0,0.0,0.0\n", ("NCF611", 6, 0)),
+    "semicolons": (HEAD + "X;Y;dx\n1,5;2;0,001\n", ("NCF605", 4, 0)),
+    "empty file": ("", ("NCF600", 0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_fault_is_named_with_its_place(name):
+    text, expected = BAD[name]
+    assert expected in faults(text)
+
+
+def test_all_faults_are_named_at_once():
+    text = GOOD.replace("0.0012", "x") + "1,,50.0,-20.0,1,1.0,160.0,0.0,0.0,nan\n"
+    assert [code for code, *_ in faults(text)] == ["NCF608", "NCF607", "NCF608"]
+
+
+def test_a_binary_file_is_refused():
+    with pytest.raises(ConfigError) as caught:
+        reads(b"PK\x03\x04\0\0", THREE)
+    assert caught.value.code == "NCF600"
+
+
+def remarks(text: str, known=THREE) -> set[str]:
+    return {message.code for message in reads(text.encode(), known).remarks}
+
+
+def test_odd_but_possible_is_remarked():
+    assert remarks(GOOD + GOOD.splitlines()[-1] + "\n") == {"NCF613"}
+    assert remarks(GOOD.replace("100.0", "4100.0")) == {"NCF615"}
+    assert remarks(GOOD.replace("0.0012", "12.3")) == {"NCF616"}
+    radians = HEAD + "B,C,dx\n" + "".join(f"0,{np.deg2rad(30 * k)},0.001\n" for k in range(12))
+    assert remarks(radians, FIVE) == {"NCF614"}
+    degrees = HEAD + "B,C,dx\n" + "".join(f"0,{k},0.001\n" for k in range(6))
+    assert not remarks(degrees, FIVE)
+
+
+def test_repeats_are_no_surprise():
+    text = HEAD + "repeat,X,dx\n1,10,0.001\n2,10,0.001\n"
+    assert not remarks(text)
+
+
+def test_real_measurements_read(shared):
+    for path in sorted(shared("measurements").glob("*.csv")):
+        found = read(str(path), THREE)
+        assert len(found) > 50
+        # the plates are wider than this machine
+        assert {m.code for m in found.remarks} <= {"NCF613", "NCF615"}, path.name
+
+
+RTL = """HEADER::
+File type: x
+DEVIATIONS here later
+TARGET DATA::
+Targets:
+0.000 50.000 100.000
+USER-TEXT::
+Axis: X
+RUNS::
+DEVIATIONS::
+Run Target Data:
+1 1 0.0
+1 2 1.2
+1 3 2.1
+2 3 2.3
+2 2 1.5
+2 1 0.4
+ENVIRONMENT::
+"""
+
+
+def test_an_interferometers_file():
+    found = reads(RTL.encode(), THREE, "x.rtl")
+    assert found.kind == "axis"
+    assert found.labels["component"] == ("EXX",) * 6
+    assert found.columns["direction"].tolist() == [1, 1, 1, -1, -1, -1]
+    assert found.columns["value"][4] == pytest.approx(1.5e-3)
+    assert found.columns["position"].tolist() == [0, 50, 100, 100, 50, 0]
+
+
+def test_tables_of_controls_are_direct_readings():
+    isg = "// lengths mm\nX EXX EYX EAX\n0.0 0.02 0.01 1e-5\n100 0.03 0.02 2e-5\n"
+    found = reads(isg.encode(), THREE)
+    assert found.labels["component"] == ("EXX", "EYX", "EAX") * 2
+    assert found.columns["position"].tolist() == [0, 0, 0, 100, 100, 100]
+    etalon = "[C0Y]\nVALUE = 0.00002\n[EXY]\nGridpoints = {\n -10 -0.001\n 20 0.002\n}\n"
+    found = reads(etalon.encode(), THREE)
+    assert found.columns["value"].tolist() == [-0.001, 0.002]
+    assert [message.code for message in found.remarks] == ["NCF618"]
+
+
+def test_shared_samples_of_instruments_read(shared):
+    folder = shared("tables")
+    for name in ("beckhoff_isg/volc_isg_csv_1d.csv", "beckhoff_isg/etalon_exchange.txt", "renishaw/rtl_skeleton.rtl"):
+        assert len(read(str(folder / name), THREE)) > 0

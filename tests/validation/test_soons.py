@@ -1,0 +1,68 @@
+"""J. A. Soons, Accuracy analysis of multi-axis machines, TU Eindhoven 1993: the designs of Table 4.1.
+
+Six ball bars of 400 mm on a two-dimensional machine with a squareness and two scales. Printed are the covariances
+times 2 L^2 / sigma^2, and the determinants and largest prediction variances of three designs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.machine import Effect, load
+from ncfix.machine.smooth import Polynomial
+from ncfix.measure.measurement import Measurement
+from ncfix.measure.observe import observe
+from ncfix.measure.plan import Pool, choose
+
+THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml"))
+LINE = Polynomial(degree=(1,))
+EFFECTS = (Effect("EC0Y", (0.0,)), Effect("EXX", (0.0,), LINE), Effect("EYY", (0.0,), LINE))
+LENGTH = 400.0
+DESIGNS = {1: (0, 0, 45, 45, 90, 90), 2: (0, 0, 45, 315, 90, 90), 3: (45, 45, 105, 105, 165, 165)}
+PRINTED = {
+    1: ([[6, 1, 1], [1, 1, 0], [1, 0, 1]], 2.98, 9.00),
+    2: ([[4, 0, 0], [0, 0.83, 0.17], [0, 0.17, 0.83]], 2.60, 4.00),
+    3: ([[2.67, 0, 0], [0, 1, 0.33], [0, 0.33, 1]], 2.50, 3.00),
+}
+
+
+def rows(angles) -> np.ndarray:
+    """The design of bars at these angles."""
+    way = np.deg2rad(np.asarray(angles, dtype=float))
+    x, y, zero = LENGTH / 2 * np.cos(way), LENGTH / 2 * np.sin(way), np.zeros(len(way))
+    ends = {"ax": -x, "ay": -y, "az": zero, "bx": x, "by": y, "bz": zero}
+    return observe(Measurement("length", (), ends), THREE).design(EFFECTS)
+
+
+@pytest.mark.parametrize("design", PRINTED)
+def test_covariance_and_largest_variance(design):
+    matrix, _, largest = PRINTED[design]
+    one = rows(DESIGNS[design])
+    covariance = np.linalg.inv(one.T @ one) * 2 * LENGTH**2
+    # printed with two decimals; the signs depend on those of the errors
+    assert np.abs(np.abs(covariance) - matrix).max() < 0.006
+    every = rows(np.arange(0, 180, 1))
+    variance = np.einsum("ni,ij,nj->n", every, np.linalg.inv(one.T @ one), every)
+    assert len(DESIGNS[design]) * variance.max() == pytest.approx(largest, abs=0.005)
+
+
+def test_determinants_compare_as_printed():
+    roots = {k: np.linalg.det(np.linalg.inv(rows(a).T @ rows(a))) ** (1 / 3) for k, a in DESIGNS.items()}
+    for design in (2, 3):
+        # each printed with three digits
+        assert roots[1] / roots[design] == pytest.approx(PRINTED[1][1] / PRINTED[design][1], rel=4e-3)
+
+
+def test_the_exchange_finds_the_best_design():
+    """Any triangle of directions is D-optimal: with six bars no plan has a lower worst variance than 3 / 6."""
+    angles = np.repeat(np.arange(0, 180, 15), 2)
+    every = rows(angles)
+    scale = np.linalg.norm(every, axis=0)
+    pool = Pool((every / scale)[:, None, :], rows(np.arange(0, 180, 5)) / scale)
+    chosen = every[choose(pool, 6)]
+    far = rows(np.arange(0, 180, 5))
+    variance = np.einsum("ni,ij,nj->n", far, np.linalg.inv(chosen.T @ chosen), far)
+    assert variance.max() == pytest.approx(0.5, abs=1e-6)
