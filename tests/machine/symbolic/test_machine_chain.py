@@ -142,7 +142,10 @@ def test_carried_location_errors(carried: bool) -> None:
     [
         ((0.0, 0.0, -1.0), (0, 0, -1)),
         ((0.0, -HALF, HALF), (0, -sp.sqrt(2) / 2, sp.sqrt(2) / 2)),
-        ((0.0, np.sin(50 * np.pi / 180), np.cos(50 * np.pi / 180)), (0, sp.sin(5 * sp.pi / 18), sp.cos(5 * sp.pi / 18))),
+        (
+            (0.0, np.sin(50 * np.pi / 180), np.cos(50 * np.pi / 180)),
+            (0, sp.sin(5 * sp.pi / 18), sp.cos(5 * sp.pi / 18)),
+        ),
         ((-0.5, 0.0, 3**0.5 / 2), (-sp.Rational(1, 2), 0, sp.sqrt(3) / 2)),
         ((1 / 3**0.5, -1 / 3**0.5, 1 / 3**0.5), (sp.sqrt(3) / 3, -sp.sqrt(3) / 3, sp.sqrt(3) / 3)),
     ],

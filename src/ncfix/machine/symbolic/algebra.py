@@ -33,7 +33,7 @@ class Algebra:
 
     def __init__(self, expressions: Iterable[sp.Expr]) -> None:
         """The ring that holds sums and products of the expressions."""
-        expressions = list(expressions)
+        expressions = [as_fractions(expression) for expression in expressions]
         numbers = {number for expression in expressions for number in expression.atoms(sp.Rational)}
         self.measured = any(number.q > SIMPLE for number in numbers)
         found = set().union(*(generators(expression) for expression in expressions))
@@ -59,7 +59,7 @@ class Algebra:
 
     def poly(self, expression: sp.Expr) -> Poly:
         """The polynomial of an expression, reduced."""
-        return self.reduced(self.ring.from_expr(sp.expand(expression)))
+        return self.reduced(self.ring.from_expr(sp.expand(as_fractions(expression))))
 
     def reduced(self, poly: Poly) -> Poly:
         """The polynomial with the relations applied."""
@@ -96,6 +96,11 @@ class Algebra:
         from ncfix.machine.symbolic.writing import written
 
         return written(self, poly)
+
+
+def as_fractions(expression: sp.Expr) -> sp.Expr:
+    """The expression with its decimals as the fractions that they are in binary."""
+    return expression.xreplace({number: sp.Rational(float(number)) for number in expression.atoms(sp.Float)})
 
 
 def generators(expression: sp.Expr) -> set[sp.Expr]:

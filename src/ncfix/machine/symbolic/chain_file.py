@@ -18,7 +18,7 @@ import sympy as sp
 from ncfix.diagnostics import ConfigError, NcfixError, Place
 from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.symbolic.chain import Chain
-from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation
+from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation, Vector
 from ncfix.machine.symbolic.variables import Size, Variable
 from ncfix.machine.toml_lines import key_lines
 
@@ -34,6 +34,8 @@ OPERATORS: Mapping[type, Callable[..., Expr]] = {
 }
 FUNCTIONS: Mapping[str, Callable[[Expr], Expr]] = {"sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "sqrt": sp.sqrt}
 STEPS = ("T", "Rx", "Ry", "Rz")
+UNIT_TO = 1e-9
+"""How far from one the square of a unit vector's length may be: nine digits in the file."""
 
 
 def load_chain(path: str | Path) -> Chain:
@@ -70,10 +72,17 @@ def _chain(root: Section) -> Chain:
     formulas = _Formulas({variable.name: variable.sign * variable.symbol for variable in variables})
     found = [_step(root, index, text, formulas, senses) for index, text in enumerate(_texts(root, "chain", True))]
     steps = [step for step in found if step is not None]
-    axis = root.numbers("tool_axis", count=3) or (0.0, 0.0, 1.0)
+    axis = _tool_axis(root)
     root.close()
-    _check_linear(root, variables, steps)
-    return Chain(name, variables, tuple(steps), tuple(sp.Rational(str(part)) for part in axis))
+    _check_steps(root, variables, steps)
+    return Chain(name, variables, tuple(steps), axis)
+
+
+def _tool_axis(root: Section) -> Vector:
+    x, y, z = (sp.Rational(str(part)) for part in root.numbers("tool_axis", count=3) or (0, 0, 1))
+    if abs(x * x + y * y + z * z - 1) > UNIT_TO:
+        root.note("NCF313", "tool_axis", "is not a unit vector")
+    return x, y, z
 
 
 def _texts(root: Section, key: str, required: bool = False) -> list[str]:
@@ -122,10 +131,14 @@ def _step(root: Section, index: int, text: str, formulas: _Formulas, senses: Map
         return None
 
 
-def _check_linear(root: Section, variables: tuple[Variable, ...], steps: list[Step]) -> None:
+def _check_steps(root: Section, variables: tuple[Variable, ...], steps: list[Step]) -> None:
     smalls = [variable.symbol for variable in variables if variable.small]
+    zero = dict.fromkeys(smalls, sp.Integer(0))
     for step in steps:
-        if isinstance(step, Rotation) and sp.Poly(step.angle, *smalls, domain="EX").total_degree() > 1:
+        if any(part.xreplace(zero).has(sp.zoo, sp.oo, sp.nan) for part in step.expressions):
+            text = f"{', '.join(map(str, step.expressions))} is not finite where the small variables are zero"
+            root.note("NCF391", "chain", text)
+        elif isinstance(step, Rotation) and any(step.angle.diff(small).has(*smalls) for small in smalls):
             root.note("NCF391", "chain", f"the angle {step.angle} is not linear in the small variables")
 
 

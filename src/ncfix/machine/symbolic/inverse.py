@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ncfix.machine.symbolic.algebra import Algebra
+from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.chain import Chain
 from ncfix.machine.symbolic.derivation import DIRECTION, POSITION, Derivation
 from ncfix.machine.symbolic.steps import Expr, Rotation, linear_part, rodrigues
@@ -133,14 +133,28 @@ def _linear(derivation: Derivation) -> tuple[dict[str, Expr], list[str]]:
         raise _UnreachableError(f"linear axes: {len(axes)} of them for three coordinates: no unique solution")
     symbols = [axis.symbol for axis in axes]
     tip = sp.Matrix([derivation.nominal[name] for name in POSITION])
-    matrix = tip.jacobian(symbols)
-    rest = TIP - tip.xreplace(dict.fromkeys(symbols, sp.Integer(0)))
-    determinant = _shortest([matrix.det()])[0]
+    matrix, rest = tip.jacobian(symbols), TIP - tip.xreplace(dict.fromkeys(symbols, sp.Integer(0)))
+    solution, determinant = _cramer(matrix, rest)
     if determinant == 0:
         raise _UnreachableError("linear axes: they do not span space: no solution")
-    solution = [part / determinant for part in _shortest(list(matrix.adjugate() * rest))]
     notes = ["x y z: the tip; the rotary axes as above"] if len(derivation.chain.axes) > 3 else []
-    return {axis.name: component for axis, component in zip(axes, solution, strict=True)}, notes
+    return {axis.name: part / determinant for axis, part in zip(axes, solution, strict=True)}, notes
+
+
+def _cramer(matrix: sp.Matrix, right: sp.Matrix) -> tuple[list[Expr], Expr]:
+    """Adjugate times right-hand side, and determinant, simplified product by product."""
+    algebra = Algebra(sp.expand(entry) for entry in (*matrix, *right))
+    rows = [[algebra.poly(matrix[i, k]) for k in range(3)] for i in range(3)]
+    sides = [algebra.poly(entry) for entry in right]
+
+    def minor(i: int, k: int) -> Poly:
+        (p, q), (r, s) = ((i + 1) % 3, (i + 2) % 3), ((k + 1) % 3, (k + 2) % 3)
+        return algebra.reduced(rows[p][r] * rows[q][s] - rows[p][s] * rows[q][r])
+
+    minors = [[minor(i, k) for k in range(3)] for i in range(3)]
+    determinant = algebra.reduced(sum(rows[0][k] * minors[0][k] for k in range(3)))
+    solution = [algebra.reduced(sum(minors[i][k] * sides[i] for i in range(3))) for k in range(3)]
+    return [algebra.expression(poly) for poly in solution], algebra.expression(determinant)
 
 
 def _shortest(expressions: list[Expr]) -> list[Expr]:

@@ -46,14 +46,16 @@ def _component(derivation: Derivation, component: str, names: dict[sp.Expr, str]
         sign, size = signed(coefficient)
         shown = "" if sign == "+" and number == 0 else sign
         head = "&\\quad" if number else f"{NAMES[component]} &="
-        yield f"{head} {shown} {_written(derivation.monomial(key), names)}{_factor(size, names)}"
+        yield f"{head} {shown} {_product(_written(derivation.monomial(key), names), size, names)}"
 
 
-def _factor(size: sp.Expr, names: dict[sp.Expr, str]) -> str:
+def _product(errors: str, size: sp.Expr, names: dict[sp.Expr, str]) -> str:
     if size == 1:
-        return ""
+        return errors
     text = _written(size, names)
-    return rf"\,\left({text}\right)" if size.is_Add else rf"\,{text}"
+    if size.is_Number:
+        return rf"{text}\,{errors}"
+    return rf"{errors}\,\left({text}\right)" if size.is_Add else rf"{errors}\,{text}"
 
 
 def _aligned(lines: list[str]) -> str:

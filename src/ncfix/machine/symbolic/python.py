@@ -46,9 +46,12 @@ def _function(
     name: str, large: Sequence[Variable], small: Sequence[Variable], formulas: dict[str, sp.Expr], meaning: str
 ) -> str:
     lines = [*_wrapped(f"def {name}(", _parameters(large, small), "):", ""), f'    """{meaning}"""']
+    lines.append("    shape = np.broadcast_shapes(*map(np.shape, locals().values()))")
     for target, expression in _assignments(formulas, [*large, *small]):
         lines += _wrapped(f"    {target} = ", [expression], "", "    ")
-    lines.append(f"    return np.stack(np.broadcast_arrays({', '.join(formulas)}), axis=-1).astype(float)")
+    lines.append(
+        f"    return np.stack([np.broadcast_to(v, shape) for v in ({', '.join(formulas)})], axis=-1).astype(float)"
+    )
     return "\n".join(lines) + "\n"
 
 
@@ -72,7 +75,7 @@ def _parameters(large: Sequence[Variable], small: Sequence[Variable]) -> Iterato
 
 def _assignments(formulas: dict[str, sp.Expr], variables: Sequence[Variable]) -> Iterator[tuple[str, str]]:
     plain = {variable.symbol: variable.plain for variable in variables if variable.arguments}
-    taken = {variable.name for variable in variables} | set(formulas)
+    taken = {variable.name for variable in variables} | {*formulas, "shape", "v"}
     names = (symbol for symbol in sp.numbered_symbols("c") if symbol.name not in taken)
     parts, results = sp.cse([formula.xreplace(plain) for formula in formulas.values()], names)
     printer = NumPyPrinter()

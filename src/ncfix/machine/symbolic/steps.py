@@ -38,6 +38,11 @@ class Translation:
         """The shift back."""
         return Translation(negated(self.vector))
 
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """Every expression in it."""
+        return self.vector
+
     def with_values(self, values: dict[Expr, Expr]) -> Translation:
         """The step with some symbols replaced."""
         return Translation(substituted(self.vector, values))
@@ -55,6 +60,11 @@ class Rotation:
         """The rotation back."""
         return Rotation(self.direction, -self.angle)
 
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """Every expression in it."""
+        return (*self.direction, self.angle)
+
     def with_values(self, values: dict[Expr, Expr]) -> Rotation:
         """The step with some symbols replaced."""
         return Rotation(substituted(self.direction, values), self.angle.xreplace(values))
@@ -71,6 +81,11 @@ class Screw:
     def inverse(self) -> Screw:
         """The screw back."""
         return Screw(negated(self.rotation), negated(self.velocity))
+
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """Every expression in it."""
+        return (*self.rotation, *self.velocity)
 
     def with_values(self, values: dict[Expr, Expr]) -> Screw:
         """The step with some symbols replaced."""

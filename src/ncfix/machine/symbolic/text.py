@@ -56,7 +56,7 @@ def _component(derivation: Derivation, component: str) -> Iterator[str]:
     yield f"  {component} = 0" if not terms else f"  {component} ="
     for key, coefficient in terms.items():
         sign, size = signed(coefficient)
-        yield f"    {sign} {derivation.monomial(key)}{_factor(size)}"
+        yield f"    {sign} {_product(str(derivation.monomial(key)), size)}"
 
 
 def signed(coefficient: sp.Expr) -> tuple[str, sp.Expr]:
@@ -65,7 +65,9 @@ def signed(coefficient: sp.Expr) -> tuple[str, sp.Expr]:
     return ("-", -coefficient) if negative else ("+", coefficient)
 
 
-def _factor(size: sp.Expr) -> str:
+def _product(errors: str, size: sp.Expr) -> str:
     if size == 1:
-        return ""
-    return f"*({size})" if size.is_Add else f"*{size}"
+        return errors
+    if size.is_Number:
+        return f"{size}*{errors}"
+    return f"{errors}*({size})" if size.is_Add else f"{errors}*{size}"

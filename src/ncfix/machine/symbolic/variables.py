@@ -14,7 +14,27 @@ import sympy as sp
 
 from ncfix.diagnostics import ConfigError
 
-TAKEN = ("np", "pi", "sin", "cos", "tan", "sqrt", "branch", *"xyzijk", "dx", "dy", "dz", "rx", "ry", "rz")
+TAKEN = (
+    "np",
+    "shape",
+    "map",
+    "v",
+    "locals",
+    "float",
+    "pi",
+    "sin",
+    "cos",
+    "tan",
+    "sqrt",
+    "branch",
+    *"xyzijk",
+    "dx",
+    "dy",
+    "dz",
+    "rx",
+    "ry",
+    "rz",
+)
 RESERVED = {*keyword.kwlist, *keyword.softkwlist, *TAKEN}
 GREEK = re.compile(r"(Theta|theta|phi|psi|alpha|beta|gamma|delta)(\w*)")
 LETTER = re.compile(r"([A-Za-z])_?(\w+)")
