@@ -1,9 +1,16 @@
-"""LinuxCNC (RS274NGC): the dialect `linuxcnc`."""
+"""LinuxCNC (RS274NGC): the dialect `linuxcnc`, and screw compensation files."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ncfix.hookspecs import Register, hookimpl
 from ncfix.program.dialect import FOREIGN, Dialect
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ncfix.tables.control import Control
 
 LINUXCNC = Dialect(
     name="linuxcnc",
@@ -25,3 +32,16 @@ LINUXCNC = Dialect(
 def register_dialects(register: Register[Dialect]) -> None:
     """Bring the dialect `linuxcnc`."""
     register(LINUXCNC)
+
+
+@hookimpl
+def register_controls(register: Register[Callable[[], Control]]) -> None:
+    """Bring the control `linuxcnc`: `.comp` files."""
+    register(control, name="linuxcnc")
+
+
+def control() -> Control:
+    """The control, imported when tables are asked for."""
+    from ncfix_linuxcnc.control import LinuxCnc
+
+    return LinuxCnc()

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from ncfix.machine.basis import Basis
     from ncfix.program.dialect import Dialect
+    from ncfix.tables.control import Control
 
 GROUP = "ncfix"
 """The entry-point group, and the name of the pluggy project."""
@@ -59,8 +60,8 @@ def register_readers(register: Register[Any]) -> None:
 
 
 @hookspec
-def register_controls(register: Register[Any]) -> None:
-    """Controls with compensation tables of their own: writer, reader and emulation of the native files."""
+def register_controls(register: Register[Callable[[], Control]]) -> None:
+    """Controls with compensation tables of their own: functions that return a `Control`; register them with a name."""
 
 
 @hookspec

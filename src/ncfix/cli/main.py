@@ -24,6 +24,8 @@ VERBS = (
     "simulate",
     "plan",
     "calibrate",
+    "export",
+    "emulate",
     "machine",
     "effects",
     "dialects",

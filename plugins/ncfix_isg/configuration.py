@@ -1,0 +1,116 @@
+"""The configuration list of VOLCOMP: a name and a value a line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ncfix.tables.control import Files
+from ncfix.tables.lines import Remarks
+
+LETTERS = "XYZABC"
+HEAD = {"workpiece_axes": "0"}
+TAIL = {
+    "Interpolation": "GRID",
+    "enable_splicing": "FALSE",
+    "filter_steps": "20",
+    "manual_activation": "FALSE",
+    "alternative_model": "FALSE",
+    "associate_to_channel": "FALSE",
+}
+FORMAT = "ISG_CSV"
+MOST_FILES = 10
+
+
+def config_text(numbers: Mapping[str, int], folder: str, file: str, filter_steps: int) -> bytes:
+    """The list: axis numbers, switches, and the one file."""
+    joint = "" if folder.endswith(("\\", "/")) else "\\"
+    entries = {
+        **HEAD,
+        **{name: str(number) for name, number in numbers.items()},
+        **TAIL,
+        "filter_steps": str(filter_steps),
+        "file[0]": f"{folder}{joint}{file}",
+        "file_format[0]": FORMAT,
+    }
+    return "".join(f"{name:<24}{value}\n" for name, value in entries.items()).encode()
+
+
+def read_configuration(files: Files) -> tuple[dict[str, list[str]], Remarks]:
+    """The grid files that the list names, each with the axes that may be looked up; and remarks on the list."""
+    lists = [name for name in files if name.endswith(".lis")]
+    path = lists[0] if len(lists) == 1 else "volcomp.lis"
+    remarks = Remarks.of(path, files[path] if len(lists) == 1 else b"")
+    if len(lists) != 1:
+        remarks.refuse(0, f"{len(lists)} configuration lists instead of one")
+        return {}, remarks
+    entries = _entries(remarks)
+    _check_switches(entries, remarks)
+    axes = [name for name in entries if name in LETTERS]
+    _check_axes(entries, axes, remarks)
+    return dict.fromkeys(_grid_files(entries, remarks, files), axes), remarks
+
+
+Entries = dict[str, tuple[int, str]]
+
+
+def _entries(remarks: Remarks) -> Entries:
+    found: Entries = {}
+    for number, row in enumerate(remarks.rows, 1):
+        words = row.split("#", 1)[0].split(None, 1)
+        if len(words) == 1:
+            remarks.refuse(number, f"{words[0]!r} has no value")
+        elif words:
+            name, value = words[0], words[1].strip()
+            if name in found:
+                remarks.refuse(number, f"{name} is there twice")
+            if name not in HEAD and name not in TAIL and name not in LETTERS and not name.startswith("file"):
+                remarks.refuse(number, f"the name {name!r} is not known (error 70468)")
+            found[name] = (number, value)
+    return found
+
+
+def _check_switches(entries: Entries, remarks: Remarks) -> None:
+    for name, value in (("workpiece_axes", "0"), ("Interpolation", "GRID"), ("alternative_model", "FALSE")):
+        line, found = entries.get(name, (0, ""))
+        if found != value:
+            remarks.refuse(line, f"{name} is {found or 'missing'}", f"these grids need {name} {value}")
+    line, steps = entries.get("filter_steps", (0, "0"))
+    if not steps.isdigit():
+        remarks.refuse(line, f"filter_steps is {steps}", "a whole number")
+    line, manual = entries.get("manual_activation", (0, "FALSE"))
+    if manual not in ("TRUE", "FALSE"):
+        remarks.refuse(line, f"manual_activation is {manual}", "TRUE or FALSE")
+
+
+def _check_axes(entries: Entries, axes: list[str], remarks: Remarks) -> None:
+    seen: dict[str, str] = {}
+    for axis in axes:
+        line, number = entries[axis]
+        if not number.isdigit():
+            remarks.refuse(line, f"the number of axis {axis} is {number}")
+        elif number in seen:
+            remarks.refuse(line, f"axes {seen[number]} and {axis} have the same number {number}")
+        seen[number] = axis
+
+
+def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
+    found = []
+    for index in range(MOST_FILES):
+        line, path = entries.get(f"file[{index}]", (0, ""))
+        if not path:
+            break
+        form_line, form = entries.get(f"file_format[{index}]", (line, ""))
+        if form != FORMAT:
+            remarks.refuse(form_line, f"file_format[{index}] is {form or 'missing'}", FORMAT)
+        name = path.replace("\\", "/").rsplit("/", 1)[-1]
+        if name not in files:
+            remarks.refuse(line, f"the file {name} is missing")
+        else:
+            found.append(name)
+    known = {f"{key}[{index}]" for index in range(len(found)) for key in ("file", "file_format")}
+    for name, (line, _) in entries.items():
+        if name.startswith("file") and name not in known and not remarks.wrong:
+            remarks.refuse(line, f"{name} does not follow on", f"file[0] to file[{MOST_FILES - 1}] in order")
+    if not found and not remarks.wrong:
+        remarks.refuse(0, "names no file")
+    return found

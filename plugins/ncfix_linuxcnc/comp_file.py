@@ -1,0 +1,175 @@
+"""The `.comp` file and the ini lines: text from values, and values from text as LinuxCNC reads it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.tables.control import Files
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Term
+
+MOST = 256
+"""EMCMOT_COMP_SIZE of LinuxCNC."""
+LONGEST = 255
+"""Characters of a line that its reader takes."""
+STEEP = 0.01
+"""Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+TRIPLE = re.compile(rf"\s*({NUMBER})\s+({NUMBER})\s+({NUMBER})(.*)")
+SECTION = re.compile(r"\s*\[(\w+)\]\s*")
+ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
+UNITS = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One table: corrections (added) over the position of a joint, in mm or degree, (n,) each."""
+
+    number: int
+    axis: str
+    nodes: Array
+    forward: Array
+    reverse: Array
+
+    @property
+    def file(self) -> str:
+        """The name of its file."""
+        return f"joint_{self.number}_{self.axis}.comp"
+
+    def terms(self) -> Iterator[Term]:
+        """The two columns as tables, mm or rad."""
+        unit = np.pi / 180 if self.axis in "ABC" else 1.0
+        for way, values in ((1, self.forward), (-1, self.reverse)):
+            grid = Grid((self.axis,), (self.nodes * unit,), (self.axis,), (values * unit)[:, None])
+            yield Term((grid,), (self.axis, way))
+
+
+def comp_text(joint: Joint, kind: int) -> bytes:
+    """A `.comp` file: nominal, forward, reverse. No comments: LinuxCNC stops reading where a line has another form."""
+    columns = [joint.nodes, joint.forward, joint.reverse]
+    if kind == 0:
+        columns = [joint.nodes, joint.nodes - joint.forward, joint.nodes - joint.reverse]
+    rows = zip(*(np.round(column, 6) + 0.0 for column in columns), strict=True)
+    return "".join(f"{a:.6f} {b:.6f} {c:.6f}\n" for a, b, c in rows).encode()
+
+
+def ini_text(joints: list[Joint], letters: str, kind: int) -> bytes:
+    """The lines of the ini file that load the files."""
+    head = ["[TRAJ]", f"COORDINATES = {' '.join(letters)}", "LINEAR_UNITS = mm", "ANGULAR_UNITS = degree"]
+    parts = [
+        ["", f"[JOINT_{joint.number}]", f"COMP_FILE = {joint.file}", f"COMP_FILE_TYPE = {kind}"] for joint in joints
+    ]
+    return "".join(f"{line}\n" for line in [*head, *(line for part in parts for line in part)]).encode()
+
+
+def read_joints(files: Files) -> tuple[list[Joint], list[Remarks]]:
+    """The tables that an ini file among these loads, with remarks on every file."""
+    inis = [name for name in files if name.endswith(".ini")]
+    path = inis[0] if len(inis) == 1 else "comp.ini"
+    ini = Remarks.of(path, files[path] if len(inis) == 1 else b"")
+    if len(inis) != 1:
+        ini.refuse(0, f"{len(inis)} ini files instead of one")
+        return [], [ini]
+    sections = _sections(ini)
+    letters = sections.get("TRAJ", {}).get("COORDINATES", (0, ""))[1].replace(" ", "").upper()
+    scale = _scale(sections, ini)
+    remarks, joints = [ini], []
+    for name, entries in sections.items():
+        if name.startswith("JOINT_") and "COMP_FILE" in entries:
+            found = _joint(name, entries, letters, scale, files, ini, remarks)
+            joints += [found] if found else []
+    return joints, remarks
+
+
+Entries = dict[str, tuple[int, str]]
+
+
+def _sections(ini: Remarks) -> dict[str, Entries]:
+    found: dict[str, Entries] = {}
+    entries: Entries = found.setdefault("", {})
+    for number, row in enumerate(ini.rows, 1):
+        if section := SECTION.fullmatch(row):
+            entries = found.setdefault(section[1].upper(), {})
+        elif entry := ENTRY.fullmatch(row):
+            entries[entry[1].upper()] = (number, entry[2])
+        elif row.strip() and not row.lstrip().startswith(("#", ";")):
+            ini.refuse(number, "neither a section, nor NAME = VALUE, nor a comment")
+    return found
+
+
+def _scale(sections: dict[str, Entries], ini: Remarks) -> float:
+    line, unit = sections.get("TRAJ", {}).get("LINEAR_UNITS", (0, ""))
+    if unit.lower() not in UNITS:
+        ini.refuse(line, f"LINEAR_UNITS = {unit or 'nothing'}", "mm or inch, under [TRAJ]")
+    return UNITS.get(unit.lower(), 1.0)
+
+
+def _joint(
+    section: str, entries: Entries, letters: str, scale: float, files: Files, ini: Remarks, remarks: list[Remarks]
+) -> Joint | None:
+    line, name = entries["COMP_FILE"]
+    number = section.removeprefix("JOINT_")
+    if not number.isdigit() or int(number) >= len(letters):
+        ini.refuse(line, f"[{section}] is no axis of COORDINATES = {letters or 'nothing'}")
+        return None
+    kind_line, kind = entries.get("COMP_FILE_TYPE", (line, ""))
+    if kind not in ("0", "1"):
+        ini.refuse(kind_line, f"COMP_FILE_TYPE = {kind or 'nothing'}", "1: corrections, 0: actual positions")
+    if "BACKLASH" in entries:
+        ini.doubt(entries["BACKLASH"][0], "BACKLASH is ignored where there is a COMP_FILE", "take the line out")
+    if name not in files:
+        ini.refuse(line, f"the file {name} is missing")
+        return None
+    found = Remarks.of(name, files[name])
+    remarks.append(found)
+    axis = letters[int(number)]
+    return _table(found, int(number), axis, kind == "0", 1.0 if axis in "ABC" else scale)
+
+
+def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: float) -> Joint | None:
+    rows = np.array(list(_triples(remarks)), dtype=np.float64).reshape(-1, 3)
+    if len(rows) > MOST:
+        remarks.refuse(MOST + 1, f"{len(rows)} points, and LinuxCNC holds {MOST}")
+    if len(rows) < 2:
+        remarks.refuse(0, f"{len(rows)} points")
+        return None
+    steps = np.diff(rows[:, 0])
+    for row in np.flatnonzero(steps <= 0):
+        remarks.refuse(int(row) + 2, "the nominal positions must ascend")
+    if (steps <= 0).any():
+        return None
+    nodes, trims = rows[:, 0], rows[:, :1] - rows[:, 1:] if measured else rows[:, 1:]
+    _look_for_jumps(remarks, steps, trims)
+    stored: NDArray[np.float64] = trims.astype(np.float32).astype(np.float64) * scale
+    return Joint(number, axis, nodes * scale, stored[:, 0], stored[:, 1])
+
+
+def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
+    """The points up to the first line that LinuxCNC's reader stops at."""
+    for number, row in enumerate(remarks.rows, 1):
+        match = TRIPLE.fullmatch(row)
+        if match is None:
+            what = "a blank line" if not row.strip() else "a decimal comma" if "," in row else "not three numbers"
+            remarks.refuse(number, f"{what}: LinuxCNC stops reading here", "three numbers on every line, no comments")
+            return
+        if len(row) > LONGEST:
+            remarks.refuse(number, f"longer than {LONGEST} characters")
+        if match[4].startswith(","):
+            remarks.refuse(number, "a decimal comma: LinuxCNC takes what is before it for the whole number")
+        elif match[4].strip():
+            remarks.doubt(number, "more than three numbers: the rest is ignored")
+        yield float(match[1]), float(match[2]), float(match[3])
+
+
+def _look_for_jumps(remarks: Remarks, steps: Array, trims: Array) -> None:
+    """Name the points where the correction rises and falls again, or jumps, faster than a screw can err."""
+    slopes = np.abs(np.diff(trims, axis=0)).max(axis=1) / steps
+    for row in np.flatnonzero(slopes > STEEP):
+        text = f"the correction changes by {slopes[row]:.3g} per unit of length from the line before"
+        remarks.doubt(int(row) + 2, text, "a slip of the digits?")

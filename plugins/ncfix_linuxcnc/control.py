@@ -1,0 +1,141 @@
+"""LinuxCNC's screw compensation: one `.comp` file for each joint, and the lines of the ini file that load them.
+
+The rules are those of LinuxCNC's source (usrmotintf.cc, command.c, control.c): a correction that is added to the motor
+position, looked up by the joint's own commanded position, forward or reverse by the way it moves, linear between the
+points and held beyond them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.neutral import Compensation
+from ncfix.tables.positioning import positioning
+from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, read_joints
+
+ORDER = "XYZABCUVW"
+DEGREE = np.pi / 180
+
+
+class LinuxCnc(Control):
+    """The control `linuxcnc`."""
+
+    name = "linuxcnc"
+    title = "LinuxCNC screw compensation"
+    reaches = "L-POS"
+    properties = Properties(
+        value_sign="correction (type 1) or measured (type 0)",
+        input_signal="setpoint",
+        position_frame="machine coordinates of the joint",
+        unit="machine units: mm, degree",
+        quantum=(1e-6, 1e-6 * DEGREE),
+        extrapolation="the value of the first or last point is held",
+        bidirectional=True,
+        max_points=MOST,
+        max_tables=9,
+        combine="one file for each joint",
+    )
+    assumptions = (
+        Assumption(
+            "LCNC-1",
+            "Joint n moves the n-th axis of COORDINATES, and nothing else.",
+            "LinuxCNC documentation, trivial kinematics",
+            "order XYZABCUVW of the axes that the machine has",
+            "Jog each joint before homing and see which axis moves; --set coordinates=... gives another order.",
+        ),
+        Assumption(
+            "LCNC-2",
+            "The way an axis moves is known when its table is looked up; the filter that limits how fast the "
+            "correction changes is not emulated.",
+            "LinuxCNC source, control.c",
+            "settled",
+            "Watch the pin joint.N.motor-offset and the motor position while an axis turns round.",
+        ),
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions"),
+        "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC"),
+        "points": Option(str(MOST), "most points of one file, at most 256"),
+    }
+    steps = (
+        "Save the ini file, and note the values of BACKLASH: a joint with COMP_FILE ignores it.",
+        "Copy the .comp files beside the ini file.",
+        "Put the lines of comp.ini into the [JOINT_n] sections.",
+        "Start LinuxCNC and home all joints.",
+        "Measure one axis again: the positioning error must have become smaller, not twice as large.",
+    )
+    switch_off = "Take the COMP_FILE lines out of the ini file and start LinuxCNC again."
+
+    def write(self, request: Request) -> Written:
+        """One file for each axis that has something to correct, and `comp.ini`."""
+        settings = self.settings(request.settings)
+        kind = _choice(settings, "type", ("0", "1"))
+        most = _whole(settings, "points", 2, MOST)
+        letters = _coordinates(request, settings["coordinates"])
+        tables = positioning(request.machine, request.space, request.tool_length, most, request.target)
+        joints = _joints(tables, letters)
+        files = {joint.file: comp_text(joint, int(kind)) for joint in joints}
+        return Written({**files, "comp.ini": ini_text(joints, letters, int(kind))}, _notes(request))
+
+    def read(self, files: Files) -> Compensation:
+        """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
+        joints, remarks = read_joints(files)
+        for each in remarks:
+            each.check()
+        return Compensation(tuple(term for joint in joints for term in joint.terms()))
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What would stop LinuxCNC's reader early, and what is rarely meant."""
+        _, remarks = read_joints(files)
+        return tuple(message for each in remarks for message in each.messages)
+
+
+def _joints(tables: Compensation, letters: str) -> list[Joint]:
+    found = []
+    for term in tables.terms[::2]:
+        (axis,) = term.outputs
+        pair = [each.factors[0] for each in tables.terms if each.outputs == (axis,)]
+        unit = DEGREE if axis in "ABC" else 1.0
+        nodes = pair[0].nodes[0] / unit
+        forward, reverse = (grid.values[:, 0] / unit for grid in pair)
+        found.append(Joint(letters.index(axis), axis, nodes, forward, reverse))
+    return sorted(found, key=lambda joint: joint.number)
+
+
+def _coordinates(request: Request, given: str) -> str:
+    names = request.machine.axis_names
+    letters = given.replace(" ", "").upper() or "".join(letter for letter in ORDER if letter in names)
+    if sorted(letters) != sorted(names):
+        if given:
+            raise UsageError.of("NCF485", f"coordinates={given} are not the axes of the machine: {' '.join(names)}")
+        raise RefusedError.of("NCF484", f"LinuxCNC has no axes but {ORDER}; the machine has {' '.join(names)}")
+    return letters
+
+
+def _choice(settings: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
+    if settings[key] not in allowed:
+        raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=f"one of {', '.join(allowed)}")
+    return settings[key]
+
+
+def _whole(settings: Mapping[str, str], key: str, low: int, high: int) -> int:
+    text = settings[key]
+    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
+        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
+    return int(text)
+
+
+def _notes(request: Request) -> tuple[str, ...]:
+    notes = [
+        "Straightness, squareness, angles and where the rotary axes lie cannot be said in one-axis tables: that part "
+        "of the error is left. ncfix fix corrects it in the program."
+    ]
+    for axis in request.machine.axes:
+        if axis.endless:
+            notes.append(f"{axis.name} is endless: its table covers one turn, beyond it the end value is held.")
+    return tuple(notes)

@@ -1,0 +1,118 @@
+"""`ncfix export`: compensation tables that a control understands."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import click
+
+from ncfix import files
+from ncfix.cli import console
+from ncfix.cli.options import Positive, force_option, json_option, load_machine, machine_option
+from ncfix.diagnostics import ExitCode, Place, UsageError
+
+if TYPE_CHECKING:
+    from ncfix.machine import Machine
+    from ncfix.tables.export import Exported
+
+
+@click.command()
+@click.argument("control")
+@machine_option
+@click.option("-o", "--output", metavar="DIR", required=True, help="The folder for the files.")
+@click.option(
+    "--tool-length", type=float, default=0.0, show_default=True, help="The length that the tables hold for, mm."
+)
+@click.option(
+    "--target-um",
+    type=Positive(),
+    default=1.0,
+    show_default=True,
+    help="How much correction may be lost between the points of a table.",
+)
+@click.option("--range", "ranges", metavar="X=LOW:HIGH", multiple=True, help="Cover less than the travel; mm, degree.")
+@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control.")
+@force_option
+@json_option
+def export(
+    control: str,
+    machine_path: str,
+    output: str,
+    tool_length: float,
+    target_um: float,
+    ranges: tuple[str, ...],
+    settings: tuple[str, ...],
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Write compensation tables for CONTROL, with a hand-over sheet and what they leave.
+
+    The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
+    """
+    from ncfix.tables.control import Request, get_control
+    from ncfix.tables.export import export as exported
+    from ncfix.tables.poses import ranges_of
+
+    chosen = get_control(control)
+    machine = load_machine(machine_path)
+    space = ranges_of(machine, given_ranges(machine, ranges))
+    options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings))
+    with console.busy("making tables"):
+        made = exported(chosen, Request(machine, space, tool_length, 1e-3 * target_um, options))
+    write_folder(output, made, force)
+    console.tell_some(made.messages)
+    tell(made, as_json, control=chosen.name, reaches=chosen.reaches, assumptions=chosen.described()["assumptions"])
+    return ExitCode.DONE
+
+
+def given_ranges(machine: Machine, texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """Axis -> range in mm or rad, from X=LOW:HIGH in mm or degree; raises `UsageError` NCF483."""
+    units = {axis.name: axis.unit for axis in machine.axes}
+    found = {}
+    for text in texts:
+        name, value = _pair(text, "--range X=LOW:HIGH")
+        try:
+            low, high = (float(part) * units.get(name, 1.0) for part in value.split(":"))
+        except ValueError as error:
+            hint = "--range X=LOW:HIGH, mm or degree"
+            raise UsageError.of("NCF483", f"{text!r} is not a range", hint=hint) from error
+        found[name] = (low, high)
+    return found
+
+
+def _pair(text: str, form: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise click.UsageError(f"{text!r} should be {form}")
+    return name.strip(), value.strip()
+
+
+def write_folder(folder: str, made: Exported, force: bool) -> None:
+    """Write all files, or none if one is there already; raises `UsageError` NCF004 or NCF007."""
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        raise UsageError.of("NCF007", "is not a folder", Place(folder))
+    paths = {os.path.join(folder, name): content for name, content in made.files.items()}
+    for path in paths:
+        if os.path.lexists(path) and (not force or os.path.islink(path) or not os.path.isfile(path)):
+            raise files.exists_already(path)
+    for path, content in paths.items():
+        files.write_whole(path, content, replace=force)
+
+
+def tell(made: Exported, as_json: bool, **more: object) -> None:
+    """Say what the tables leave."""
+    figures = made.left.figures()
+    reaches = more.pop("reaches")
+    if as_json:
+        entries = {**more, "class": reaches, "files": sorted(made.files), "residual_um": figures}
+        warnings = [message.as_dict() for message in made.messages]
+        console.put_json(**entries, limits=made.limits(), notes=made.notes, warnings=warnings)
+        return
+    rows = [(when, *(f"{figures[when][key]:.2f}" for key in ("max", "rms", "mean"))) for when in ("before", "after")]
+    console.table(("tip error, um", "max", "rms", "mean"), rows)
+    pose = " ".join(f"{name}{value:g}" for name, value in figures["after"]["at"].items())
+    limits = made.limits()
+    console.put(f"class {reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
+    for note in made.notes:
+        console.say(note)

@@ -1,0 +1,165 @@
+"""What a control's plugin brings: how its tables are made, written, read back and judged.
+
+A reader turns the files into a `Compensation`, with the control's own signs, digits, limits and rules outside the
+range worked in; running that is the emulation. A plugin registers a function that returns its `Control` with the hook
+`register_controls`, so that nothing numeric is imported before tables are asked for.
+`ncfix.testing.check_control` is the contract that any plugin must pass.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+from ncfix.diagnostics import Message, UsageError
+from ncfix.machine import Machine
+from ncfix.plugins import registry
+from ncfix.tables.grid import Array
+from ncfix.tables.neutral import Compensation
+
+Files = Mapping[str, bytes]
+"""File name (no folder) -> content."""
+
+
+@dataclass(frozen=True, slots=True)
+class Properties:
+    """What a format is, as data.
+
+    value_sign      "correction" (added), "error" (taken off) or "measured" (where the axis really is)
+    input_signal    what the tables look up: "setpoint" or "actual"
+    position_frame  where positions count from
+    unit            of values and positions
+    quantum         smallest step of a value in the file, mm and rad
+    extrapolation   beyond the first and last node
+    bidirectional   whether values depend on the way an axis moves
+    max_points      per table
+    max_tables      in all
+    combine         what several tables for one axis do
+    """
+
+    value_sign: str
+    input_signal: str
+    position_frame: str
+    unit: str
+    quantum: tuple[float, float]
+    extrapolation: str
+    bidirectional: bool
+    max_points: int
+    max_tables: int
+    combine: str
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """Something that no public text settles: what is taken for true, and how to find out on the machine."""
+
+    id: str
+    text: str
+    source: str
+    default: str
+    verify: str
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """A setting of a control, `--set name=value`; a default of None means that it must be given."""
+
+    default: str | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What to make tables of.
+
+    machine      with its errors
+    space        (n_axes, 2) the positions that the tables cover, mm and rad
+    tool_length  the length for which they hold, mm
+    target       how much correction may be lost between nodes, mm
+    settings     the control's options, all of them
+    """
+
+    machine: Machine
+    space: Array
+    tool_length: float
+    target: float
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The files of a control. `notes`: what could not be done as asked, in words."""
+
+    files: Files
+    notes: tuple[str, ...] = ()
+
+
+class Control(ABC):
+    """A control with compensation tables of its own.
+
+    name         as in `ncfix export NAME`
+    title        for people
+    reaches      ISO/TR 16907 class of what the tables can correct
+    properties   of the format
+    assumptions  that the files rest on
+    options      `--set`
+    steps        what to do at the machine, in order
+    switch_off   how to be rid of it
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    reaches: ClassVar[str]
+    properties: ClassVar[Properties]
+    assumptions: ClassVar[tuple[Assumption, ...]] = ()
+    options: ClassVar[Mapping[str, Option]] = {}
+    steps: ClassVar[tuple[str, ...]]
+    switch_off: ClassVar[str]
+
+    @abstractmethod
+    def write(self, request: Request) -> Written:
+        """The native files; raises `RefusedError` NCF484 for what the format cannot hold."""
+
+    @abstractmethod
+    def read(self, files: Files) -> Compensation:
+        """What the control does with these files; raises `ConfigError` for files that it would not load."""
+
+    @abstractmethod
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What is wrong or doubtful in these files, each with its place; empty if nothing is."""
+
+    def settings(self, given: Mapping[str, str]) -> dict[str, str]:
+        """All options with those given; raises `UsageError` NCF485 for one that is unknown or missing."""
+        for key in given:
+            if key not in self.options:
+                known = ", ".join(self.options) or "none"
+                raise UsageError.of("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
+        for key, option in self.options.items():
+            if option.default is None and key not in given:
+                text = f"{self.name} needs the option {key!r}: {option.text}"
+                raise UsageError.of("NCF485", text, hint=f"--set {key}=VALUE")
+        return {key: given.get(key, option.default or "") for key, option in self.options.items()}
+
+    def described(self) -> dict[str, Any]:
+        """Properties and assumptions as plain data."""
+        return {"properties": asdict(self.properties), "assumptions": [asdict(each) for each in self.assumptions]}
+
+
+def controls() -> dict[str, Control]:
+    """All controls that plugins bring."""
+    return {name: factory() for name, factory in registry("controls").items()}
+
+
+def get_control(name: str) -> Control:
+    """The control of that name; raises `UsageError` NCF480."""
+    found = registry("controls")
+    if name not in found:
+        raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=f"one of {_listed(found)}")
+    control: Control = found[name]()
+    return control
+
+
+def _listed(names: Sequence[str] | Mapping[str, object]) -> str:
+    return ", ".join(sorted(names))

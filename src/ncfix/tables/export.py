@@ -1,0 +1,139 @@
+"""Tables made, written, read back from what was written, and run: the residual is always that of the files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
+from ncfix.machine import Machine
+from ncfix.tables import manifest as side
+from ncfix.tables.control import Control, Files, Request
+from ncfix.tables.grid import Array
+from ncfix.tables.manifest import Manifest
+from ncfix.tables.neutral import Compensation
+from ncfix.tables.poses import ranges_of
+from ncfix.tables.residual import POSES, Residual, residual
+from ncfix.tables.sheet import as_html, as_markdown
+
+SHEET = "hand-over"
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """Files with what they leave.
+
+    native  the control's own files
+    files   all: also the side file and the hand-over sheet
+    """
+
+    native: Files
+    files: Files
+    tables: Compensation
+    left: Residual
+    notes: tuple[str, ...]
+    messages: tuple[Message, ...]
+
+    def limits(self) -> dict[str, Any]:
+        """How much of what the control can hold is used."""
+        grids = self.tables.grids
+        return {
+            "tables": len(grids),
+            "points": self.tables.points,
+            "largest": max((g.points for g in grids), default=0),
+        }
+
+
+def export(control: Control, request: Request, poses: int = POSES) -> Exported:
+    """Write the tables of a machine, read them again, and judge them by running them.
+
+    Raises `RefusedError`: NCF484 for what the format cannot hold, NCF489 for corrections beyond what the machine
+    allows, NCF490 for tables that leave more than there was before.
+    """
+    _check_finite(request.machine)
+    written = control.write(request)
+    tables = control.read(written.files)
+    messages = control.lint(written.files)
+    left = residual(request.machine, tables, request.space, request.tool_length, poses)
+    _check_size(request.machine, left)
+    made = _manifest(control, request, written.files)
+    sheet = as_markdown(control, request, tables, left, written)
+    more = {
+        side.NAME: made.as_bytes(**control.described(), residual_um=left.figures(), notes=written.notes),
+        f"{SHEET}.md": sheet.encode(),
+        f"{SHEET}.html": as_html(sheet).encode(),
+    }
+    return Exported(written.files, {**written.files, **more}, tables, left, written.notes, messages)
+
+
+def emulate(
+    control: Control,
+    files: Files,
+    machine: Machine,
+    folder: str,
+    any_machine: bool = False,
+    poses: int = POSES,
+) -> Exported:
+    """Run files as the control would; they are those of a folder, side file included.
+
+    Raises `ConfigError` for files that the control would not load, `RefusedError` NCF487 for those of another machine.
+    """
+    if side.NAME not in files:
+        raise ConfigError.of("NCF486", f"has no {side.NAME}", Place(folder), "give the folder that export wrote")
+    path = f"{folder}/{side.NAME}"
+    made = side.loads(files[side.NAME], path)
+    side.check(made, control.name, None if any_machine else machine, path)
+    native = {name: files[name] for name in made.files if name in files}
+    missing = [name for name in made.files if name not in files]
+    if missing:
+        raise ConfigError.of("NCF486", f"these files are missing: {', '.join(missing)}", Place(folder))
+    tables = control.read(native)
+    if not tables.axes <= set(machine.axis_names):
+        odd = ", ".join(sorted(tables.axes - set(machine.axis_names)))
+        raise RefusedError.of("NCF487", f"the tables are for axes that the machine does not have: {odd}", Place(folder))
+    space = ranges_of(machine, _internal(machine, made.ranges))
+    left = residual(machine, tables, space, made.tool_length, poses)
+    messages = (*made.changed(native, folder), *control.lint(native))
+    return Exported(native, files, tables, left, (), messages)
+
+
+def _internal(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    units = {axis.name: axis.unit for axis in machine.axes}
+    return {
+        name: (low * units.get(name, 1.0), high * units.get(name, 1.0))
+        for name, (low, high) in ranges.items()
+        if name in units
+    }
+
+
+def _manifest(control: Control, request: Request, files: Files) -> Manifest:
+    machine = request.machine
+    ranges = {
+        axis.name: (round(float(low) / axis.unit, 9), round(float(high) / axis.unit, 9))
+        for axis, (low, high) in zip(machine.axes, request.space, strict=True)
+    }
+    hashes = {name: side.digest(content) for name, content in files.items()}
+    return Manifest(
+        control.name, machine.name, machine.hash, ranges, request.tool_length, dict(request.settings), hashes
+    )
+
+
+def _check_finite(machine: Machine) -> None:
+    if any(not np.isfinite(effect.coefficients).all() for effect in machine.effects):
+        raise RefusedError.of("NCF489", "an error of the machine is not a number", hint="calibrate it again")
+
+
+def _check_size(machine: Machine, left: Residual) -> None:
+    allowed: Array = np.where(machine.rotary, machine.max_correction[1], machine.max_correction[0])
+    for name, value, limit, rotary in zip(left.names, left.largest, allowed, machine.rotary, strict=True):
+        if value > limit:
+            shown = (
+                f"{np.degrees(value):.4f} of {np.degrees(limit):.4f} degree" if rotary else f"{value:.3f} of {limit} mm"
+            )
+            text = f"the correction of {name} is larger than this machine allows: {shown}"
+            raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
+    if np.mean(left.after**2) > np.mean(left.before**2) + 1e-12:
+        raise RefusedError.of("NCF490", "these tables would leave more error than there is without them")

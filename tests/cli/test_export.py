@@ -1,0 +1,140 @@
+"""`ncfix export` and `ncfix emulate`: folders, refusals, figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.diagnostics import ExitCode
+
+FILES = ["comp.ini", "hand-over.html", "hand-over.md", "joint_0_X.comp", "ncfix-tables.json"]
+
+
+@pytest.fixture
+def tables(shop: Any, ncfix: Any) -> Path:
+    """Tables for LinuxCNC of the machine that is too long in X."""
+    folder: Path = shop.folder / "tables"
+    assert ncfix("export", "linuxcnc", "-m", shop.machine, "-o", folder).code == ExitCode.DONE
+    return folder
+
+
+def test_export_says_what_the_files_leave(shop: Any, ncfix: Any) -> None:
+    found = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "t", "--json").json()
+    assert found["control"] == "linuxcnc"
+    assert found["class"] == "L-POS"
+    assert found["files"] == FILES == sorted(path.name for path in (shop.folder / "t").iterdir())
+    assert found["residual_um"]["before"]["max"] == pytest.approx(50, abs=0.1)  # 0.1 um/mm over 500 mm, 20000 poses
+    assert found["residual_um"]["after"]["max"] < 0.002  # six decimals of a millimetre, and 32-bit floats
+    assert set(found["residual_um"]["after"]["at"]) == {"X", "Y", "Z"}
+    assert found["limits"] == {"tables": 2, "points": 4, "largest": 2}
+    assert {each["id"] for each in found["assumptions"]} == {"LCNC-1", "LCNC-2"}
+
+
+def test_emulate_reads_the_same_from_the_files(shop: Any, ncfix: Any, tables: Path) -> None:
+    exported = json.loads((tables / "ncfix-tables.json").read_bytes())
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine, "--json")
+    assert result.code == ExitCode.DONE
+    assert result.json()["residual_um"] == exported["residual_um"]
+
+
+def test_an_edited_file_is_run_as_it_is_and_named(shop: Any, ncfix: Any, tables: Path) -> None:
+    (tables / "joint_0_X.comp").write_text("0 0.01 0.01\n500 0.01 0.01\n")
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine, "--json")
+    assert result.code == ExitCode.FINDINGS
+    assert "NCF488" in result.err
+    assert result.json()["residual_um"]["after"]["max"] == pytest.approx(60, abs=0.1)  # 50 um too long, 10 more
+
+
+def test_a_broken_file_is_not_run(shop: Any, ncfix: Any, tables: Path) -> None:
+    (tables / "joint_0_X.comp").write_text("# X\n0 0 0\n")
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine)
+    assert result.code == ExitCode.UNREADABLE
+    assert "joint_0_X.comp:1: NCF491" in result.err
+
+
+def test_tables_of_another_machine_are_refused(shop: Any, ncfix: Any, tables: Path) -> None:
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.perfect)
+    assert result.code == ExitCode.REFUSED
+    assert "NCF487" in result.err
+    left = ncfix("emulate", "linuxcnc", tables, "-m", shop.perfect, "--other-machine", "--json").json()
+    assert left["residual_um"]["after"]["max"] > 40
+
+
+def test_tables_of_another_control_are_refused(shop: Any, ncfix: Any, tables: Path) -> None:
+    result = ncfix("emulate", "isg", tables, "-m", shop.machine, "--other-machine")
+    assert (result.code, "NCF487" in result.err) == (ExitCode.REFUSED, True)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b'{"ncfix-tables": 2}', b'{"ncfix-tables": 1}'])
+def test_a_side_file_that_is_none(shop: Any, ncfix: Any, tables: Path, content: bytes) -> None:
+    (tables / "ncfix-tables.json").write_bytes(content)
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine)
+    assert (result.code, "NCF486" in result.err) == (ExitCode.UNREADABLE, True)
+
+
+@pytest.mark.parametrize("gone", ["ncfix-tables.json", "joint_0_X.comp"])
+def test_a_file_that_is_missing(shop: Any, ncfix: Any, tables: Path, gone: str) -> None:
+    (tables / gone).unlink()
+    result = ncfix("emulate", "linuxcnc", tables, "-m", shop.machine)
+    assert (result.code, gone in result.err) == (ExitCode.UNREADABLE, True)
+
+
+def test_nothing_is_replaced_unasked(shop: Any, ncfix: Any, tables: Path) -> None:
+    before = (tables / "comp.ini").read_bytes()
+    again = ("export", "linuxcnc", "-m", shop.machine, "-o", tables, "--set", "type=0")
+    result = ncfix(*again)
+    assert (result.code, "NCF004" in result.err) == (ExitCode.USAGE, True)
+    assert (tables / "comp.ini").read_bytes() == before
+    assert ncfix(*again, "--force").code == ExitCode.DONE
+    assert (tables / "comp.ini").read_bytes() != before
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--set", "sign=1"], "NCF485"),
+        (["--set", "type=7"], "NCF485"),
+        (["--set", "points=900"], "NCF485"),
+        (["--set", "coordinates=XY"], "NCF485"),
+        (["--set", "type"], "NCF001"),
+        (["--range", "X=1"], "NCF483"),
+        (["--range", "U=1:2"], "NCF483"),
+        (["--range", "X=0:501"], "NCF483"),
+        (["--target-um", "0"], "NCF001"),
+    ],
+)
+def test_wrong_use(shop: Any, ncfix: Any, options: list[str], code: str) -> None:
+    result = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "t", *options)
+    assert (result.code, code in result.err) == (ExitCode.USAGE, True), result.err
+    assert not (shop.folder / "t").exists()
+
+
+def test_corrections_beyond_what_the_machine_allows(shop: Any, ncfix: Any) -> None:
+    """2 um per mm: a correction of 1 mm at the end, where half a millimetre is allowed."""
+    shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-3"))
+    result = ncfix("export", "isg", "-m", shop.machine, "-o", shop.folder / "t")
+    assert (result.code, "NCF489" in result.err) == (ExitCode.REFUSED, True)
+    assert not (shop.folder / "t").exists()
+
+
+def test_the_sheet_says_what_matters(tables: Path) -> None:
+    text = (tables / "hand-over.md").read_text()
+    for part in ("What to do", "How to switch it off", "Range covered", "Class (ISO/TR 16907): L-POS", "LCNC-1"):
+        assert part in text
+    page = (tables / "hand-over.html").read_text()
+    assert (
+        page.count("<li>")
+        == page.count("</li>")
+        == sum(line[:2] == "- " or line[1:3] == ". " for line in text.splitlines())
+    )
+
+
+def test_isg_end_to_end(shop: Any, ncfix: Any) -> None:
+    folder = shop.folder / "isg"
+    result = ncfix("export", "isg", "-m", shop.machine, "-o", folder, "--json").json()
+    assert result["limits"]["points"] == 8
+    assert result["residual_um"]["after"]["max"] < 0.01  # 1e-6 mm in the file, bilinear is exact here
+    assert ncfix("emulate", "isg", folder, "-m", shop.machine).code == ExitCode.DONE

@@ -1,0 +1,125 @@
+"""VOLCOMP of the ISG kernel: to the byte, read back, and what the linter says of broken files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import ConfigError
+from ncfix.machine import Effect
+from ncfix.tables.control import Request, get_control
+from ncfix.tables.export import export
+from ncfix.tables.poses import ranges_of
+from ncfix.testing import single_error
+
+CONTROL = get_control("isg")
+CONFIG = (
+    b"workpiece_axes          0\nX                       1\nY                       2\nZ                       3\n"
+    b"Interpolation           GRID\nenable_splicing         FALSE\nfilter_steps            20\n"
+    b"manual_activation       FALSE\nalternative_model       FALSE\nassociate_to_channel    FALSE\n"
+    b"file[0]                 C:\\vc\\volcomp0.csv\nfile_format[0]          ISG_CSV\n"
+)
+GRID = b"// errors\nX Y EXX EYY\n0 0 0.001 0\n0 10 0.002 0\n5 0 0.003 0\n5 10 0.004 0.002\n"
+
+
+def files(grid: bytes = GRID, config: bytes = CONFIG) -> dict[str, bytes]:
+    return {"volcomp.lis": config, "volcomp0.csv": grid}
+
+
+def test_golden_bytes() -> None:
+    """X stands 0.010 mm too far everywhere: the file holds that error at the eight corners of the travel."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001), 100).native
+    corners = [f"{x} {y} {z} 0.010000 0.000000 0.000000\n" for x in (-200, 300) for y in (-150, 250) for z in (-300, 0)]
+    assert made["volcomp.lis"] == CONFIG
+    head, names, *rows = made["volcomp0.csv"].decode().splitlines(keepends=True)
+    assert head.startswith("// ")
+    assert names == "X Y Z EXX EYY EZZ\n"
+    assert rows == corners
+
+
+def test_the_list_of_the_documentation_is_understood(shared: Callable[[str], Path]) -> None:
+    folder = shared("tables") / "beckhoff_isg"
+    sample = (folder / "volcomp_config.lis").read_bytes().replace(b"volcomp1.csv", b"volcomp0.csv")
+    assert sample.replace(b"\r", b"") == CONFIG
+    assert not CONTROL.lint(files(config=sample))
+
+
+def test_errors_are_taken_off_and_held_outside() -> None:
+    q = np.array([[2.5, 5.0], [99.0, 99.0]])
+    found = CONTROL.read(files()).at(("X", "Y"), q)
+    assert found == pytest.approx(-np.array([[0.0025, 0.0005], [0.004, 0.002]]), abs=1e-12)  # rounding of sums
+
+
+def test_rows_may_come_in_any_order() -> None:
+    head, *rows = GRID.splitlines(keepends=True)[1:]
+    mixed = b"".join([head, *reversed(rows)])
+    q = np.array([[1.0, 7.0]])
+    assert (CONTROL.read(files(mixed)).at(("X", "Y"), q) == CONTROL.read(files()).at(("X", "Y"), q)).all()
+
+
+def test_rotary_arguments_are_in_degree() -> None:
+    config = CONFIG.replace(b"Interpolation", b"C                       4\nInterpolation")
+    grid = b"C EXX\n0 0.000\n90 0.009\n"
+    found = CONTROL.read(files(grid, config)).at(("X", "C"), np.array([[0.0, np.pi / 6]]))
+    assert found[0, 0] == pytest.approx(-0.003, abs=1e-12)
+
+
+BROKEN = {
+    "a hole": (GRID.replace(b"5 0 0.003 0\n", b""), "no regular grid 2 x 2: 1 nodes missing"),
+    "a node twice": (GRID + b"5 0 0.003 0\n", "1 double"),
+    "one value too many": (GRID.replace(b"0.003 0\n", b"0.003 0 0\n"), "5 values under 4 names"),
+    "one value too few": (GRID.replace(b"0.003 0\n", b"0.003\n"), "3 values under 4 names"),
+    "a decimal comma": (GRID.replace(b"0.003", b"0,003"), "decimal comma"),
+    "a word": (GRID.replace(b"0.003", b"three"), "not a number"),
+    "not finite": (GRID.replace(b"0.003", b"nan"), "not finite"),
+    "an unknown name": (GRID.replace(b"EYY", b"EYQ"), "70468"),
+    "a name twice": (GRID.replace(b"EYY", b"EXX"), "70469"),
+    "a parameter before an argument": (GRID.replace(b"X Y EXX", b"X EXX Y"), "arguments first"),
+    "an axis without a number": (GRID.replace(b"X Y EXX", b"X B EXX"), "no axis number"),
+    "an angle": (GRID.replace(b"EYY", b"EAX"), "position errors only"),
+    "micrometres": (GRID.replace(b"0.004", b"4.0"), "not um"),
+    "empty": (b"// nothing\n", "is empty"),
+    "not ASCII": (GRID.replace(b"// errors", "// µm".encode()), "not ASCII"),
+}
+BROKEN_CONFIG = {
+    "an unknown name": (CONFIG.replace(b"filter_steps ", b"filter_stops "), "70468"),
+    "a name twice": (CONFIG + b"X 9\n", "X is there twice"),
+    "no value": (CONFIG + b"Y\n", "has no value"),
+    "other kinematics": (CONFIG.replace(b"axes          0", b"axes          1"), "workpiece_axes is 1"),
+    "no such file": (CONFIG.replace(b"volcomp0", b"volcomp9"), "volcomp9.csv is missing"),
+    "another format": (CONFIG.replace(b"ISG_CSV", b"EXCEL"), "file_format[0] is EXCEL"),
+    "two axes with one number": (CONFIG.replace(b"Y                       2", b"Y  1"), "same number 1"),
+    "no file": (CONFIG[: CONFIG.index(b"file[0]")], "names no file"),
+    "file 2 without file 1": (CONFIG + b"file[2] volcomp0.csv\n", "does not follow on"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_grids(case: str) -> None:
+    content, expected = BROKEN[case]
+    found = CONTROL.lint(files(content))
+    assert any(expected in f"{message.text} {message.hint}" for message in found), found
+    with pytest.raises(ConfigError):
+        CONTROL.read(files(content))
+
+
+@pytest.mark.parametrize("case", BROKEN_CONFIG)
+def test_broken_lists(case: str) -> None:
+    content, expected = BROKEN_CONFIG[case]
+    found = CONTROL.lint(files(config=content))
+    assert any(expected in message.text for message in found), found
+    with pytest.raises(ConfigError):
+        CONTROL.read(files(config=content))
+
+
+def test_a_jump_is_doubtful() -> None:
+    found = CONTROL.lint(files(GRID.replace(b"0.004", b"0.4")))
+    assert {message.code for message in found} == {"NCF492"}
+
+
+def test_good_files_are_not_remarked_on() -> None:
+    assert not CONTROL.lint(files())

@@ -1,0 +1,111 @@
+"""LinuxCNC's `.comp` files: to the byte, as its source reads them, and what the linter says of broken ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import ConfigError
+from ncfix.machine import Effect
+from ncfix.machine.smooth import Polynomial
+from ncfix.tables.control import Request, get_control
+from ncfix.tables.export import export
+from ncfix.tables.poses import ranges_of
+from ncfix.testing import single_error
+
+INI = b"[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\n\n[JOINT_0]\nCOMP_FILE = x.comp\nCOMP_FILE_TYPE = 1\n"
+GOOD = b"-10.0 0.001 0.002\n0.0 0.000 0.001\n10.0 -0.001 0.000\n"
+CONTROL = get_control("linuxcnc")
+
+
+def test_golden_bytes() -> None:
+    """A screw that is 0.1 um per mm too long over 500 mm, worked by hand: at x the correction is -x / 10001."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (1e-4,), Polynomial((1,))),))
+    files = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001), 100).native
+    assert files == {
+        "joint_0_X.comp": b"-200.000000 0.019998 0.019998\n300.000000 -0.029997 -0.029997\n",
+        "comp.ini": b"[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\n\n"
+        b"[JOINT_0]\nCOMP_FILE = joint_0_X.comp\nCOMP_FILE_TYPE = 1\n",
+    }
+
+
+def at(files: dict[str, bytes], x: float, way: float) -> float:
+    found = CONTROL.read(files).at(("X",), np.array([[x]]), np.array([[way]]))
+    return float(found[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("x", "way", "expected"), [(5, 1, -0.0005), (5, -1, 0.0005), (99, 1, -0.001), (-99, -1, 0.002), (0, 0, 0.0005)]
+)
+def test_columns_ends_and_between(x: float, way: float, expected: float) -> None:
+    assert at({"comp.ini": INI, "x.comp": GOOD}, x, way) == pytest.approx(expected, abs=1e-9)  # float32 of 0.002
+
+
+def test_type_0_says_where_the_axis_really_is(shared: Callable[[str], Path]) -> None:
+    """LinuxCNC's own sample: at 10 the forward reading is 9.999, so 0.001 is added."""
+    sample = (shared("tables") / "linuxcnc" / "screwcompX.dat").read_bytes()
+    files = {"comp.ini": INI.replace(b"TYPE = 1", b"TYPE = 0"), "x.comp": sample}
+    assert at(files, 10, 1) == pytest.approx(0.001, abs=1e-9)
+    assert at(files, 10, -1) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_slip_in_linuxcncs_own_sample_is_named(shared: Callable[[str], Path]) -> None:
+    sample = (shared("tables") / "linuxcnc" / "screwcompX.dat").read_bytes()
+    found = CONTROL.lint({"comp.ini": INI.replace(b"TYPE = 1", b"TYPE = 0"), "x.comp": sample})
+    assert {message.place.line for message in found if message.place} == {4, 5}  # into -4.2 and out of it
+    assert {message.code for message in found} == {"NCF492"}
+
+
+def test_inches() -> None:
+    ini = INI.replace(b"= mm", b"= inch")
+    assert at({"comp.ini": ini, "x.comp": GOOD}, 254.0, 1) == pytest.approx(-0.0254, abs=1e-8)
+
+
+BROKEN = {
+    "a comment": (b"# screw of X\n" + GOOD, "not three numbers"),
+    "a blank line": (GOOD.replace(b"\n0.0", b"\n\n0.0"), "a blank line"),
+    "a decimal comma": (GOOD.replace(b"0.002", b"0,002"), "a decimal comma"),
+    "two columns": (GOOD.replace(b" 0.002", b""), "not three numbers"),
+    "descending": (GOOD.replace(b"10.0 -0", b"-20.0 -0"), "must ascend"),
+    "twice the same": (GOOD.replace(b"10.0 -0", b"0.0 -0"), "must ascend"),
+    "one point": (GOOD.splitlines(keepends=True)[0], "1 points"),
+    "too many points": (b"".join(b"%d 0 0\n" % n for n in range(257)), "holds 256"),
+    "not ASCII": (GOOD + "30.0 0 0 µm\n".encode(), "not ASCII"),
+    "a word": (GOOD.replace(b"0.001", b"nan"), "not three numbers"),
+}
+BROKEN_INI = {
+    "no type": (INI.replace(b"COMP_FILE_TYPE = 1\n", b""), "COMP_FILE_TYPE = nothing"),
+    "type 2": (INI.replace(b"TYPE = 1", b"TYPE = 2"), "COMP_FILE_TYPE = 2"),
+    "no such file": (INI.replace(b"x.comp", b"y.comp"), "y.comp is missing"),
+    "no such joint": (INI.replace(b"JOINT_0", b"JOINT_7"), "no axis of COORDINATES"),
+    "no units": (INI.replace(b"LINEAR_UNITS = mm\n", b""), "LINEAR_UNITS"),
+    "no assignment": (INI + b"COMP FILE x\n", "nor NAME = VALUE"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_tables(case: str) -> None:
+    content, expected = BROKEN[case]
+    files = {"comp.ini": INI, "x.comp": content}
+    assert any(expected in message.text and message.code == "NCF491" for message in CONTROL.lint(files))
+    with pytest.raises(ConfigError, match=expected):
+        CONTROL.read(files)
+
+
+@pytest.mark.parametrize("case", BROKEN_INI)
+def test_broken_ini_files(case: str) -> None:
+    content, expected = BROKEN_INI[case]
+    assert any(expected in message.text for message in CONTROL.lint({"comp.ini": content, "x.comp": GOOD}))
+
+
+def test_backlash_beside_a_table_is_doubtful() -> None:
+    found = CONTROL.lint({"comp.ini": INI + b"BACKLASH = 0.01\n", "x.comp": GOOD})
+    assert [message.code for message in found] == ["NCF492"]
+    assert "BACKLASH is ignored" in found[0].text
+
+
+def test_a_good_pair_of_files_is_not_remarked_on() -> None:
+    assert not CONTROL.lint({"comp.ini": INI, "x.comp": GOOD})

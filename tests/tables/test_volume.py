@@ -1,0 +1,106 @@
+"""Grids made from a machine, and how many nodes they take."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import RefusedError, UsageError
+from ncfix.machine import State, loads
+from ncfix.tables.exact import exact_correction
+from ncfix.tables.poses import random_poses, ranges_of
+from ncfix.tables.volume import Volume, inputs_that_matter, search
+from ncfix.testing import single_error
+
+STRAIGHT = """
+ncfix = 1
+name = "the 13 errors of Table 4-3"
+topology = "w C B X F Z Y t"
+axis.X = { type = "linear", direction = [-1, 0, 0], range = [-305, 305] }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [-280, 280] }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [0, 560] }
+axis.B = { type = "rotary", direction = [0, -1, 0], range = [-90, 90] }
+axis.C = { type = "rotary", direction = [0, 0, -1], range = [-360, 360] }
+"""
+THIRTEEN = {  # Esmaeili Marzdashti (2021), Table 4-3, mm and rad
+    "EA0B": -0.000040,
+    "EC0B": -0.000001,
+    "EX0C": -0.095600,
+    "EA0C": -0.000012,
+    "EB0C": 0.000011,
+    "EB0Z": -0.000010,
+    "EA0Y": -0.000038,
+    "EC0Y": 0.000015,
+    "EY0S": 0.029300,
+    "EX0S": -0.100000,
+}
+GAINS = {"EXX": -0.000017, "EYY": -0.000023, "EZZ": -0.000032}
+
+
+def thirteen() -> str:
+    places = "".join(f'[[effect]]\nname = "{name}"\ncoefficients = [{value}]\n' for name, value in THIRTEEN.items())
+    gain = '[[effect]]\nname = "{}"\nbasis = "polynomial"\ndegree = [1]\ncoefficients = [{}]\n'
+    return STRAIGHT + places + "".join(gain.format(*pair) for pair in GAINS.items())
+
+
+def test_two_nodes_along_each_axis_do_for_the_thirteen_errors() -> None:
+    """Thesis, section 4.3: the 13-error model needs a grid of 2 x 2 x 2 (8 nodes), to 0.1 um."""
+    machine = loads(thirteen())
+    mesh = search(Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 275.86), 1e-4, [25] * 3, 15625)
+    assert mesh.reached
+    assert mesh.grid.counts == (2, 2, 2)
+
+
+def test_unequal_counts_take_fewer_nodes_than_equal_ones() -> None:
+    machine = single_error("EBX", 40e-6)
+    volume = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 100.0)
+    target = 2e-4
+    free, same = (search(volume, target, [25] * 3, 15625, equal) for equal in (False, True))
+    assert free.reached
+    assert same.reached
+    assert max(free.left, same.left) <= target
+    assert len(set(same.grid.counts)) == 1
+    assert free.grid.points < same.grid.points
+
+
+def test_limits_end_the_search() -> None:
+    machine = single_error("EXX")
+    mesh = search(Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 0.0), 1e-7, [4] * 3, 30)
+    assert not mesh.reached
+    assert mesh.grid.points <= 30
+    assert max(mesh.grid.counts) <= 4
+
+
+def test_nodes_hold_the_exact_correction() -> None:
+    machine = single_error("ECX", 50e-6, "w X F Y Z t")
+    grid = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 80.0).grid([3, 2, 4])
+    place = np.array([[grid.nodes[0][1], grid.nodes[1][1], grid.nodes[2][2]]])
+    names = machine.axis_names
+    q = place[:, ["XYZ".index(name) for name in names]]
+    corrected = q + grid.at(place)[:, [grid.outputs.index(name) for name in names]]
+    gap = machine.actual_tip(corrected, State(80.0)) - machine.tip(q, 80.0)
+    assert np.abs(gap).max() < 1e-7  # where the iteration stops, mm
+
+
+def test_only_rotary_axes_that_matter_are_inputs() -> None:
+    text = thirteen()
+    machine = loads(text)
+    assert set(inputs_that_matter(machine, ranges_of(machine), 0.0)) == set("XYZBC")
+    linear = loads(text[: text.index("[[effect]]")] + '[[effect]]\nname = "EXX"\ncoefficients = [0.01]\n')
+    assert set(inputs_that_matter(linear, ranges_of(linear), 0.0)) == set("XYZ")
+
+
+def test_what_cannot_be_corrected_is_refused() -> None:
+    machine = single_error("EXX", 3e6)
+    with pytest.raises(RefusedError) as caught:
+        exact_correction(machine, random_poses(ranges_of(machine), 20), State())
+    assert caught.value.code == "NCF482"
+
+
+@pytest.mark.parametrize(
+    "given", [{"U": (0.0, 1.0)}, {"X": (5.0, 5.0)}, {"X": (-200.0, 301.0)}], ids=["no axis", "empty", "beyond travel"]
+)
+def test_wrong_ranges(given: dict[str, tuple[float, float]]) -> None:
+    with pytest.raises(UsageError) as caught:
+        ranges_of(single_error("EXX"), given)
+    assert caught.value.code == "NCF483"
