@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format ci clean
+.PHONY: demo test lint format accuracy ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -18,6 +18,9 @@ lint:            ## style, types, floors (needs: pip install -e '.[dev]')
 format:
 	$(PYTHON) -m ruff format .
 	$(PYTHON) -m ruff check --fix .
+
+accuracy:        ## work out docs/accuracy.md (half an hour)
+	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py
 
 ci:              ## what the server runs
 	.ci/run
