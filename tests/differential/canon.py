@@ -62,12 +62,12 @@ class Canon:
     start, end  (n, 9)
     centre, normal, turns  (n, 3) (n, 3) (n,) of arcs; turns positive: counterclockwise about the normal
     calls     all other canonical calls, each with the number of motions before it
-    exact     full double precision (else four decimals of the program's unit)
+    exact     (n,) in full double precision (else four decimals of the program's unit)
     """
 
     accepted: bool
     error: str
-    exact: bool
+    exact: NDArray[np.bool_]
     line: NDArray[np.int64]
     kind: NDArray[np.int64]
     mode: NDArray[np.int64]
@@ -108,13 +108,12 @@ def interpret(
         rows = _run_extension(home, source, controls, folder, timeout)
     printed = canon_text.parse(text)
     rows = None if rows is None else canon_text.splines_joined(printed, rows)
-    exact = rows is not None and canon_text.agrees(printed, rows)
-    rows = rows if rows is not None and exact else printed.rows
+    rows, exact = canon_text.joined(printed, rows)
     rows[rows[:, 0] > 0, 0] += _lines_before_tape(content)
     return _canon(rows, printed.calls, controls, error, exact)
 
 
-def _canon(rows: Floats, calls: tuple[Call, ...], controls: Controls, error: str, exact: bool) -> Canon:
+def _canon(rows: Floats, calls: tuple[Call, ...], controls: Controls, error: str, exact: NDArray[np.bool_]) -> Canon:
     integer = rows[:, [0, 1, 2, 3, 6, 31]].astype(np.int64)
     end = rows[:, 16:25]
     first = np.array([[*controls.initial, 0.0, 0.0, 0.0]])

@@ -144,16 +144,18 @@ def splines_joined(printed: Printed, rows: Floats) -> Floats:
     return rows[[*kept, *range(row, len(rows))]]
 
 
-def agrees(printed: Printed, rows: Floats) -> bool:
-    """The extension's motions are those that were printed: same number, kinds and numbers to the digits printed.
+def joined(printed: Printed, rows: Floats | None) -> tuple[Floats, NDArray[np.bool_]]:
+    """The extension's motions where they are those that were printed, to the digits printed, and which those are.
 
+    The extension loses an axis position that was never programmed when the unit changes before a tool change; such
+    motions are taken as printed, with the extension's line. If it tells other motions altogether, or none, all are.
     The end of a spline is not printed.
     """
-    if len(printed.rows) != len(rows) or not np.array_equal(printed.rows[:, 1], rows[:, 1]):
-        return False
-    if not len(rows):
-        return True
+    if rows is None or len(printed.rows) != len(rows) or not np.array_equal(printed.rows[:, 1], rows[:, 1]):
+        return printed.rows, np.zeros(len(printed.rows), dtype=np.bool_)
     allowed = np.full((len(rows), 6), LAST_DIGIT)
     allowed[:, :3] *= printed.unit[:, None]
     difference = np.abs(printed.rows[:, 7:13] - rows[:, 7:13])
-    return bool(np.all(np.isnan(difference) | (difference <= allowed)))
+    same: NDArray[np.bool_] = np.all(np.isnan(difference) | (difference <= allowed), axis=1)
+    rows[~same, 7:] = printed.rows[~same, 7:]
+    return rows, same

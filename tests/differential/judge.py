@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 FLOAT_SLACK = 1e-5
 """mm: two exact models may differ in the order of composing small rotations: (3e-5 rad)**2 times 10 m."""
 DENSE = (0.125, 0.25, 0.5, 0.75, 0.9)
+PRINTED = 3e-3  # mm: four decimals of an inch, rounded twice
 LARGEST_RADIUS = 5.0  # mm, of a cutter
 MOST_DENSE = 4000  # motions of a file that are looked at along their whole length, evenly spread
 
@@ -107,17 +108,21 @@ class _Judge:
     def __init__(self, original: Canon, fixed: Canon, machine: Machine, terms: Terms) -> None:
         self.original, self.fixed, self.machine, self.terms = original, fixed, machine, terms
         self.verdict = Verdict(motions=len(original))
-        self.printed = 0.0 if original.exact and fixed.exact else 3e-3
-        self.half = terms.step / 2 + FLOAT_SLACK + self.printed
+        self.half = terms.step / 2 + FLOAT_SLACK
+        self.rough = PRINTED * ~original.exact, PRINTED * ~fixed.exact
         self.length = _lengths(fixed, terms)
 
     def run(self) -> Verdict:
         if not (self.original.accepted and self.fixed.accepted):
             self.verdict.complain(0, f"the control refuses: {self.original.error or self.fixed.error}")
             return self.verdict
-        linear, rotary = 2 * self.half, max(2 * self.half, self.terms.rotary)
+        linear = 2 * self.half + sum(float(rough.max(initial=0.0)) for rough in self.rough)
+        rotary = max(linear, self.terms.rotary)
         near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3)
-        segments, self.seen = match(self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance)
+        by_rule = np.array([self.terms.passed(int(line)) for line in self.original.line], dtype=np.bool_)
+        segments, self.seen = match(
+            self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance, by_rule
+        )
         for k, text in segments.complaints:
             self.verdict.complain(int(self.original.line[k]), text)
         self.started = self.machine.embedded(self.fixed.start, self.length) if len(self.fixed) else self.seen
@@ -128,6 +133,12 @@ class _Judge:
         for line, text in calls.compare(self.original, self.fixed, segments) if self.terms.calls else ():
             self.verdict.complain(line, text)
         return self.verdict
+
+    def halves(self, of: NDArray[np.int64], pieces: NDArray[np.int64]) -> Floats:
+        """Half an output step, and what is not known of motions of which only the printed numbers are."""
+        start, end = self.rough
+        unknown = start[of] + start[np.maximum(of - 1, 0)] + end[pieces] + end[np.maximum(pieces - 1, 0)]
+        return self.half + np.asarray(unknown)
 
     # -- what became of the motions -----------------------------------------------------------------------------------
 
@@ -179,14 +190,14 @@ class _Judge:
         done = np.flatnonzero(segments.fate == Fate.COMPENSATED)
         last = segments.last[done]
         off = np.abs(_turn_back(self.seen[last] - self.original.end[done], self.original.rotation[done]))
+        half = self.halves(done, last)
         arc = (self.original.kind[done] == ARC) | (self.fixed.kind[last] == ARC)
         linear = off[:, self.machine.linear].max(axis=1, initial=0.0)
         lines = self.original.line[done]
         if not self.terms.rotary:
-            self.verdict.note("line ends", linear[~arc], np.full(int((~arc).sum()), self.half), lines[~arc])
-            allowed = np.full(int(arc.sum()), self.half + self.terms.tolerance)
-            self.verdict.note("arc ends", linear[arc], allowed, lines[arc])
-        free = np.full(len(done), self.terms.rotary + 1e-9 + self.printed)
+            self.verdict.note("line ends", linear[~arc], half[~arc], lines[~arc])
+            self.verdict.note("arc ends", linear[arc], half[arc] + self.terms.tolerance, lines[arc])
+        free = half - self.half + self.terms.rotary + 1e-9
         rotary = off[:, self.machine.rotary].max(axis=1, initial=0.0)
         self.verdict.note("rotary ends (degree)", rotary, free, lines)
 
@@ -236,7 +247,7 @@ class _Judge:
 
         _, distance = paths.nearest(intended, real, guess, low, high)
         excused = self.entry_error(segments, pieces, of) * (1 - u)
-        allowed = self.terms.tolerance + np.sqrt(3) * self.half + excused
+        allowed = self.terms.tolerance + np.sqrt(3) * self.halves(of, pieces) + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
         self.verdict.note(what, distance, allowed, self.original.line[of], excused)
 
@@ -244,7 +255,7 @@ class _Judge:
         """How far the tip is off where a motion begins, if the one before was not corrected; it fades on the way."""
         begins = pieces == segments.first[of]
         off = np.linalg.norm(self.started[pieces] - self.original.start[of], axis=1)
-        return np.where(begins & (off > 2 * self.half), off, 0.0)
+        return np.where(begins & (off > 2 * self.halves(of, pieces)), off, 0.0)
 
     def rotary_rounding(
         self, pieces: NDArray[np.int64], of: NDArray[np.int64], segments: Segments, command: Floats
@@ -271,10 +282,11 @@ class _Judge:
             off = np.abs(_turn_back(miss, self.original.rotation[rows]))
             linear, lines = off[:, self.machine.linear].max(axis=1), self.original.line[rows]
             refused = np.isin(lines, list(self.terms.refused))
+            half = self.halves(rows, segments.last[rows])
             if fate == Fate.CYCLE:
                 bottom = _bottoms(self.original, rows) & ~refused
-                self.verdict.note("cycle bottoms", linear[bottom], np.full(int(bottom.sum()), self.half), lines[bottom])
-            near = self.half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
+                self.verdict.note("cycle bottoms", linear[bottom], half[bottom], lines[bottom])
+            near = half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
             self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
             self.verdict.refused += int(refused.sum())
             self.verdict.compensated -= int(refused.sum())
@@ -316,8 +328,9 @@ def _bottoms(canon: Canon, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _lengths(canon: Canon, terms: Terms) -> Floats:
-    """(n,) length of the tool in the spindle."""
-    return np.array([terms.tool_length.get(int(number), 0.0) for number in canon.tool], dtype=np.float64)
+    """(n,) length of the tool: the offset in force, which tells it, else that of the tool in the spindle."""
+    table = np.array([terms.tool_length.get(int(number), 0.0) for number in canon.tool], dtype=np.float64)
+    return np.where(canon.offset_z != 0, canon.offset_z, table)
 
 
 def _turn_back(vectors: Floats, angle: Floats) -> Floats:

@@ -18,7 +18,7 @@ for _ in range(4):
 VALUE = rb"(?:[-+]?(?:\d+\.?\d*|\.\d+)|[A-Z]*" + BRACKETS + rb"|[-+]?#+(?:\d+|<[^>]*>|" + BRACKETS + rb"))"
 MOTION = re.compile(rb"[XYZABCUVWIJKRPF]" + VALUE + rb"|G0*[0123](?![\d.])")
 TOKEN = re.compile(rb"\([^)\n]*\)|;.*|[A-Z][-+]?[0-9.]+|[^ \t]")
-NUMBERED = re.compile(rb"[XYZABCUVWIJKR][-+]?[\d.\[#]")
+NUMBERED = re.compile(rb"[XYZABCUVWIJKR](?:[-+]?[\d.\[#]|[A-Z]+\[)")
 STAMP = b"ncfix"
 
 

@@ -72,7 +72,7 @@ def _arc_fraction(canon: Canon, rows: Rows, position: Floats, after: Floats) -> 
     total = sweep(canon, rows)
     turn = 2 * np.pi / np.abs(total)
     fraction = (angle * np.sign(total) % (2 * np.pi)) / np.abs(total)
-    fraction = np.where(fraction > turn - 1e-6, fraction - turn, fraction)
+    fraction = np.where((fraction > turn * (1 - 1e-4)) & (after < turn / 2), fraction - turn, fraction)
     return fraction + turn * np.maximum(np.ceil((after - 1e-3 * turn - fraction) / turn), 0.0)
 
 

@@ -62,6 +62,7 @@ class _Matcher:
     seen: Floats
     near: Floats
     tolerance: float
+    by_rule: NDArray[np.bool_]
     fate: list[int] = field(default_factory=list)
     first: list[int] = field(default_factory=list)
     last: list[int] = field(default_factory=list)
@@ -89,9 +90,10 @@ class _Matcher:
         for j in range(self.j, min(self.j + LOOKAHEAD, len(self.fixed))):
             if not self.same_kind(k, j):
                 break
-            if self.arrives(k, j):
-                return self.take(k, j, Fate.COMPENSATED)
-            if j == self.j and untouched(self.original, self.fixed, k, j):
+            left = j == self.j and untouched(self.original, self.fixed, k, j)
+            if self.arrives(k, j) and not (left and self.by_rule[k]) and self.went_round(k, j, progress):
+                return self.take(k, self.nearest(k, j), Fate.COMPENSATED)
+            if left:
                 return self.take(k, j, Fate.UNCHANGED)
             progress = self.progress(k, j, progress)
             if np.isnan(progress[0]):
@@ -115,6 +117,24 @@ class _Matcher:
             return False
         near = self.near + (self.tolerance * LINEAR if self.original.kind[k] == ARC else 0.0)
         return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= near))
+
+    def went_round(self, k: int, j: int, progress: Floats) -> bool:
+        """A full circle ends where it begins: to be there is not enough."""
+        closed = self.original.kind[k] == ARC and bool(
+            np.all(np.abs(self.original.end[k] - self.original.start[k]) < 1e-3)
+        )
+        return not closed or progress[0] > 0.5 or int(self.fixed.kind[j]) == ARC
+
+    def nearest(self, k: int, j: int) -> int:
+        """The last pieces of a finely cut arc may all be near its end: the one that is nearest."""
+        while self.original.kind[k] == ARC and j + 1 < len(self.fixed) and self.arrives(k, j + 1):
+            if not self.same_kind(k, j + 1) or self.distance(k, j + 1) >= self.distance(k, j):
+                break
+            j += 1
+        return j
+
+    def distance(self, k: int, j: int) -> float:
+        return float(np.abs(self.seen[j] - self.original.end[k]).max())
 
     def progress(self, k: int, j: int, before: Floats) -> Floats:
         """(1,) the fraction of the original motion that a piece ends at, NaN if it ends far from the path."""
@@ -177,13 +197,20 @@ def _turned(vector: Floats, angle: float) -> Floats:
 
 
 def match(
-    original: Canon, fixed: Canon, machine: Machine, length: Floats, near: Floats, tolerance: float
+    original: Canon,
+    fixed: Canon,
+    machine: Machine,
+    length: Floats,
+    near: Floats,
+    tolerance: float,
+    by_rule: NDArray[np.bool_],
 ) -> tuple[Segments, Floats]:
     """The segments, and (m, 9) where the corrected motions end as the machine with errors does them.
 
     length     (m,) tool length of the corrected motions, mm
     near       (9,) mm, degree: how near an end must be to count as reached; the judge looks closer afterwards
     tolerance  mm: added for the ends of arcs
+    by_rule    (n,) original motions that must not be touched
     """
     seen = machine.embedded(fixed.end, length) if len(fixed) else fixed.end
-    return _Matcher(original, fixed, seen, near, tolerance).run(), seen
+    return _Matcher(original, fixed, seen, near, tolerance, by_rule).run(), seen

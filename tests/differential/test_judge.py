@@ -94,7 +94,7 @@ WRONG = {
     "drops an arc": (ARCS, Flaws(drops=4), ""),
     "a crooked piece": (LONG, Flaws(pieces=40, piece_off=0.01), "inserted points"),
     "a piece in the wrong place": (LONG, Flaws(pieces=40, piece_off=3.0), ""),
-    "split, F of inverse time kept": (INVERSE, Flaws(pieces=2), "feed"),
+    "split, F of inverse time kept": (INVERSE, Flaws(pieces=2), "inverse time"),
 }
 
 
