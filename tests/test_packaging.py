@@ -47,7 +47,7 @@ def run(arguments: list[str], cwd: Path, *path: Path) -> Any:
 
 def origin(cwd: Path, *path: Path) -> list[Path]:
     """Where ncfix and its built-in plugins come from."""
-    names = ["ncfix", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc"]
+    names = ["ncfix", "ncfix_fanuc", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc"]
     script = "import sys, importlib; print(*(importlib.import_module(name).__file__ for name in sys.argv[1:]))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
     command = [sys.executable, "-c", script, *names]
@@ -69,7 +69,7 @@ def test_the_wheel_holds_the_packages_and_the_grammars_and_nothing_else(root: Pa
     assert wheel.name == f"ncfix-{__version__}-py3-none-any.whl"
     names = zipfile.ZipFile(wheel).namelist()
     tops = {name.split("/")[0] for name in names}
-    assert tops == {"ncfix", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc", f"ncfix-{__version__}.dist-info"}
+    assert tops == {"ncfix", "ncfix_fanuc", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc", f"ncfix-{__version__}.dist-info"}
     grammars = {f"ncfix/grammars/{path.name}" for path in (root / "grammars").glob("*.lark")}
     assert grammars
     assert {name for name in names if "/grammars/" in name} == grammars

@@ -19,7 +19,7 @@ def test_actual_positions_are_the_same_tables_in_another_form() -> None:
 
 
 def test_all_are_found() -> None:
-    assert {"linuxcnc", "isg"} <= set(controls())
+    assert {"fanuc", "linuxcnc", "isg"} <= set(controls())
 
 
 def test_an_unknown_control_is_refused() -> None:

@@ -1,0 +1,141 @@
+"""Three-dimensional error compensation of Fanuc Series 30i: a grid of corrections over X, Y and Z.
+
+The interpolation (A-79351E, trilinear in the control's current position), the size (25 x 25 x 25) and the record of
+the FOCAS library are public; the control's own text file is not, so none is written. What cannot be known from public
+text, and would double the error if guessed wrongly, must be said: `--set sign=...`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.volume import Volume, search
+from ncfix_fanuc.records import LARGEST, Volc, csv_text, json_text, read_volc
+
+SIDE = 25
+AXES = ("X", "Y", "Z")
+
+
+class Fanuc(Control):
+    """The control `fanuc`."""
+
+    name = "fanuc"
+    title = "Fanuc Series 30i three-dimensional error compensation"
+    reaches = "L-VOL"
+    properties = Properties(
+        value_sign="as --set sign says",
+        input_signal="setpoint",
+        position_frame="machine coordinates",
+        unit="detection unit times magnification; positions mm",
+        quantum=(1e-4, 0.0),
+        extrapolation="taken as held at the outermost nodes (FANUC-4)",
+        bidirectional=False,
+        max_points=SIDE**3,
+        max_tables=1,
+        combine="one grid",
+    )
+    assumptions = (
+        Assumption(
+            "FANUC-1",
+            "The sign of the values is what --set sign says.",
+            "none public; patents speak of an amount that is added",
+            "none: it must be given",
+            "Load +0.010 mm at all points of X: does X move by 0.010 towards plus (correction) or minus (error)?",
+        ),
+        Assumption(
+            "FANUC-2",
+            "Points are numbered from 1, X fastest, then Y, then Z.",
+            "none public",
+            "so",
+            "Load a value at point 2 only, and find with cnc_rdvolccomp where it acts.",
+        ),
+        Assumption(
+            "FANUC-3",
+            "A value is a whole number from -127 to 127, times magnification, times detection unit.",
+            "none public for the grid; so it is with other compensations of these controls",
+            "the detection unit is 0.1 um",
+            "The parameter manual of the machine; --set detection_unit_um=...",
+        ),
+        Assumption(
+            "FANUC-4",
+            "Outside the grid the value of its edge holds.",
+            "none public",
+            "edge value",
+            "Move beyond the grid and read cnc_rdvolccomp.",
+        ),
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        "sign": Option(None, "correction: values are added to the command; error: they are taken off it"),
+        "detection_unit_um": Option("0.1", "detection unit of the linear axes, um"),
+    }
+    steps = (
+        "Settle the assumptions below on the machine, sign first.",
+        "Set numbers of points, intervals, reference points and magnification as volume.json has them.",
+        "Write the records of volume.json with cnc_wrvolc, or type in volume.csv.",
+        "Switch power off and on, home all axes.",
+        "Read cnc_rdvolccomp at one pose and compare it with volume.csv.",
+        "Measure one line again: the error must have become smaller, not twice as large.",
+    )
+    switch_off = "Switch the function off by its parameter, or set the magnification to zero."
+
+    def write(self, request: Request) -> Written:
+        """`volume.json` with the FOCAS records, and the same as `volume.csv`."""
+        settings = self.settings(request.settings)
+        sign = _sign(settings["sign"])
+        unit = _unit(settings["detection_unit_um"])
+        if not set(AXES) <= set(request.machine.axis_names):
+            text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
+            raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+        volume = Volume(request.machine, AXES, request.space, request.tool_length)
+        mesh = search(volume, request.target, [SIDE] * 3, SIDE**3)
+        order = [mesh.grid.outputs.index(axis) for axis in AXES]
+        values = mesh.grid.values[..., order]
+        magnification = max(1, math.ceil(float(np.abs(values).max()) / (LARGEST * unit) - 1e-9))
+        whole = np.rint(sign * values / (magnification * unit)).astype(np.int64)
+        low = tuple(float(line[0]) for line in mesh.grid.nodes)
+        step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
+        made = Volc(settings["sign"], low, step, unit, magnification, whole)
+        counts = " x ".join(map(str, mesh.grid.counts))
+        notes = [
+            f"Grid {counts}: {mesh.grid.points} points; it misses {1e3 * mesh.left:.2f} um at most between them.",
+            f"Magnification {magnification}: a value is rounded by up to {500 * magnification * unit:.2f} um.",
+        ]
+        if not mesh.reached:
+            notes.append(f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis.")
+        if request.machine.rotary.any():
+            notes.append("The grid is that of rotary axes at zero; at other angles more is left.")
+        return Written({"volume.json": json_text(made), "volume.csv": csv_text(made)}, tuple(notes))
+
+    def read(self, files: Files) -> Compensation:
+        """As the control would interpolate them. Raises `ConfigError` NCF491."""
+        volc, remarks = read_volc(files)
+        remarks.check()
+        assert volc is not None
+        return Compensation((Term((volc.grid(),)),))
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """Records that do not fit, values beyond the range, and a CSV that says something else."""
+        return read_volc(files)[1].messages
+
+
+def _sign(text: str) -> int:
+    if text not in ("correction", "error"):
+        raise UsageError.of("NCF485", f"sign={text}", hint="correction or error; FANUC-1 says how to find out")
+    return 1 if text == "correction" else -1
+
+
+def _unit(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not 0.001 <= found <= 10:
+        raise UsageError.of("NCF485", f"detection_unit_um={text}", hint="um, from 0.001 to 10")
+    return found / 1000

@@ -1,0 +1,108 @@
+"""Fanuc's three-dimensional grid: records, sign, magnification, and what the linter says of broken files."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import ConfigError, UsageError
+from ncfix.machine import Effect
+from ncfix.tables.control import Request, get_control
+from ncfix.tables.export import Exported, export
+from ncfix.tables.poses import ranges_of
+from ncfix.testing import check_control, single_error
+
+CONTROL = get_control("fanuc")
+
+
+def exported(sign: str = "correction", unit: str = "0.1", size: float = 0.01) -> Exported:
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (size,)),))
+    settings = {"sign": sign, "detection_unit_um": unit}
+    return export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100)
+
+
+@pytest.mark.parametrize("sign", ["correction", "error"])
+def test_the_contract(sign: str) -> None:
+    check_control(CONTROL, {"sign": sign})
+
+
+def test_golden_records() -> None:
+    """X 0.010 mm too far everywhere: -100 units of 0.1 um at eight points."""
+    found = json.loads(exported().native["volume.json"])
+    record = {"start_no": 1, "start_ax": 1, "end_no": 8, "end_ax": 3, "num": 24, "type": 0, "data": [-100, 0, 0] * 8}
+    assert found == {
+        "sign": "correction",
+        "first_mm": [-200.0, -150.0, -300.0],
+        "interval_mm": [500.0, 400.0, 300.0],
+        "counts": [2, 2, 2],
+        "detection_unit_um": 0.1,
+        "magnification": 1,
+        "records": [record],
+    }
+    lines = exported().native["volume.csv"].splitlines()
+    assert lines[:3] == [
+        b"point,X,Y,Z,X_value,Y_value,Z_value",
+        b"1,-200.000000,-150.000000,-300.000000,-100,0,0",
+        b"2,300.000000,-150.000000,-300.000000,-100,0,0",
+    ]
+
+
+def test_the_sign_turns_every_value_and_leaves_the_same() -> None:
+    one, other = exported("correction"), exported("error")
+    data = [json.loads(each.native["volume.json"])["records"][0]["data"] for each in (one, other)]
+    assert data[0] == [-value for value in data[1]]
+    assert (one.left.after == other.left.after).all()
+
+
+def test_the_sign_must_be_given() -> None:
+    with pytest.raises(UsageError, match="sign"):
+        CONTROL.settings({})
+
+
+def test_magnification_and_its_rounding() -> None:
+    """0.1 mm in units of 0.1 um is 1000: magnification 8, and rounding by at most 0.4 um."""
+    made = exported(size=0.1)
+    assert json.loads(made.native["volume.json"])["magnification"] == 8
+    assert made.left.after.max() <= 0.0004 + 1e-9
+    assert any("0.40 um" in note for note in made.notes)
+
+
+def test_records_hold_24_points() -> None:
+    machine = single_error("EXX", 0.02)
+    settings = {"sign": "error", "detection_unit_um": "0.1"}
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.0001, settings), 500)
+    found = json.loads(made.native["volume.json"])
+    assert len(found["records"]) == -(-int(np.prod(found["counts"])) // 24) > 1
+    assert max(len(record["data"]) for record in found["records"]) == 72
+
+
+BROKEN = {
+    "a value gone": (lambda found: found["records"][0]["data"].pop(), "23 values and says 24"),
+    "a value too many": (lambda found: found["records"][0]["data"].append(0), "25 values and says 24"),
+    "a record gone": (lambda found: found["records"].clear(), "0 values in the records, 24 expected"),
+    "too large": (lambda found: found["records"][0]["data"].__setitem__(0, 128), "beyond -127 to 127"),
+    "too many points": (lambda found: found.update(counts=[26, 2, 2]), "2 to 25 points"),
+    "one point": (lambda found: found.update(counts=[1, 2, 4]), "2 to 25 points"),
+    "no interval": (lambda found: found.update(interval_mm=[0, 400, 300]), "intervals above zero"),
+    "no sign": (lambda found: found.update(sign=""), "the sign is"),
+    "a wrong number": (lambda found: found["records"][0].update(start_no=2), "record of point 2"),
+    "another value than the CSV": (
+        lambda found: found["records"][0]["data"].__setitem__(0, 5),
+        "does not say the same",
+    ),
+    "a key gone": (lambda found: found.pop("magnification"), "magnification"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files(case: str) -> None:
+    damage, expected = BROKEN[case]
+    files = dict(exported().native)
+    found = json.loads(files["volume.json"])
+    damage(found)
+    files["volume.json"] = json.dumps(found).encode()
+    assert any(expected in message.text for message in CONTROL.lint(files)), CONTROL.lint(files)
+    with pytest.raises(ConfigError):
+        CONTROL.read(files)
