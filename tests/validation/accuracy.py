@@ -77,7 +77,7 @@ def round_trip(name: str, kind: str, draws: int) -> tuple[int, int, float, float
     for draw in range(draws):
         real = drawn(chosen, known, random)
         start = chosen.machine(real, np.zeros(len(chosen.start)).tolist())
-        data = simulate(plan(known, kind, ROWS, draw), real, Faults(noise_um=1.0), seed=draw)
+        data = simulate(plan(known, kind, ROWS), real, Faults(noise_um=1.0), seed=draw)
         found = calibrate([data], start, Selection(start.effects, chosen.free), loss="none")
         truth = np.concatenate([e.coefficients for e, free in zip(real.effects, chosen.free, strict=True) if free])
         covariance = replace(found, scale=1.0).sigma

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
-from ncfix.measure.kinds import CHOICES, KINDS, Kind
+from ncfix.measure.kinds import CHOICES, KINDS, STATES, Kind
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -88,7 +88,8 @@ class Measurement:
     def state(self, machine: Machine) -> State:
         """The rest of the state of each row."""
         direction = np.stack([self.column(f"dir_{axis.name}") for axis in machine.axes], axis=-1)
-        inputs = {name: self.columns[name] for name in self.columns if name in machine.inputs or name == "time_s"}
+        names = [name for name in self.columns if name in machine.inputs or STATES.fullmatch(name)]
+        inputs = {name: self.columns[name] for name in names if name != "tool_length"}
         return State(self.column("tool_length"), direction, inputs)
 
     def place(self, row: int) -> Place:

@@ -26,7 +26,9 @@ PLACES = 150
 """Poses at which the predictions are judged."""
 RIDGE = 1e-9
 """Information that counts as none, of that of a candidate."""
-PASSES = 2
+PASSES = 8
+STARTS, SMALL = 20, 20_000
+"""Random starts besides the first choice, where candidates times predictions are few."""
 EXCHANGED = 1e-3
 """A relative gain below this is none."""
 
@@ -157,10 +159,9 @@ def _targets(
     if separate:
         columns = [k for k, effect in enumerate(_owners(selection)) if effect.name in separate]
         chosen = np.flatnonzero(np.isin(kept, columns))
-        names = {_owners(selection)[int(kept[k])].name for k in chosen}
-        if names != set(separate):
-            lost = ", ".join(sorted(set(separate) - names))
-            text = f"no pose of this kind tells {lost} from what else is unknown"
+        lost = ", ".join(selection.labels[k] for k in columns if k not in kept)
+        if lost or not columns:
+            text = f"no pose of this kind tells {lost or separate} from what else is unknown"
             raise UsageError.of("NCF636", text, hint="another kind of measurement, or more tool lengths")
         return np.eye(len(kept))[chosen]
     places = candidates(machine, "tcp", PLACES, room, seed + 1)
@@ -190,11 +191,17 @@ def choose(pool: Pool, count: int, fixed: int = 0) -> Index:
         chosen.append(best)
         free[best] = False
         inverse = inverse - spread[best].T @ np.linalg.solve(small[best], spread[best])
-    return _exchanged(pool, chosen, fixed)
+    random = np.random.default_rng(0)
+    others = np.arange(fixed, len(pool.blocks))
+    size = len(pool.targets) * len(pool.blocks)
+    starts = [chosen] + [random.permutation(others)[:count].tolist() for _ in range(STARTS if size < SMALL else 0)]
+    found = [_exchanged(pool, start, fixed) for start in starts]
+    chosen, _ = min(found, key=lambda each: each[1])
+    return np.array(chosen, dtype=np.int64)
 
 
-def _exchanged(pool: Pool, chosen: list[int], fixed: int) -> Index:
-    """Replace one pose after another by the candidate that lowers the worst variance most."""
+def _exchanged(pool: Pool, chosen: list[int], fixed: int) -> tuple[list[int], float]:
+    """Replace one pose after another by the candidate that lowers the worst variance most; that variance."""
     worst = float(variances(pool, [*range(fixed), *chosen]).max())
     for _ in range(PASSES):
         before = worst
@@ -205,7 +212,7 @@ def _exchanged(pool: Pool, chosen: list[int], fixed: int) -> Index:
                 chosen[place], worst = best, value
         if worst > before * (1 - EXCHANGED):
             break
-    return np.array(chosen, dtype=np.int64)
+    return chosen, worst
 
 
 def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:

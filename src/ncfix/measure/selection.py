@@ -19,6 +19,7 @@ from ncfix.machine.basis import Basis
 from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
 from ncfix.machine.fields import did_you_mean
 from ncfix.machine.smooth import Constant, Fourier, Polynomial
+from ncfix.measure.library import library
 
 ALL = "all"
 
@@ -29,7 +30,6 @@ class Selection:
 
     effects  all of them, those of the machine first
     free     for each whether it is estimated
-    ties     coefficients that are one: (effect, effect) estimate only their difference, the second stays as it is
     """
 
     effects: tuple[Effect, ...]
@@ -75,7 +75,8 @@ def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
 
 
 def select(machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None) -> Selection:
-    """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model.
+    """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
+    names of physical effects (`ncfix.measure.library`) may stand in the list.
 
     Nothing given means those of the machine; a machine without effects gets all of them. `reference` is the point to
     which new effects refer. Raises `UsageError` NCF635.
@@ -89,9 +90,12 @@ def select(machine: Machine, wanted: str | None = None, reference: Sequence[floa
     if wanted is None and machine.effects:
         return Selection(machine.effects, (True,) * len(machine.effects))
     names = [name.strip() for name in (wanted or ALL).split(",") if name.strip()]
+    physical = library(machine)
+    found = [effect for name in names if name in physical for effect in physical[name].effects]
+    names = [name for name in names if name not in physical]
     free = [any(_matches(effect.name, name) for name in names) for effect in machine.effects]
     present = {effect.name for effect in machine.effects}
-    new = [effect for name in names for effect in _new(machine, name, present, point)]
+    new = found + [effect for name in names for effect in _new(machine, name, present, point)]
     return Selection((*machine.effects, *dict.fromkeys(new)), (*free, *(True for _ in dict.fromkeys(new))))
 
 
@@ -114,7 +118,7 @@ def _new(machine: Machine, name: str, present: set[str], point: tuple[float, flo
         return [default(machine, name)]
     from ncfix.measure.models import MODELS
 
-    known = [*MODELS, *present, *(each.name for each in candidates(machine))]
+    known = [*MODELS, *library(machine), *present, *(each.name for each in candidates(machine))]
     hint = did_you_mean(name, known) or "`ncfix effects` lists the names"
     raise UsageError.of("NCF635", f"there is no effect {name!r} of this machine", hint=hint)
 

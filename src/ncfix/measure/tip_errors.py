@@ -102,7 +102,7 @@ class TipErrors(Observation):
         seen = [(*SHIFTS, *TURNS).index(name) for name in self.components]
         parts = [np.einsum("nij,nj...->ni...", self.observed_turn, errors[:, part]) for part in (slice(3), slice(3, 6))]
         turned = np.concatenate(parts, axis=1)[:, seen]
-        return turned.reshape(-1, *errors.shape[2:])
+        return turned.reshape(turned.shape[0] * turned.shape[1], *errors.shape[2:])
 
     def _setup(self, unknowns: Array, turned: Array) -> Array:
         """The derivative by the unknowns with the tool turned like this, (m, k)."""

@@ -1,0 +1,135 @@
+"""Physical effects by name: what warms, bends, twists and plays, as effects of a machine file.
+
+`spindle-growth`, `backlash-X`, ... stand for one or more components with the basis and the input that the physics asks
+for, zero until they are estimated. `calibrate --effects` and the selection of effects take these names beside those of
+ISO 230-1. Dead weight acts on an axis by the positions of axes that it carries, not of those that carry it (Soons 1993,
+section 2.5, rule 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.machine import Effect, Machine
+from ncfix.machine.axis import Axis
+from ncfix.machine.effect import SPINDLE
+from ncfix.machine.smooth import Backlash, Periodic, Polynomial
+
+WARM = 20.0
+"""Degree C at which thermal effects are zero."""
+HOUR = 3600.0
+LINEAR = Polynomial(degree=(1,))
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """A physical effect of one machine.
+
+    largest      (mm or rad, over the travel) what would be much
+    instruments  kinds of measurement that see it
+    needs        state columns without which it cannot be seen
+    """
+
+    name: str
+    title: str
+    effects: tuple[Effect, ...]
+    largest: float
+    instruments: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+
+
+SEEN = ("tcp", "tcp6", "probe", "length")
+
+
+def library(machine: Machine) -> dict[str, Named]:
+    """Every physical effect that this machine can have, by name."""
+    found = [each for axis in machine.axes for each in _of_axis(axis)]
+    found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
+    return {each.name: each for each in (*found, *_of_spindle(machine))}
+
+
+def _of_axis(axis: Axis) -> Iterator[Named]:
+    component = _along(axis)
+    if component is None:
+        return
+    name, q = f"E{component}{axis.name}", axis.name
+    center, scale = _span(axis)
+    sides = (f"dir_{q}",)
+    play = Effect(name, (0.0,), Backlash())
+    yield Named(f"backlash-{q}", f"play of {q} when it reverses", (play,), 0.01, (*SEEN, "axis"), sides)
+    wound = Effect(name, (0.0,), Backlash(degree=(1,)), center=center, scale=scale)
+    yield Named(f"wind-up-{q}", f"play of {q} that grows along it", (wound,), 0.005, (*SEEN, "axis"), sides)
+    if axis.pitch is not None:
+        screw = Effect(name, (0.0,) * 4, Periodic(order=(1, 2), period=axis.pitch))
+        yield Named(f"screw-{q}", f"screw of {q}, once and twice a turn", (screw,), 0.003, (*SEEN, "axis"))
+    if not axis.rotary:
+        sensor = f"temp_{q.lower()}"
+        warm = Effect(name, (0.0,), LINEAR, center, scale, times=sensor, times_center=WARM, times_scale=1.0)
+        yield Named(f"expansion-{q}", f"scale of {q} that grows with {sensor}", (warm,), 0.02, SEEN, (sensor,))
+    if axis.workpiece_side and not axis.rotary:
+        basis = Polynomial(degree=(0, 1))
+        loaded = {"times": "load_kg", "times_center": 0.0, "times_scale": 1.0}
+        tilts = tuple(Effect(f"E{turn}{q}", (0.0, 0.0), basis, center, scale, **loaded) for turn in "ABC")  # type: ignore[arg-type]
+        yield Named(f"load-{q}", f"guide of {q} that tilts under the workpiece", tilts, 1e-4, SEEN, ("load_kg",))
+
+
+def _dead_weight(own: Axis, carried: Axis) -> Iterator[Named]:
+    """f(own) times the position of what it carries: the part that is not of either axis alone."""
+    center, scale = _span(own)
+    middle, half = _span(carried)
+    for turn in "ABC":
+        bent = Effect(
+            f"E{turn}{own.name}",
+            (0.0, 0.0),
+            Polynomial(degree=(1, 2)),
+            center,
+            scale,
+            times=carried.name,
+            times_center=middle,
+            times_scale=half,
+        )
+        name = f"weight-E{turn}{own.name}-{carried.name}"
+        title = f"tilt of {own.name} about {'XYZ'['ABC'.index(turn)]} by the weight of {carried.name}"
+        yield Named(name, title, (bent,), 5e-5, SEEN)
+
+
+def _of_spindle(machine: Machine) -> Iterator[Named]:
+    along = "XYZ"[int(np.abs(np.asarray(machine.tool.direction)).argmax())]
+    warm, late = "temp_spindle", 1800.0
+    grown = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm)
+    yield Named("spindle-growth", f"spindle that grows with {warm}", (grown,), 0.05, SEEN[:3], (warm,))
+    lagged = Effect(f"E{along}{SPINDLE}", (0.0,), LINEAR, center=WARM, input=warm, time_constant_s=late)
+    title = f"spindle that grows after {warm}, time constant {late:g} s"
+    yield Named("spindle-growth-late", title, (lagged,), 0.05, SEEN[:3], (warm, "time_s"))
+    for axis in "XYZ":
+        moved = Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, scale=HOUR, input="time_s")
+        yield Named(
+            f"drift-{axis}", f"structure that drifts in {axis}, per hour", (moved,), 0.03, SEEN[:3], ("time_s",)
+        )
+
+
+def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
+    """Pairs of linear axes of one branch: one, and one that it carries."""
+    for held in (True, False):
+        outward = [axis for axis in machine.axes if axis.workpiece_side == held and not axis.rotary]
+        if held:
+            outward.reverse()
+        for index, own in enumerate(outward):
+            yield from ((own, other) for other in outward[index + 1 :])
+
+
+def _along(axis: Axis) -> str | None:
+    """The component along or about the axis itself; None if it is none of its error axes."""
+    shares = np.abs(np.asarray(axis.error_axes) @ np.asarray(axis.direction))
+    index = int(shares.argmax())
+    return ("ABC" if axis.rotary else "XYZ")[index] if shares[index] > 1 - 1e-9 else None
+
+
+def _span(axis: Axis) -> tuple[float, float]:
+    """Centre and half of the travel, in the file's unit."""
+    low, high = (limit / axis.unit for limit in axis.range)
+    bounded = bool(np.isfinite([low, high]).all())
+    return ((low + high) / 2, (high - low) / 2) if bounded else (0.0, 180.0 if axis.rotary else 100.0)
