@@ -78,6 +78,7 @@ class Program:
     def predict(self, machine: Path, plan: Path) -> Array:
         """Run `simulate --plan` and read the dx, dy, dz it writes."""
         output = plan.with_name("predicted.csv")
+        output.unlink(missing_ok=True)
         self._run("simulate", "-m", str(machine), "--plan", str(plan), "-o", str(output))
         columns = files.read(output.read_text())
         return np.stack([columns[name] for name in ("dx", "dy", "dz")], axis=1)
@@ -105,8 +106,9 @@ def load(name: str) -> Candidate:
 
 def ask(candidate: Candidate, folder: Path, without: Sequence[str] = (), more: Sequence[Path] = ()) -> Answer:
     """One question: all measurement files of a folder (and some more) against its machine file."""
-    start = time.perf_counter()
     output = folder / "found.toml"
+    output.unlink(missing_ok=True)
+    start = time.perf_counter()
     measured = [*sorted(folder.glob("measured-*.csv")), *more]
     try:
         said = candidate.diagnose(folder / "machine.toml", measured, output, without)

@@ -19,6 +19,7 @@ from .visibility import first_order, sensitivities, view
 from .world import Specimen, World, draw_clutter, sized
 
 PAIRED = ("wCBXFZYSt", "wCAYFXZSt", "wXFYZSt")
+PATIENCE = 8
 KIND_SHARE = {"tcp": 0.6, "probe": 0.3, "length": 0.1}
 
 
@@ -77,7 +78,7 @@ def _hide(rng: Generator, spec: Family, wish: Wish, draft: Draft) -> Draft:
         entry = pick(rng, spec, wish, draft, tries)
         specimen = sized(draft.world, entry, entry.draw(rng), rows, near, size)
         verdict = judge(rng, spec, draft, seen_from, specimen, tuple(h.entry.name for h in hidden))
-        if verdict is not None or tries > 2 * ROUNDS:
+        if verdict is not None or tries > PATIENCE * ROUNDS:
             hidden.append(specimen)
             kin, fair = verdict or {}, fair and verdict is not None
     world = replace(draft.world, hidden=tuple(hidden))

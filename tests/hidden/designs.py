@@ -106,7 +106,7 @@ def _at_balls(rng: Generator, s: Situation, table: Table, ball: Ints, design: De
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     bar = np.asarray(table.bars)[ball % 2]
     q = _written(s.machine, s.machine.linear_solve(s.q, s.length, place + bar[:, None] * way))
-    block = s.block if s.block.any() else (ball * 4 + 2 * (way[:, 0] > 0) + (way[:, 1] > 0))
+    block = s.block if s.block.any() else 4 * (way[:, 0] > 0) + 2 * (way[:, 1] > 0) + (way[:, 2] > 0.5)
     return replace(s, q=q, centre=place, radius=bar, block=block)
 
 

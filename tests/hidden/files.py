@@ -36,8 +36,8 @@ def measurement(
 
 
 def plan(s: Situation) -> str:
-    """The commanded states only: what a simulation is asked for."""
-    return "\n".join([*_header("tcp", None, ()), *_rows(_state(s, "tcp")), ""])
+    """The commanded states only: what a simulation is asked for, without a set-up that could be off."""
+    return "\n".join([*_header("tcp", None, ()), "# setup: none", *_rows(_state(s, "tcp")), ""])
 
 
 def _header(kind: str, noise_um: float | None, distances: tuple[str, ...]) -> list[str]:
@@ -63,7 +63,7 @@ def _state(s: Situation, kind: str) -> dict[str, list[str]]:
     columns["tool_length"] = [f"{v:g}" for v in s.length]
     columns["repeat"] = _whole(s.repeat)
     if kind == "length":
-        columns |= {f"center_{letter}": [f"{v:.4f}" for v in s.centre[:, i]] for i, letter in enumerate("xyz")}
+        columns |= {f"c{letter}": [f"{v:.4f}" for v in s.centre[:, i]] for i, letter in enumerate("xyz")}
         columns["radius"] = [f"{v:g}" for v in s.radius]
     return columns
 

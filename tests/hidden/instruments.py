@@ -26,6 +26,7 @@ class Noise:
     wander_um: float = 0.3
 
 
+CUT = 6.0
 CLEAN = Noise(outliers=0.0, wander_um=0.0)
 SILENT = Noise(sigma_um=0.0, outliers=0.0, wander_um=0.0)
 
@@ -44,24 +45,25 @@ class Setup:
         return np.array([self.balls[int(k)] for k in s.set_id]), np.array([self.stylus[int(k)] for k in s.set_id])
 
 
-def draw_setup(rng: Generator, s: Situation, size: float, per_ball: bool = False) -> Setup:
+def draw_setup(rng: Generator, s: Situation, kind: str) -> Setup:
     """Offsets of some hundredths for an R-test, of half a millimetre for probed balls.
 
-    `per_ball`: the sets that share a ball (number // 2) share its offset, and those of one tool (number % 2) the
-    stylus'.
+    A stylus belongs to its tool (number % 2) whatever the set; a bar's cup has none. Probed balls (number // 2) keep
+    their place for both tools; else every set is set up anew.
     """
+    size = 0.5 if kind == "probe" else 0.03
     sets = [int(k) for k in np.unique(s.set_id)]
-    balls = {k // 2: rng.uniform(-size, size, 3) for k in sets}
-    tools = {k % 2: rng.uniform(-size, size, 3) for k in sets}
-    if per_ball:
-        return Setup({k: balls[k // 2] for k in sets}, {k: tools[k % 2] for k in sets})
-    return Setup({k: rng.uniform(-size, size, 3) for k in sets}, {k: rng.uniform(-size, size, 3) for k in sets})
+    tools = {k: np.zeros(3) if kind == "length" else rng.uniform(-size, size, 3) for k in range(2)}
+    places = {k: rng.uniform(-size, size, 3) for k in sets}
+    balls = {k: places[min(j for j in sets if j // 2 == k // 2)] for k in sets} if kind == "probe" else places
+    return Setup(balls, {k: tools[k % 2] for k in sets})
 
 
 def draw_noise(rng: Generator, noise: Noise, time: Array, width: int) -> tuple[Array, Ints]:
-    """(n, width) in mm, and the rows that are outliers."""
+    """(n, width) in mm, tails cut at six sigma, and the rows that are outliers beyond that."""
     n = len(time)
-    drawn = rng.standard_t(noise.tails, (n, width)) / np.sqrt(noise.tails / (noise.tails - 2)) * noise.sigma_um
+    drawn = np.clip(rng.standard_t(noise.tails, (n, width)) / np.sqrt(noise.tails / (noise.tails - 2)), -CUT, CUT)
+    drawn *= noise.sigma_um
     drawn += noise.wander_um * _wander(rng, time, width)
     bad = np.flatnonzero(rng.random(n) < noise.outliers)
     away = rng.normal(size=(len(bad), width))

@@ -111,7 +111,7 @@ def _told_by_more(rng: Generator, draft: Draft, specimen: Specimen, rival: Entry
     design = replace(designs.FREE, count=54, repeated=0, tools=1)
     other = tuple(x for x in workshop.LENGTHS[draft.topology] if x != s.length[0])
     more = designs.lay_out(rng, s.machine, draft.topology, s.climate, other, design)
-    both = joined([s, replace(more, set_id=more.set_id + 50)])
+    both = joined([s, replace(more, set_id=more.set_id + 51)])
     sight = view(both, draft.handed_model, np.ones(len(both), dtype=bool), draft.kind)
     seen_from = sensitivities(both)
     truth = first_order(seen_from, specimen.twists(both))

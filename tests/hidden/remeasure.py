@@ -35,7 +35,8 @@ def at_random(scene: Scenario, count: int, seed: int) -> str:
     lengths = workshop.LENGTHS[draft.topology]
     s = designs.lay_out(rng, draft.world.machine, draft.topology, draft.situation.climate, lengths, design)
     times = _later(scene, count)
-    return _measured(scene, replace(s, time=times, set_id=NEW_SETS + s.set_id % 2, load=0 * s.load + 40.0), seed)
+    sets = NEW_SETS + np.searchsorted(np.unique(s.length), s.length)
+    return _measured(scene, replace(s, time=times, set_id=sets, load=0 * s.load + scene.draft.situation.load[0]), seed)
 
 
 def _later(scene: Scenario, count: int) -> Array:
@@ -52,17 +53,23 @@ def _situation(scene: Scenario, poses: Sequence[Pose], seed: int) -> Situation:
     direction = [
         [pose.get(f"dir_{a}", chance[i, k]) for k, a in enumerate(machine.axes)] for i, pose in enumerate(poses)
     ]
-    tools = np.searchsorted(np.unique(length), length)
+    sets = np.searchsorted(np.unique(length), length)
     nothing, zero = np.full(n, np.nan), np.zeros(n, dtype=int)
     load = np.array([pose.get("load_kg", s.load[0]) for pose in poses], dtype=float)
     return Situation(
-        machine, s.climate, q, np.array(direction), _later(scene, n), length, load, NEW_SETS + tools, zero, zero,
+        machine, s.climate, q, np.array(direction), _later(scene, n), length, load, NEW_SETS + sets, zero, zero,
         np.full((n, 3), np.nan), nothing,
     )  # fmt: skip
 
 
 def _measured(scene: Scenario, s: Situation, seed: int) -> str:
+    """Balls newly set up, one set a tool; a tool that was there before has the stylus it had."""
     rng = np.random.default_rng([seed, 3])
-    values = instruments.tcp(s, scene.draft.world.tips, instruments.draw_setup(rng, s, 0.03))
+    setup = instruments.draw_setup(rng, s, "tcp")
+    before = scene.draft.situation
+    had = {float(x): scene.setup.stylus[int(k)] for x, k in zip(before.length, before.set_id, strict=True)}
+    lengths = {int(k): float(x) for k, x in zip(s.set_id, s.length, strict=True)}
+    stylus = {k: had[x] if x in had else rng.uniform(-0.03, 0.03, 3) for k, x in lengths.items()}
+    values = instruments.tcp(s, scene.draft.world.tips, replace(setup, stylus=stylus))
     drawn, _ = instruments.draw_noise(rng, Noise(outliers=0.0), s.time, 3)
     return files.measurement(s, "tcp", values + drawn)

@@ -100,16 +100,11 @@ def scenario(
     rng = np.random.default_rng([seed, list(FAMILIES).index(family)])
     draft = choose(rng, spec, Wish(index, effect, amplitude_um, topology, kind))
     noise = SILENT if silent else CLEAN if spec.clean else Noise()
-    setup = _setup(rng, draft)
+    setup = instruments.draw_setup(rng, draft.situation, draft.kind)
     handed, outliers = _handed(rng, draft, setup, noise)
     tips = draft.world.displacement(draft.situation)
     truth = _truth(seed, spec, draft, tips, outliers, noise)
     return Scenario(handed, truth, files.plan(draft.situation), tips, draft.given, draft, setup)
-
-
-def _setup(rng: Generator, draft: Draft) -> Setup:
-    probed = draft.kind == "probe"
-    return instruments.draw_setup(rng, draft.situation, 0.5 if probed else 0.03, per_ball=probed)
 
 
 def observe(world: World, s: Situation, kind: str, setup: Setup) -> Array:
@@ -178,8 +173,10 @@ def _effect(draft: Draft, index: int) -> dict[str, Any]:
 
 def gaps(draft: Draft, tips: Array, noise: Noise) -> dict[str, float]:
     """`file`: the machine file as handed over; `before`: the same after a refit of its constants, which no name is
-    needed for; `floor`: clutter and the fit's own noise, with nothing hidden.
+    needed for; `floor`: clutter and the fit's own noise, with nothing hidden. A mistake makes them meaningless: zeros.
     """
+    if draft.mistake:
+        return dict.fromkeys(("file", "before", "floor"), 0.0)
     s, sight = draft.situation, draft.sight
     known = draft.handed_model.displacement(draft.handed_machine, s.q, s.length)
     bare = replace(draft.world, hidden=(), control=None).displacement(s)

@@ -139,9 +139,9 @@ def test_measurement_files_are_valid(scenes: dict[tuple[str, int], Scenario], ca
             "tool_length",
             "repeat",
             "radius",
-            "center_x",
-            "center_y",
-            "center_z",
+            "cx",
+            "cy",
+            "cz",
         }
         known |= {*ranges, *(f"dir_{a}" for a in ranges), *files.HEADS[scene.truth.kind]}
         assert all(c in known or c.startswith("temp_") for c in columns)

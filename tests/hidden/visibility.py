@@ -62,9 +62,12 @@ class View:
 
     def observed(self, displacement: Array) -> Array:
         """Displacements (n, 3, ...) as numbers of the given rows: all coordinates, or those along the bar."""
-        rows = displacement[self.given]
+        return self._shown(displacement, self.given)
+
+    def _shown(self, displacement: Array, rows_of: Mask) -> Array:
+        rows = displacement[rows_of]
         if self.seen is not None:
-            rows = np.einsum("ni,ni...->n...", self.seen[self.given], rows)[:, None]
+            rows = np.einsum("ni,ni...->n...", self.seen[rows_of], rows)[:, None]
         result: Array = rows.reshape(rows.shape[0] * rows.shape[1], *rows.shape[2:])
         return result
 
@@ -75,16 +78,18 @@ class View:
         return result
 
     def gap(self, displacement: Array, refit_base: bool = True) -> float:
-        """Rms length, mm, of what is left on rows held out, when set-up (and base) are fitted on the given ones."""
+        """Rms, mm, of what is left on rows held out, when set-up (and base) are fitted on the given ones.
+
+        Of the length of the vector, or of its part along the bar where the instrument sees no more.
+        """
         columns = self.columns if refit_base else self.setup
         rest = displacement - columns @ self._solve(columns, self.observed(displacement))
-        return float(np.sqrt(np.mean(np.sum(rest[~self.given] ** 2, axis=1))))
+        return float(np.sqrt(np.sum(self._shown(rest, ~self.given) ** 2) / np.sum(~self.given)))
 
     def noise_gap(self, sigma: float) -> float:
-        """What noise of one coordinate in the fit alone leaves on the rows held out, rms length, mm."""
-        ahead = self.columns[~self.given].reshape(-1, self.columns.shape[2])
-        gain = ahead @ _pseudo_inverse(self.observed(self.columns))
-        return float(sigma * np.sqrt(3 * np.mean(np.sum(gain**2, axis=1))))
+        """What noise of one coordinate in the fit alone leaves on the rows held out, rms as for `gap`."""
+        gain = self._shown(self.columns, ~self.given) @ _pseudo_inverse(self.observed(self.columns))
+        return float(sigma * np.sqrt(np.sum(gain**2) / np.sum(~self.given)))
 
     def _solve(self, columns: Array, values: Array) -> Array:
         result: Array = _pseudo_inverse(self.observed(columns)) @ values
@@ -120,12 +125,12 @@ def view(s: Situation, model: Model, given: Mask, kind: str, sensitivity: Array 
 
 
 def _setup_columns(s: Situation, kind: str) -> Array:
-    """Offset of the ball (workpiece frame) and of the stylus (tool frame), per set; by ball and by tool when probed."""
+    """Offset of the ball per set (probed: per ball), workpiece frame; of the stylus per tool, tool frame (bars: none)."""
     turn = s.machine.nominal(s.q, s.length)[1]
     places = s.set_id // 2 if kind == "probe" else s.set_id
-    tools = s.set_id % 2 if kind == "probe" else s.set_id
+    tools = s.set_id % 2
     still = [(places == k)[:, None, None] * np.eye(3) for k in np.unique(places)]
-    carried = [(tools == k)[:, None, None] * turn for k in np.unique(tools)]
+    carried = [(tools == k)[:, None, None] * turn for k in np.unique(tools) if kind != "length"]
     return np.concatenate([*still, *carried], axis=2)
 
 
