@@ -32,8 +32,8 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--records",
         type=Path,
-        default=Path("hidden.jsonl"),
-        help="where answers are kept; what is there is not asked again",
+        default=Path(os.devnull),
+        help="keep the answers there, and do not ask again what is there (default: keep none)",
     )
     p.add_argument("--table", type=Path, help="Markdown file whose section is replaced")
     p.add_argument("--write", type=Path, metavar="DIR", help="only write the scenarios there, ask nothing")

@@ -125,7 +125,7 @@ def view(s: Situation, model: Model, given: Mask, kind: str, sensitivity: Array 
 
 
 def _setup_columns(s: Situation, kind: str) -> Array:
-    """Offset of the ball per set (probed: per ball), workpiece frame; of the stylus per tool, tool frame (bars: none)."""
+    """Of the ball per set (probed: per ball), workpiece frame; of the stylus per tool, tool frame (bars: none)."""
     turn = s.machine.nominal(s.q, s.length)[1]
     places = s.set_id // 2 if kind == "probe" else s.set_id
     tools = s.set_id % 2
