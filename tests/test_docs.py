@@ -22,6 +22,7 @@ DOCUMENTS = (
     "docs/plugins.md",
     "docs/formats.md",
     "docs/conventions.md",
+    "docs/derive.md",
 )
 
 LINK = re.compile(r"\[[^]]*\]\(([^)#\s]+)(#[^)\s]*)?\)")

@@ -26,6 +26,7 @@ VERBS = (
     "calibrate",
     "export",
     "emulate",
+    "derive",
     "machine",
     "effects",
     "dialects",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -128,3 +129,12 @@ def test_without_sympy_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(UsageError, match="NCF390") as caught:
         require_sympy()
     assert 'pip install "ncfix[symbolic]"' in str(caught.value)
+
+
+def test_the_chain_file_and_the_python_of_the_document(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (root / "docs/derive.md").read_text()
+    (toml,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert derive(loads_chain(toml)).error["dx"].has(sp.Symbol("a", real=True))
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(root)
+    exec(code, {})

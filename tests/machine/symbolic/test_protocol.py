@@ -59,7 +59,7 @@ def test_combinations_are_what_the_formulas_have(trunnion: Derivation) -> None:
 def test_text_says_what_is_inseparable_and_what_is_invisible(trunnion: Derivation) -> None:
     text = identifiable(trunnion).to_text()
     assert text.startswith("rank 17 of 36\n")
-    assert "only together: EC0C - EC0Y\n" in text
+    assert "only together: EC0C + EC0Y\n" in text
     assert "no pose shows:" in text
     assert "EZ0C" in text
 

@@ -15,6 +15,7 @@ from ncfix.machine.symbolic.derivation import Derivation  # noqa: E402
 from ncfix.machine.symbolic.from_machine import from_machine  # noqa: E402
 from ncfix.machine.symbolic.identify import Identifiable, identifiable  # noqa: E402
 from ncfix.machine.symbolic.inverse import Inverse, inverse_nominal  # noqa: E402
+from ncfix.machine.symbolic.measuring import measuring  # noqa: E402
 from ncfix.machine.symbolic.protocol import Equation, Identification, equations, protocol  # noqa: E402
 from ncfix.machine.symbolic.variables import Size, Variable  # noqa: E402
 
@@ -34,5 +35,6 @@ __all__ = [
     "inverse_nominal",
     "load_chain",
     "loads_chain",
+    "measuring",
     "protocol",
 ]

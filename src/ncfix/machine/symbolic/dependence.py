@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from functools import cache
 
 import numpy as np
 import sympy as sp
@@ -51,13 +52,39 @@ class Columns:
         factors = np.linalg.lstsq(self.numbers[:, self.pivots], self.numbers[:, index], rcond=None)[0]
         used = [pivot for pivot, factor in zip(self.pivots, factors, strict=True) if abs(factor) > NEGLIGIBLE]
         rows = independent_columns(self.numbers[:, used].T)
-        square = sp.Matrix(len(used), len(used), lambda i, k: self._entry(rows[i], used[k]))
-        right = sp.Matrix(len(used), 1, lambda i, _: self._entry(rows[i], index))
-        return {pivot: sp.simplify(part) for pivot, part in zip(used, square.LUsolve(right), strict=True)}
+        square = [[self._entry(row, pivot) for pivot in used] for row in rows]
+        right = [self._entry(row, index) for row in rows]
+        whole = _determinant(self._algebra, square)
+        return {pivot: self._ratio(_replaced(square, k, right), whole) for k, pivot in enumerate(used)}
 
-    def _entry(self, row: int, column: int) -> sp.Expr:
-        poly = self._columns[column].get(self._rows[row])
-        return sp.Integer(0) if poly is None else self._algebra.expression(poly)
+    def _ratio(self, square: list[list[Poly]], whole: Poly) -> sp.Expr:
+        """Cramer's rule."""
+        above, below = _determinant(self._algebra, square).cancel(whole)
+        return self._algebra.expression(above) / self._algebra.expression(below)
+
+    def _entry(self, row: int, column: int) -> Poly:
+        return self._columns[column].get(self._rows[row], self._algebra.ring.zero)
+
+
+def _replaced(square: list[list[Poly]], column: int, right: list[Poly]) -> list[list[Poly]]:
+    return [[*row[:column], side, *row[column + 1 :]] for row, side in zip(square, right, strict=True)]
+
+
+def _determinant(algebra: Algebra, square: list[list[Poly]]) -> Poly:
+    """By minors of the last rows, each worked out once."""
+
+    @cache
+    def minor(columns: tuple[int, ...]) -> Poly:
+        if not columns:
+            return algebra.ring.one
+        row = square[len(square) - len(columns)]
+        total = algebra.ring.zero
+        for k, column in enumerate(columns):
+            if row[column]:
+                total += (-1) ** k * row[column] * minor((*columns[:k], *columns[k + 1 :]))
+        return algebra.reduced(total)
+
+    return minor(tuple(range(len(square))))
 
 
 class _GenericPoint:
