@@ -75,24 +75,31 @@ def _same_arguments(one: Call, two: Call, original: Canon, fixed: Canon) -> bool
 
 
 def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[int, str]]:
-    """Each piece runs at the feed of its motion; with inverse time all the pieces together take its time."""
+    """Each piece runs at the feed of its motion; with inverse time all the pieces together take its time.
+
+    So they do where only rotary axes turn: F is degrees a minute then, but mm a minute as soon as X Y Z move too.
+    """
     wanted, before = _feed_of(original)
     given, after = _feed_of(fixed)
     old, new = _length(original), _length(fixed)
+    turns = np.linalg.norm((original.end - original.start)[:, :3], axis=1) < 1e-9
     for k, (first, last) in enumerate(zip(segments.first, segments.last, strict=True)):
         if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or original.kind[k] == RAPID:
             continue
         pieces = range(first, last + 1)
         if any(after[j] != before[k] for j in pieces):
             yield int(original.line[k]), "the feed mode changed"
-        elif not before[k]:
+        elif not before[k] and not turns[k]:
             other = next((given[j] for j in pieces if abs(given[j] - wanted[k]) > 1e-4), None)
             if other is not None:
                 yield int(original.line[k]), f"feed {wanted[k]:g} became {other:g}"
         elif min(wanted[k], *(given[j] for j in pieces)) > 0:
             time, total = old[k] / wanted[k], sum(new[j] / given[j] for j in pieces)
             if abs(total - time) > time * (FEED_SLACK + sum(PRINTED / given[j] for j in pieces)):
-                yield int(original.line[k]), f"{time * 60:g} s of inverse time became {total * 60:g} s"
+                yield (
+                    int(original.line[k]),
+                    f"{time * 60:g} s for {'a turn' if turns[k] else 'inverse time'}: {total * 60:g} s",
+                )
 
 
 def _length(canon: Canon) -> Floats:

@@ -222,7 +222,7 @@ class _Judge:
     def fractions(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """On the original motion, the fractions at which each piece begins and ends; they must grow."""
         begins, ends = pieces == segments.first[of], pieces == segments.last[of]
-        leaving = paths.fraction_of(self.original, of, self.seen[pieces], np.zeros(len(of)))
+        leaving = paths.fraction_of(self.original, of, self.seen[pieces], np.where(begins, 0.0, 1e-12))
         leaving += paths.turns_before(self.original, of, leaving, begins)
         leaving[ends] = 1.0
         entering = np.where(begins, 0.0, np.roll(leaving, 1))
@@ -275,7 +275,7 @@ class _Judge:
     def cycles(self, segments: Segments) -> None:
         """The bottom of a hole to half a step; the rest of a cycle to what the correction varies over its depth."""
         for fate, what in ((Fate.CYCLE, "cycles"), (Fate.CONTOUR, "contours")):
-            rows = np.flatnonzero(segments.fate == fate)
+            rows = np.setdiff1d(np.flatnonzero(segments.fate == fate), segments.loose)
             if not rows.size:
                 continue
             miss = self.seen[segments.last[rows]] - self.original.end[rows]
@@ -286,7 +286,11 @@ class _Judge:
             if fate == Fate.CYCLE:
                 bottom = _bottoms(self.original, rows) & ~refused
                 self.verdict.note("cycle bottoms", linear[bottom], half[bottom], lines[bottom])
-            near = half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
+            near = (
+                half
+                + SMALL * np.isin(rows, segments.loose)
+                + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
+            )
             self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
             self.verdict.refused += int(refused.sum())
             self.verdict.compensated -= int(refused.sum())

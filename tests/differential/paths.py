@@ -13,6 +13,9 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 
+BACK = 0.98  # of a turn: a first piece does not go so far, but may end a little behind the start
+
+
 def sweep(canon: Canon, rows: Rows) -> Floats:
     """Signed angle of arcs (n,), rad, full turns included; a start equal to the end is a full circle."""
     first, second, normal = _arms(canon, rows)
@@ -43,7 +46,7 @@ def fraction_of(canon: Canon, rows: Rows, position: Floats, after: Floats) -> Fl
     """Fractions (n,) at which motions come nearest to positions (n, 9), not before the fractions `after`.
 
     On a line by projection over all axes (a degree counts as a mm); on an arc by the angle, the first turn that is
-    not before `after`.
+    not before `after`, where 0 says that nothing of the arc is done yet: just behind its start is then its start.
     """
     step = canon.end[rows] - canon.start[rows]
     square = np.sum(step * step, axis=1)
@@ -60,8 +63,8 @@ def turns_before(canon: Canon, rows: Rows, fraction: Floats, begins: NDArray[np.
     falls = np.where(begins, 0, np.diff(fraction, prepend=0.0) < -1e-6)
     total = np.cumsum(falls)
     starts = np.maximum.accumulate(np.where(begins, np.arange(len(rows)), 0))
-    many = np.abs(canon.turns[rows]) > 1
-    turn = np.where(many, 2 * np.pi / np.maximum(np.abs(sweep(canon, rows)), 1e-9), 0.0)
+    arcs = canon.kind[rows] == ARC
+    turn = np.where(arcs, 2 * np.pi / np.maximum(np.abs(sweep(canon, rows)), 1e-9), 0.0)
     return (total - total[starts]) * turn
 
 
@@ -72,7 +75,7 @@ def _arc_fraction(canon: Canon, rows: Rows, position: Floats, after: Floats) -> 
     total = sweep(canon, rows)
     turn = 2 * np.pi / np.abs(total)
     fraction = (angle * np.sign(total) % (2 * np.pi)) / np.abs(total)
-    fraction = np.where((fraction > turn * (1 - 1e-4)) & (after < turn / 2), fraction - turn, fraction)
+    fraction = np.where((fraction > BACK * turn) & (after == 0), fraction - turn, fraction)
     return fraction + turn * np.maximum(np.ceil((after - 1e-3 * turn - fraction) / turn), 0.0)
 
 

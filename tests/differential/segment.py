@@ -23,6 +23,7 @@ LOOKAHEAD = 4000  # pieces that one motion may have
 FAR = 1.0  # mm, degree: a piece farther from the original path than this belongs to something else
 LINEAR = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
 SMALL = 0.3  # mm: as large as a correction may be
+ONE_PECK = 3  # motions: down, out, and back
 CYCLES = {730, 760, *range(810, 900, 10)}
 
 
@@ -38,12 +39,17 @@ class Fate(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """For every original motion its fate and its corrected motions first[k] : last[k] + 1."""
+    """For every original motion its fate and its corrected motions first[k] : last[k] + 1.
+
+    complaints  (original motion, text) where they cannot be told
+    loose       motions of cycles that have no counterpart of their own, and are compared here
+    """
 
     fate: NDArray[np.int64]
     first: NDArray[np.int64]
     last: NDArray[np.int64]
     complaints: tuple[tuple[int, str], ...]
+    loose: NDArray[np.int64]
 
     def owner(self, n: int) -> NDArray[np.int64]:
         """(n,) the original motion of each corrected one, -1 for none."""
@@ -67,6 +73,7 @@ class _Matcher:
     first: list[int] = field(default_factory=list)
     last: list[int] = field(default_factory=list)
     complaints: list[tuple[int, str]] = field(default_factory=list)
+    loose: list[int] = field(default_factory=list)
     j: int = 0
 
     def run(self) -> Segments:
@@ -81,8 +88,10 @@ class _Matcher:
                 k += 1
         if self.j < len(self.fixed):
             self.complaints.append((len(self.original) - 1, f"{len(self.fixed) - self.j} motions too many at the end"))
-        return Segments(*(np.array(part, dtype=np.int64) for part in (self.fate, self.first, self.last)),
-                        tuple(self.complaints))  # fmt: skip
+        fate, first, last, loose = (
+            np.array(part, dtype=np.int64) for part in (self.fate, self.first, self.last, self.loose)
+        )
+        return Segments(fate, first, last, tuple(self.complaints), loose)
 
     def motion(self, k: int) -> None:
         """Consume the corrected motions of one original motion."""
@@ -143,6 +152,22 @@ class _Matcher:
         near = np.all(np.abs(paths.at(self.original, row, fraction) - point) <= FAR)
         return fraction if near else np.full(1, np.nan)
 
+    def pecks(self, k: int, stop: int, end: int) -> int:
+        """A depth that is a multiple of Q by a hair may take a peck more or less: each motion against the nearest one."""
+        there = self.seen[self.j : end, :3]
+        for n in range(k, stop):
+            off = float(np.abs(there - self.original.end[n, :3]).max(axis=1).min())
+            deepest = self.original.end[n, 2] <= self.original.end[k:stop, 2].min() + 1e-9
+            if off > (self.near[2] if deepest else SMALL):
+                self.complaints.append((n, f"no motion of the cycle comes nearer than {off:.4f} mm"))
+            self.fate.append(Fate.CYCLE)
+            self.first.append(min(self.j + n - k, end - 1))
+            self.last.append(self.first[-1])
+            self.loose.append(n)
+        self.first[-1] = self.last[-1] = end - 1
+        self.j = end
+        return stop
+
     def rises(self, k: int, stop: int) -> bool:
         """Somewhere before its hole the corrected cycle has a motion along Z that is no longer than a correction."""
         length = np.abs(self.fixed.end[self.j : self.j + 2] - self.fixed.start[self.j : self.j + 2])
@@ -162,6 +187,8 @@ class _Matcher:
         stop, end = _same_line(self.original, k), _same_line(self.fixed, self.j)
         if stop - k + 1 == end - self.j and self.rises(k, stop):
             self.j += 1
+        if fate == Fate.CYCLE and 0 < abs((stop - k) - (end - self.j)) <= ONE_PECK:
+            return self.pecks(k, stop, end)
         pairs = min(stop - k, end - self.j)
         for n in range(k, stop):
             self.fate.append(fate)
