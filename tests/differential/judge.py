@@ -286,11 +286,7 @@ class _Judge:
             if fate == Fate.CYCLE:
                 bottom = _bottoms(self.original, rows) & ~refused
                 self.verdict.note("cycle bottoms", linear[bottom], half[bottom], lines[bottom])
-            near = (
-                half
-                + SMALL * np.isin(rows, segments.loose)
-                + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
-            )
+            near = half + (self.variation(rows) if fate == Fate.CYCLE else self.offset_change(rows))
             self.verdict.note(what, linear[~refused], near[~refused], lines[~refused])
             self.verdict.refused += int(refused.sum())
             self.verdict.compensated -= int(refused.sum())

@@ -153,7 +153,7 @@ class _Matcher:
         return fraction if near else np.full(1, np.nan)
 
     def pecks(self, k: int, stop: int, end: int) -> int:
-        """A depth that is a multiple of Q by a hair may take a peck more or less: each motion against the nearest one."""
+        """A depth that is a multiple of Q by a hair may take a peck more or less; compared are the nearest ones."""
         there = self.seen[self.j : end, :3]
         for n in range(k, stop):
             off = float(np.abs(there - self.original.end[n, :3]).max(axis=1).min())
