@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from threading import Timer
 from typing import Any
 
@@ -37,8 +38,9 @@ def say(text: str) -> None:
 
 
 def tell(*messages: Message) -> None:
-    """Coded messages, on standard error."""
-    for message in messages:
+    """Coded messages, on standard error; one without a hint of its own points to the explanation of its code."""
+    for plain in messages:
+        message = plain if plain.hint else replace(plain, hint=f"ncfix explain {plain.code} says more")
         say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
 
 
