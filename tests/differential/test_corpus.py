@@ -93,7 +93,7 @@ def test_every_program_is_corrected_as_predicted(
     machine: Callable[[str], Machine],
     machine_file: Callable[[str], Path],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    figures: Callable[[str], None],
 ) -> None:
     variant, total = VARIANTS[name], Total()
     wanted = [e for e in corpus.entries(shared("corpus")) if e.accepted and e.motions and e.dialect in READABLE]
@@ -112,8 +112,7 @@ def test_every_program_is_corrected_as_predicted(
         total.wrong += [f"{entry.path.name}: {text}" for text in locality.complaints(source, outcome.text)[:3]]
         terms = _terms(entry, outcome, model, variant)
         total.add(entry.path.name, outcome, judge(original, fixed, model, terms))
-    with capsys.disabled():
-        print(f"\ndifferential, {name}: {total}")
+    figures(f"differential, {name}: {total}")
     assert not total.wrong, "\n".join(total.wrong)
     assert total.blocks["refused"] < REFUSED_SHARE * sum(total.blocks.values())
 

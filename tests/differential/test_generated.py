@@ -9,8 +9,6 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from differential import corpus, locality, product, setups
 from differential.canon import Canon, Controls
 from differential.errors import LETTERS, Machine
@@ -33,7 +31,7 @@ def test_programs_made_up_at_random(
     machine: Callable[[str], Machine],
     machine_file: Callable[[str], Path],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    figures: Callable[[str], None],
 ) -> None:
     found: Counter[str] = Counter()
     wrong: list[str] = []
@@ -62,8 +60,7 @@ def test_programs_made_up_at_random(
         found["refused"] += verdict.refused
         wrong += [f"seed {seed} {name}: {verdict}"] if not verdict.right else []
         wrong += [f"seed {seed} {name}: {text}" for text in locality.complaints(source.encode(), outcome.text)[:2]]
-    with capsys.disabled():
-        print(f"\ngenerated: {dict(found)}, {len(wrong)} wrong")
+    figures(f"generated: {dict(found)}, {len(wrong)} wrong")
     assert not wrong, "\n".join(wrong[:12])
     assert found["not for the control"] < found["programs"] / 4
     assert found["refused"] < REFUSED_SHARE * found["motions"]

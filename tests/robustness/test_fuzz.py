@@ -9,8 +9,6 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from differential import corpus, product
 from differential.canon import Canon
 from differential.errors import Machine
@@ -60,7 +58,7 @@ def test_mutated_programs(
     machine: Callable[[str], Machine],
     machine_file: Callable[[str], Path],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    figures: Callable[[str], None],
 ) -> None:
     rng, codes, judged, wrong = random.Random(20261121), Counter[int](), Counter[str](), []
     end = time.monotonic() + SECONDS
@@ -74,8 +72,7 @@ def test_mutated_programs(
         elif outcome.text is not None and judged["asked"] < JUDGED and number % 2 == 0:
             judged["asked"] += 1
             wrong += _judged(source, outcome, rs274, machine("three"), judged)
-    with capsys.disabled():
-        print(f"\nfuzz: {sum(codes.values())} programs, exit codes {dict(codes)}, judged {dict(judged)}")
+    figures(f"fuzz: {sum(codes.values())} programs, exit codes {dict(codes)}, judged {dict(judged)}")
     assert not wrong, "\n\n".join(wrong[:5])
     assert sum(codes.values()) >= 200
 

@@ -18,7 +18,7 @@ def test_programs_come_back_byte_for_byte(
     shared: Callable[[str], Path],
     machine_file: Callable[[str], Path],
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    figures: Callable[[str], None],
 ) -> None:
     same, unreadable, faults = 0, [], []
     for entry in corpus.entries(shared("corpus")):
@@ -34,7 +34,6 @@ def test_programs_come_back_byte_for_byte(
             faults.append(f"{name}: exit {outcome.code}, {outcome.errors[:200]}")
     faults += [f"{name}: no line named: {o.errors[:200]}" for name, _, o in unreadable if not any(o.places)]
     faults += [f"{name}: rs274 reads it: {o.errors[:300]}" for name, accepted, o in unreadable if accepted]
-    with capsys.disabled():
-        print(f"\nidentity, {dialect}: {same} byte for byte, {len(unreadable)} unreadable, {len(faults)} at fault")
+    figures(f"identity, {dialect}: {same} byte for byte, {len(unreadable)} unreadable, {len(faults)} at fault")
     assert not faults, "\n".join(faults)
     assert same > 0
