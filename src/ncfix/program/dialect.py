@@ -33,6 +33,7 @@ class Dialect:
     closure_relative    the same relative to the radius (both must be exceeded)
     block_skip_executed blocks with `/` run unless the operator asks otherwise
     needs_end           the control wants M2/M30 or `%` at the end
+    language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
     semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
                         refuses is an error) or "iso" (codes that cannot move anything are passed over)
     """
@@ -49,4 +50,5 @@ class Dialect:
     closure_relative: float = 0.001
     block_skip_executed: bool = True
     needs_end: bool = False
+    language: str = "ncfix.program.rs274.language:RS274"
     semantics: str = "iso"

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.frames import FrameMap
-from ncfix.program.layout import Layout, has_free_text, layout_of
+from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
-from ncfix.program.render import STRAIGHT_AND_ARCS, BlockRenderer, Rendered, Target
+from ncfix.program.render import STRAIGHT_AND_ARCS, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.writer import Edit
 
@@ -91,6 +91,7 @@ class _Emitter:
         self, program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray, reading: Reading
     ) -> None:
         self.program = program
+        self.language = language_of(program.dialect)
         self.moves = moves
         self.pieces = pieces
         self.reading = reading
@@ -103,7 +104,7 @@ class _Emitter:
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.eol = _line_end(program.source)
-        self.layouts: dict[int, Layout | None] = {}
+        self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
         self.replaced_by = -1
@@ -191,7 +192,7 @@ class _Emitter:
             return
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
-        rendered = BlockRenderer(self.program, block, layout, target).render()
+        rendered = self.language.render(self.program, block, layout, target)
         frame = self.frames[self.reading.frame[row]]
         self.end[rows] = frame.command(np.array(rendered.ends))
         if rendered.centre is not None:
@@ -251,10 +252,9 @@ class _Emitter:
             return self.cycle_end
         return self.position
 
-    def _layout(self, block: int) -> Layout | None:
+    def _layout(self, block: int) -> BlockLayout | None:
         if block not in self.layouts:
-            writable = not has_free_text(self.program, block)
-            self.layouts[block] = layout_of(self.program, block) if writable else None
+            self.layouts[block] = self.language.layout(self.program, block)
         return self.layouts[block]
 
     # -- the result ---------------------------------------------------------------------------------------------------

@@ -20,8 +20,9 @@ from ncfix.program.build import Parsed
 from ncfix.program.content import check_content, header_length
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError
-from ncfix.program.reach import UNREAD, Reach, tape_end
-from ncfix.program.shapes import Scan, scan, split_blocks
+from ncfix.program.language import Language, language_of
+from ncfix.program.reach import UNREAD, Reach
+from ncfix.program.shapes import Scan
 from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
 
@@ -50,11 +51,12 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     that cannot be read, and UsageError NCF104 for an unknown dialect.
     """
     chosen = dialects.detect(source, path) if dialect is None else dialect
-    language = dialects.get(chosen) if isinstance(chosen, str) else chosen
-    check_content(source, path, language)
-    blocks = split_blocks(source)
+    known = dialects.get(chosen) if isinstance(chosen, str) else chosen
+    check_content(source, path, known)
+    language = language_of(known)
+    blocks = language.split(source)
     blocks[0, 0] = header_length(source)
-    return Reading(source, path, language, blocks, tape_end(source, blocks)).program()
+    return Reading(source, path, known, language, blocks, language.end(source, blocks)).program()
 
 
 def unread_error(program: Program, block: int) -> SourceError:
@@ -102,6 +104,7 @@ class Reading:
     source: bytes
     path: str
     dialect: Dialect
+    language: Language
     blocks: NDArray[np.int64]
     tape_end: int
     templates: list[Template] = field(default_factory=list)
@@ -161,7 +164,7 @@ class Reading:
         limit = self.dialect.line_limit
         if limit and len(blocks) == 1 and lengths[0] > limit:
             return ONE_UNSCANNED
-        found = scan(self.source[start:end], blocks - start)
+        found = self.language.scan(self.source[start:end], blocks - start)
         for row in np.flatnonzero(lengths > limit) if limit else ():
             found.shapes[row] = None
         return found
@@ -200,7 +203,7 @@ class Reading:
             check_length(self.dialect, len(text))
             parsed = parse_block(self.dialect, text.decode("latin-1"))
         except BlockError as fault:
-            if self.in_doubt(block):
+            if self.language.lenient and self.in_doubt(block):
                 return NOT_READ
             raise source_error(self.path, block, text.decode("latin-1"), fault) from None
         texts_of(self.dialect).keep(text, parsed)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ncfix.diagnostics import UsageError
-from ncfix.program import stamp
+from ncfix.program.language import language_of
+from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.moves import Kinematics, Trace
-from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.coordinates import LETTERS
-from ncfix.program.rs274.interpreter import MAX_BLOCKS, Interpreter
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 
 NO_LETTER = "NCF207"
+MAX_BLOCKS = 10_000_000
+"""Blocks that are executed before a program counts as endless."""
 
 
 def trace(
@@ -35,18 +35,7 @@ def trace(
     Raises SourceError NCF2xx at the first block at which the control would stop, UsageError with everything that the
     program uses and the setup does not give, and with every axis that the program moves and the machine lacks.
     """
-    strangers = [axis for axis in axes if axis not in LETTERS]
+    strangers = [axis for axis in axes if axis not in AXIS_LETTERS]
     if strangers:
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
-    control = Control(setup, axes, rotary, program.dialect, kinematics)
-    Interpreter(control, program, resolve, max_blocks).run()
-    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
-    if lacking:
-        raise UsageError.collected(lacking)
-    marked = stamp.find(program)
-    return Trace(
-        moves=control.builder.moves(),
-        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
-        assumed=tuple(control.knowledge.assumed),
-        stamp="" if marked is None else program.text_of(marked),
-    )
+    return language_of(program.dialect).follow(program, setup, axes, rotary, resolve, max_blocks, kinematics)

@@ -24,9 +24,6 @@ from ncfix.program.rs274.unit import Unit
 from ncfix.program.rs274.wordcheck import check_words
 from ncfix.program.tree import Constant, Program, Span, Word
 
-MAX_BLOCKS = 10_000_000
-"""Blocks that are executed before a program counts as endless."""
-
 ENDLESS = "NCF233"
 NO_END = "NCF234"
 CALL, RETURN = 980, 990

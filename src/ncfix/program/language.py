@@ -1,0 +1,85 @@
+"""A family of controls, as the functions in which they differ: how a text is read, followed and written.
+
+The tree, the motions, the frames and the walk of the emitter are the same for all. What a line is, what a number is,
+what a block means and how a corrected motion is put into words is a family's own, and a `Dialect` names its family.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ncfix.program.build import Parsed
+    from ncfix.program.dialect import Dialect
+    from ncfix.program.moves import Kinematics, Trace
+    from ncfix.program.render import Rendered, Target
+    from ncfix.program.setup import Setup
+    from ncfix.program.shapes import Scan
+    from ncfix.program.tree import Program, Word
+
+Resolve = Callable[[str], bytes | None]
+"""Gives the text of a subprogram file by its name; None if there is none."""
+
+
+class BlockLayout(Protocol):
+    """Where things stand in a motion block; what else there is, only the family's own renderer knows."""
+
+    @property
+    def motion(self) -> Word | None:
+        """The word that says which kind of motion it is, if the block has one."""
+
+
+class Follow(Protocol):
+    """Follows a program as the control would; see `trace`, which has the same arguments."""
+
+    def __call__(
+        self,
+        program: Program,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        resolve: Resolve | None,
+        max_blocks: int,
+        kinematics: Kinematics | None,
+    ) -> Trace:
+        """The motions of the program."""
+
+
+@dataclass(frozen=True, slots=True)
+class Language:
+    """How one family of controls is read, followed and written.
+
+    split     source -> (n, 2) start and stop byte of each block, line ends not included
+    end       (source, blocks) -> the block that ends the program's text: what follows is passed over; len(blocks) if
+              nothing does
+    scan      (source, blocks) -> shapes and numbers of the blocks, without understanding them
+    parse     (dialect, text) -> one block by its grammar; raises `BlockError`
+    lenient   a block that cannot be read, and that the control may never get to, is no error until it does
+    follow    the program's motions
+    layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
+    render    (program, block, layout, target) -> its edits, and the lines that come after it
+    """
+
+    split: Callable[[bytes], NDArray[np.int64]]
+    end: Callable[[bytes, NDArray[np.int64]], int]
+    scan: Callable[[bytes, NDArray[np.int64]], Scan]
+    parse: Callable[[Dialect, str], Parsed]
+    follow: Follow
+    layout: Callable[[Program, int], BlockLayout | None]
+    render: Callable[[Program, int, Any, Target], Rendered]
+    lenient: bool = False
+
+
+@lru_cache(maxsize=32)
+def language_of(dialect: Dialect) -> Language:
+    """The language of a dialect, imported when it is first needed."""
+    language = resolve_name(dialect.language)
+    assert isinstance(language, Language), f"{dialect.language} is no Language"
+    return language

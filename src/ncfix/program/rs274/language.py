@@ -1,0 +1,63 @@
+"""The RS274 family as a `Language`: LinuxCNC, plain ISO code and their like."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import UsageError
+from ncfix.program import stamp
+from ncfix.program.language import Language, Resolve
+from ncfix.program.layout import Layout, has_free_text, layout_of
+from ncfix.program.moves import Kinematics, Trace
+from ncfix.program.reach import tape_end
+from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.rs274.blocks import parse_block
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.interpreter import Interpreter
+from ncfix.program.setup import Setup
+from ncfix.program.shapes import scan, split_blocks
+from ncfix.program.tree import Program
+
+
+def follow(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Resolve | None,
+    max_blocks: int,
+    kinematics: Kinematics | None,
+) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    control = Control(setup, axes, rotary, program.dialect, kinematics)
+    Interpreter(control, program, resolve, max_blocks).run()
+    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
+    if lacking:
+        raise UsageError.collected(lacking)
+    marked = stamp.find(program)
+    return Trace(
+        moves=control.builder.moves(),
+        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
+        assumed=tuple(control.knowledge.assumed),
+        stamp="" if marked is None else program.text_of(marked),
+    )
+
+
+def writable(program: Program, block: int) -> Layout | None:
+    """The layout of a block of words, None for flow control and text that is passed over."""
+    return None if has_free_text(program, block) else layout_of(program, block)
+
+
+def render(program: Program, block: int, layout: Layout, target: Target) -> Rendered:
+    """The text of a corrected motion."""
+    return BlockRenderer(program, block, layout, target).render()
+
+
+RS274 = Language(
+    split=split_blocks,
+    end=tape_end,
+    scan=scan,
+    parse=parse_block,
+    follow=follow,
+    layout=writable,
+    render=render,
+    lenient=True,
+)
