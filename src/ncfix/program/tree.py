@@ -51,9 +51,14 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Literal:
-    """A number written in the block: the value of number `slot` of the block."""
+    """A number written in the block: the value of number `slot` of the block.
+
+    `pointless`: it has no decimal point, in a language where that matters: there the value of an axis word may count
+    least increments, and `numbers` holds it as it is written.
+    """
 
     slot: int
+    pointless: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +106,26 @@ class Exists:
     parameter: Parameter | NamedParameter
 
 
-Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | Exists
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A string, `"DRILL 8.5"`, without its quotation marks."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A name with something in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
+
+    An argument that is left out is None. `indexed`: the brackets are square.
+    """
+
+    name: str
+    arguments: tuple[Expression | None, ...]
+    indexed: bool = False
+
+
+Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | Exists | Text | Call
 
 
 # -- the items of a block ---------------------------------------------------------------------------------------------
@@ -124,8 +148,21 @@ class Word:
 class Assignment:
     """`#1=...`, `#<name>=...`: takes effect after the whole block."""
 
-    target: Parameter | NamedParameter
+    target: Parameter | NamedParameter | Call
     value: Expression
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A name that stands for itself or takes arguments in brackets, lower case: `SUPA`, `CYCLE81(10,0,2,-5)`.
+
+    An argument that is left out is None. `called`: brackets are written, if only empty ones.
+    """
+
+    name: str
+    arguments: tuple[Expression | None, ...]
+    called: bool
     span: Span
 
 
@@ -174,7 +211,7 @@ class Opaque:
     span: Span
 
 
-Item = Word | Assignment | Comment | Skip | Flow | Tape | Opaque
+Item = Word | Assignment | Command | Comment | Skip | Flow | Tape | Opaque
 
 
 @dataclass(frozen=True, slots=True)

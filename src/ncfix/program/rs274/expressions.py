@@ -61,6 +61,8 @@ def compiled(expression: Expression) -> Evaluate:
             return unary(operator, compiled(operand))
         case Binary(operator, left, right):
             return binary(operator, compiled(left), compiled(right))
+        case _:
+            raise AssertionError(f"the grammars of this family have no {type(expression).__name__}")
 
 
 def unary(operator: str, operand: Evaluate) -> Evaluate:

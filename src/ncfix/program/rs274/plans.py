@@ -23,6 +23,7 @@ from ncfix.program.tree import (
     Literal,
     NamedParameter,
     Opaque,
+    Parameter,
     Skip,
     Span,
     Tape,
@@ -165,6 +166,7 @@ def flow_line(item: Flow) -> FlowLine:
 
 def assignment(item: Assignment) -> tuple[int | str | Evaluate, Evaluate, Span]:
     """Target and value of an assignment; a name as it is, a number as a function."""
+    assert isinstance(item.target, NamedParameter | Parameter), "this family has no arrays"
     target = item.target.name if isinstance(item.target, NamedParameter) else compiled(item.target.index)
     return target, compiled(item.value), item.span
 
