@@ -27,7 +27,7 @@ from ncfix.program.emit import Reading
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
-from ncfix.program.writer import apply
+from ncfix.program.writer import Splices, spliced
 
 __all__ = ["FixOptions", "Fixed", "fix_program"]
 
@@ -85,7 +85,7 @@ def _refuse_stamped(program: Program, options: FixOptions) -> None:
 
 
 def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
-    if not settled.emission.edits:
+    if not len(settled.emission.splices):
         return program.source
     words = (
         f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
@@ -94,8 +94,7 @@ def _written(program: Program, settled: Settled, machine: Machine, options: FixO
         words += f", assumed zero: {', '.join(followed.assumed)}"
     limit = program.dialect.line_limit or 250
     edit = stamp.insertion(program, words[: limit - 10])
-    edits = sorted((*settled.emission.edits, edit), key=lambda each: (each.start, each.stop))
-    return apply(program.source, edits)
+    return spliced(program.source, Splices.joined([settled.emission.splices, Splices.of([edit])]))
 
 
 def _errors(machine: Machine, settled: Settled) -> PathError:
@@ -137,7 +136,7 @@ def _report(
         moves=len(moves),
         compensated=len(account.compensated),
         passed=len(account.passed),
-        changed=bool(settled.emission.edits),
+        changed=bool(len(settled.emission.splices)),
         inserted_blocks=settled.emission.added_blocks,
         max_correction_um=_largest_correction(moves, settled) * 1e3,
         error_before_um=_figures(errors.before) if errors else {},

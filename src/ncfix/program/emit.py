@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.bulk import Bulk
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
@@ -34,7 +35,7 @@ MODE_LOST = "a kept block that follows relies on its motion code"
 class Emission:
     """What was written.
 
-    edits      replacements and insertions in the source, sorted
+    splices    replacements and insertions in the source, sorted
     end        (m, n_axes) the command at the end of each piece as the control will understand it
     centre     (m, 3) the centre of arc pieces likewise
     start      (n, n_axes) the command at the start of each motion likewise
@@ -42,13 +43,18 @@ class Emission:
     added_blocks  lines added
     """
 
-    edits: tuple[Edit, ...]
+    splices: Splices
     end: FloatArray
     centre: FloatArray
     start: FloatArray
     conflicts: dict[int, str]
     added_blocks: int
 
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """The replacements and insertions one by one."""
+        return tuple(self.splices.edits())
 
 @dataclass(frozen=True, slots=True)
 class Reading:
@@ -115,9 +121,15 @@ class _Emitter:
         self.centre = pieces.centre.copy()
         self.start = moves.start.copy()
 
+        self.bulk = Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
     def run(self) -> Emission:
         """Walk all motions."""
-        for row in range(len(self.moves)):
+        row = 0
+        while row < len(self.moves):
+            done = self._stretch(row)
+            if done:
+                row += done
+                continue
             self._resync(row)
             self.start[row] = self.position
             if self.pieces.kept[self.first_piece[row]]:
@@ -130,7 +142,24 @@ class _Emitter:
             elif self.moves.kind[row] != Kind.DWELL:
                 self.cycle_end = None
         edits, added = self._edits()
-        return Emission(edits, self.end, self.centre, self.start, self.conflicts, added)
+            row += 1
+        splices = Splices.joined([*self.bulk.parts, Splices.of(edits)])
+        return Emission(splices, self.end, self.centre, self.start, self.conflicts, added)
+
+    def _stretch(self, row: int) -> int:
+        """Write the stretch of plain motions that begins here all at once; the number of motions written."""
+        if self.replaced is not None:
+            return 0
+        frame = self.reading.frame[row]
+        ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
+        if ends is None:
+            return 0
+        stop = row + len(ends)
+        self.end[self.first_piece[row:stop]] = ends
+        self.start[row], self.start[row + 1 : stop] = self.position, ends[:-1]
+        self.position = ends[-1].copy()
+        self.cycle_end = None
+        return len(ends)
 
     # -- the control's book -------------------------------------------------------------------------------------------
 
@@ -317,12 +346,18 @@ def closure_of_refusals(moves: Moves, kept: NDArray[np.bool_]) -> tuple[NDArray[
     kept = kept.copy()
     added: list[int] = []
     starts_matter = moves.incremental | (moves.kind == Kind.ARC) | (moves.kind == Kind.CYCLE)
-    pinned = False
-    for row in range(len(moves) - 1, -1, -1):
-        passed = moves.rule[row] == Rule.PASS
-        if pinned and not passed and not kept[row]:
-            kept[row] = True
-            added.append(row)
-        if not passed:
-            pinned = bool(kept[row] and (starts_matter[row] or (pinned and not moves.programmed[row].all())))
+    passed = moves.rule == Rule.PASS
+    complete = np.asarray(moves.programmed.all(axis=1))
+    reached = len(moves)
+    for row in np.flatnonzero(kept & starts_matter & ~passed)[::-1].tolist():
+        pinned = row < reached
+        reached = min(reached, row)
+        while pinned and reached > 0:
+            reached -= 1
+            if passed[reached]:
+                continue
+            if not kept[reached]:
+                kept[reached] = True
+                added.append(reached)
+            pinned = bool(starts_matter[reached] or not complete[reached])
     return kept, added

@@ -6,7 +6,7 @@ what a block means and how a corrected motion is put into words is a family's ow
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ncfix.program.render import Rendered, Target
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
-    from ncfix.program.tree import Program, Word
+    from ncfix.program.tree import Anchor, Program, Word
 
 Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
@@ -34,6 +34,22 @@ class BlockLayout(Protocol):
     @property
     def motion(self) -> Word | None:
         """The word that says which kind of motion it is, if the block has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class BulkLayout:
+    """Where things stand in the blocks of one shape, for motions that are written many at a time.
+
+    slots     axis letter -> which of the block's numbers its word has
+    words_at  where missing axis words go
+    blank     what stands before them: a blank or nothing
+    lower     addresses are in lower case
+    """
+
+    slots: Mapping[str, int]
+    words_at: Anchor
+    blank: str
+    lower: bool
 
 
 class Follow(Protocol):
@@ -65,6 +81,8 @@ class Language:
     follow    the program's motions
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     render    (program, block, layout, target) -> its edits, and the lines that come after it
+    bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
+              for blocks that it has to write one by one
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -75,6 +93,7 @@ class Language:
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]
     lenient: bool = False
+    bulk: Callable[[Program, int], BulkLayout | None] | None = None
 
 
 @lru_cache(maxsize=32)

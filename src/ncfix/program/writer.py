@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,3 +32,82 @@ def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
         done = edit.stop
     pieces.append(source[done:])
     return b"".join(pieces)
+
+
+@dataclass(frozen=True, slots=True)
+class Splices:
+    """Many edits as columns.
+
+    start, stop  (n,) what is replaced
+    length       (n,) bytes of each replacement
+    data         the replacements, one after the other
+    """
+
+    start: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    length: NDArray[np.int64]
+    data: bytes
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @classmethod
+    def of(cls, edits: Sequence[Edit]) -> Splices:
+        """From single edits."""
+        places = np.array([(edit.start, edit.stop, len(edit.text)) for edit in edits], dtype=np.int64).reshape(-1, 3)
+        return cls(places[:, 0], places[:, 1], places[:, 2], b"".join(edit.text for edit in edits))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Splices]) -> Splices:
+        """Several, sorted by place; at one place in the order given."""
+        start, stop, length = (
+            np.concatenate([getattr(part, name) for part in parts] or [np.empty(0, np.int64)])
+            for name in ("start", "stop", "length")
+        )
+        data = b"".join(part.data for part in parts)
+        if not ((np.diff(start) < 0) | ((np.diff(start) == 0) & (np.diff(stop) < 0))).any():
+            return cls(start, stop, length, data)
+        order = np.lexsort((stop, start))
+        first = np.cumsum(length) - length
+        taken = np.frombuffer(data, dtype=np.uint8)[_stretches(first[order], length[order])]
+        return cls(start[order], stop[order], length[order], taken.tobytes())
+
+    def edits(self) -> Iterator[Edit]:
+        """One by one."""
+        at = 0
+        for start, stop, length in zip(self.start.tolist(), self.stop.tolist(), self.length.tolist(), strict=True):
+            yield Edit(start, stop, self.data[at : at + length])
+            at += length
+
+
+def spliced(source: bytes, splices: Splices) -> bytes:
+    """The source with many edits made, as `apply` does it; raises ValueError likewise."""
+    if not len(splices):
+        return source
+    start, stop = splices.start, splices.stop
+    if start[0] < 0 or stop[-1] > len(source) or (start > stop).any() or (stop[:-1] > start[1:]).any():
+        raise ValueError(f"edits overlap, or lie outside the {len(source)} bytes")
+    kept = ~_cover(len(source), start, stop)
+    ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
+    out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
+    new = _cover(len(out), ends - splices.length, ends)
+    out[new] = np.frombuffer(splices.data, dtype=np.uint8)
+    out[~new] = np.frombuffer(source, dtype=np.uint8)[kept]
+    return out.tobytes()
+
+
+def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
+    full = stops > starts
+    change = np.zeros(size + 1, dtype=np.int8)
+    change[starts[full]] += 1
+    change[stops[full]] -= 1
+    return np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)
+
+
+def _stretches(first: NDArray[np.int64], length: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The indices first, first + 1, ... of stretches of such lengths, one stretch after the other."""
+    ends = np.cumsum(length)
+    indices: NDArray[np.int64] = np.arange(int(ends[-1]) if len(ends) else 0)
+    indices += np.repeat(first - (ends - length), length)
+    return indices

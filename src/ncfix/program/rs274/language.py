@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ncfix.diagnostics import UsageError
 from ncfix.program import stamp
-from ncfix.program.language import Language, Resolve
+from ncfix.program.language import BulkLayout, Language, Resolve
 from ncfix.program.layout import Layout, has_free_text, layout_of
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.reach import tape_end
@@ -14,7 +14,7 @@ from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.interpreter import Interpreter
 from ncfix.program.setup import Setup
 from ncfix.program.shapes import scan, split_blocks
-from ncfix.program.tree import Program
+from ncfix.program.tree import Literal, Program
 
 
 def follow(
@@ -51,6 +51,18 @@ def render(program: Program, block: int, layout: Layout, target: Target) -> Rend
     return BlockRenderer(program, block, layout, target).render()
 
 
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    layout = writable(program, block)
+    if layout is None or not layout.axes:
+        return None
+    slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
+    if len(slots) < len(layout.axes):
+        return None
+    at = program.position(block, layout.code_at)
+    return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())
+
+
 RS274 = Language(
     split=split_blocks,
     end=tape_end,
@@ -60,4 +72,5 @@ RS274 = Language(
     layout=writable,
     render=render,
     lenient=True,
+    bulk=in_bulk,
 )

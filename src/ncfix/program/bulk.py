@@ -1,0 +1,260 @@
+"""Stretches of corrected straight motions written all at once.
+
+What the emitter and the renderer do motion by motion, done as columns, byte for byte; a test holds the two together.
+A motion qualifies if its block is words with plain numbers, is executed once, and becomes one block with the same
+motion code. Whatever is not clear to the last digit (a value in the middle between two outputs, a position that is
+not on the digits) ends a stretch, and the emitter takes it by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.frames import FrameMap
+from ncfix.program.language import BulkLayout, Language
+from ncfix.program.layout import AXIS_LETTERS
+from ncfix.program.moves import Frame, Kind, Moves, Rule
+from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
+from ncfix.program.pieces import Pieces
+from ncfix.program.tree import START, Anchor, Program
+from ncfix.program.writer import Splices
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+SHORTEST = 16
+"""Stretches of fewer motions go one by one."""
+FIRST, LONGEST = 256, 1 << 15
+"""Motions that are tried at once: few at first, and after a stretch that went through four times as many."""
+
+
+@dataclass(slots=True)
+class Bulk:
+    """The stretches of one emission.
+
+    stop     (n + 1,) for each motion, the first one from there on that does not qualify
+    layouts  the layout of each shape that qualifies
+    """
+
+    program: Program
+    moves: Moves
+    pieces: Pieces
+    first_piece: IntArray
+    layouts: dict[int, BulkLayout]
+    stop: IntArray
+    reach: int = FIRST
+    parts: list[Splices] = field(default_factory=list)
+
+    @classmethod
+    def of(
+        cls,
+        language: Language,
+        program: Program,
+        moves: Moves,
+        pieces: Pieces,
+        frame: NDArray[np.int32],
+        frames: tuple[Frame, ...],
+        jumps: Mask,
+    ) -> Bulk:
+        """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
+        first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
+        layouts = _layouts(language, program, moves)
+        fit = _qualified(program, moves, pieces, first_piece, layouts) & ~jumps.any(axis=1)
+        straight = np.array([not (each.diameter or (each.rotation != np.eye(3)).any()) for each in frames])
+        fit &= straight[frame] if len(frames) else False
+        breaks = np.ones(len(moves) + 1, dtype=np.bool_)
+        breaks[:-1] = ~fit
+        ends = np.append(np.flatnonzero(breaks[:-1]), len(moves))
+        stop = ends[np.searchsorted(ends, np.arange(len(moves) + 1))]
+        changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
+        stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
+        return cls(program, moves, pieces, first_piece, layouts, stop)
+
+    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+        """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
+
+        position  (n_axes,) the command at which the control stands
+        decimals  (n_axes,) digits that the least increment needs
+
+        Returns the commands (k, n_axes) at the ends of the motions written.
+        """
+        stop = min(int(self.stop[row]), row + self.reach)
+        if stop - row < SHORTEST:
+            return None
+        stretch = Stretch.of(self, row, stop, position, frame, decimals)
+        count = stretch.count_clear()
+        self.reach = min(4 * self.reach, LONGEST) if count == stop - row else max(count, FIRST)
+        if count < SHORTEST:
+            return None
+        stretch = stretch if count == stop - row else Stretch.of(self, row, row + count, position, frame, decimals)
+        self.parts.append(stretch.splices())
+        return stretch.commands()
+
+
+def _layouts(language: Language, program: Program, moves: Moves) -> dict[int, BulkLayout]:
+    """The layouts of the shapes that occur and can be written in bulk."""
+    if language.bulk is None or not len(moves):
+        return {}
+    shapes, at = np.unique(program.template[moves.block], return_index=True)
+    found = {int(shape): language.bulk(program, int(moves.block[row])) for shape, row in zip(shapes, at, strict=True)}
+    return {shape: layout for shape, layout in found.items() if layout is not None}
+
+
+def _qualified(
+    program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: dict[int, BulkLayout]
+) -> Mask:
+    """(n,) motions that may be written in bulk, as far as their own data say."""
+    first = first_piece[:-1]
+    shapes = np.zeros(len(program.templates), dtype=np.bool_)
+    shapes[list(layouts)] = True
+    turns = (moves.kind == Kind.FEED) & (moves.end == moves.start)[:, ~moves.rotary].all(axis=1)
+    fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
+    fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
+    fit &= (np.diff(first_piece) == 1) & ~pieces.kept[first] & ~pieces.arc[first]
+    fit &= np.isfinite(pieces.end[first]).all(axis=1)
+    fit &= shapes[program.template[moves.block]]
+    fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
+    fit[1:] &= moves.block[1:] > moves.block[:-1]
+    return fit
+
+
+@dataclass(slots=True)
+class Stretch:
+    """One stretch while it is written; k motions, columns by axis.
+
+    words     (k, n_axes) index of the number of each axis word, -1 where there is none
+    wanted    (k, n_axes) program numbers of the corrected ends
+    values    (k, n_axes) what will stand there: as written now, as written anew, or where the axis is left
+    rewrite   words that get another value
+    add       axes that get a word
+    styles    of all words, in the order of `words[words >= 0]`
+    """
+
+    bulk: Bulk
+    row: int
+    position: FloatArray
+    frame: FrameMap
+    decimals: IntArray
+    words: IntArray
+    wanted: FloatArray
+    values: FloatArray
+    rewrite: Mask
+    add: Mask
+    styles: Styles
+    clear: Mask
+
+    @classmethod
+    def of(cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Stretch:
+        """Work out which words change."""
+        program = bulk.program
+        words = _words(bulk, row, stop)
+        present = words >= 0
+        wanted = frame.program(bulk.pieces.end[bulk.first_piece[row:stop]].copy())
+        half = 0.5 * 10.0 ** -decimals.astype(float)
+        original = np.where(present, program.numbers[np.maximum(words, 0)], 0.0)
+        rewrite = present & (np.abs(wanted - original) >= half)
+        styles = styles_of(np.frombuffer(program.source, dtype=np.uint8), program.number_spans[words[present]])
+        digits = np.broadcast_to(decimals, words.shape).copy()
+        digits[present] = np.maximum(digits[present], styles.decimals)
+        clear = is_plain(wanted, digits) | (present & ~rewrite)
+        clear[present] &= styles.clear | ~rewrite[present]
+        values = np.where(present & ~rewrite, original, rounded(wanted, digits))
+        add = _missing(frame.program(position.copy()), values, present, wanted, half, clear)
+        return cls(bulk, row, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
+
+    def count_clear(self) -> int:
+        """How many motions from the first on are clear."""
+        fine = np.asarray(self.clear.all(axis=1))
+        return len(fine) if fine.all() else int(np.argmin(fine))
+
+    def commands(self) -> FloatArray:
+        """The commands at the ends of the motions, (k, n_axes): an axis that is not told to move stays where it was."""
+        told = (self.words >= 0) | self.add
+        last = np.maximum.accumulate(np.where(told, np.arange(len(told))[:, None], -1), axis=0)
+        commands = np.take_along_axis(self.frame.command(self.values), np.maximum(last, 0), axis=0)
+        result: FloatArray = np.where(last >= 0, commands, self.position)
+        return result
+
+    def splices(self) -> Splices:
+        """What changes in the source."""
+        return Splices.joined([self._rewritten(), self._added()])
+
+    def _rewritten(self) -> Splices:
+        """The words that get another value."""
+        numbers = self.words[self.rewrite]
+        order = np.argsort(numbers, kind="stable")
+        rows, columns = (index[order] for index in np.nonzero(self.rewrite))
+        styles = self.styles.rows(np.flatnonzero(self.rewrite[self.words >= 0])[order])
+        texts = in_style(self.wanted[rows, columns], styles, self.decimals[columns])
+        spans = self.bulk.program.number_spans[numbers[order]]
+        return Splices(spans[:, 0], spans[:, 1], texts.length, texts.data)
+
+    def _added(self) -> Splices:
+        """The words that are missing, in the order in which programs write them."""
+        program, moves = self.bulk.program, self.bulk.moves
+        order = np.array(sorted(range(len(moves.axes)), key=lambda column: AXIS_LETTERS.index(moves.axes[column])))
+        rows, columns = np.nonzero(self.add[:, order])
+        columns = order[columns]
+        blocks = moves.block[self.row + rows].astype(np.int64)
+        shapes = program.template[blocks]
+        at, heads = np.empty(len(rows), dtype=np.int64), np.empty((len(rows), 2), dtype=np.uint8)
+        for shape in np.unique(shapes).tolist():
+            layout, mine = self.bulk.layouts[shape], shapes == shape
+            at[mine] = _places(program, blocks[mine], layout.words_at)
+            heads[mine] = np.array([_head(layout, letter) for letter in moves.axes], dtype=np.uint8)[columns[mine]]
+        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads)
+        return Splices(at, at, texts.length, texts.data)
+
+
+def _head(layout: BulkLayout, letter: str) -> tuple[int, int]:
+    """What stands before the number of a new word: a blank, or nothing, and the letter."""
+    return ord(layout.blank) if layout.blank else 0, ord(letter.lower() if layout.lower else letter)
+
+
+def _places(program: Program, blocks: IntArray, anchor: Anchor) -> IntArray:
+    """The bytes that an anchor stands for in blocks of one shape."""
+    if anchor.slot < 0:
+        base = program.blocks[blocks, 0 if anchor.slot == START else 1]
+    else:
+        base = program.number_spans[program.first_number[blocks] + anchor.slot, 1]
+    places: IntArray = base + anchor.offset
+    return places
+
+
+def _missing(
+    start: FloatArray, values: FloatArray, present: Mask, wanted: FloatArray, half: FloatArray, clear: Mask
+) -> Mask:
+    """Axes without a word that must stand elsewhere by half an output step; marks in `clear` where that is clear.
+
+    start  (n_axes,) program numbers of where the control stands before the stretch
+
+    After its last word an axis is left there until it is off by half a step; from then on it is on the digits, and gets
+    a word whenever the nearest digits change.
+    """
+    rows = np.arange(len(values))[:, None]
+    last_word = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
+    left_at = np.where(last_word >= 0, np.take_along_axis(values, np.maximum(last_word, 0), axis=0), start)
+    away = np.abs(wanted - left_at) >= half
+    last_away = np.maximum.accumulate(np.where(away & ~present, rows, -1), axis=0)
+    held = np.vstack((np.full(len(start), -1), last_away[:-1])) <= last_word
+    before = np.where(held, left_at, np.vstack((start, values[:-1])))
+    add: Mask = ~present & (np.abs(wanted - before) >= half)
+    clear |= ~present & held & ~away
+    return add
+
+
+def _words(bulk: Bulk, row: int, stop: int) -> IntArray:
+    """(k, n_axes) the number of each axis word, -1 where there is none."""
+    program, moves = bulk.program, bulk.moves
+    blocks = moves.block[row:stop]
+    shapes = program.template[blocks]
+    slots = np.full((len(program.templates), len(moves.axes)), -1, dtype=np.int64)
+    for shape in np.unique(shapes).tolist():
+        slots[shape] = [bulk.layouts[shape].slots.get(letter, -1) for letter in moves.axes]
+    found = slots[shapes]
+    words: IntArray = np.where(found >= 0, program.first_number[blocks][:, None] + found, -1)
+    return words
