@@ -21,7 +21,7 @@ from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS, Rendered, Target
 from ncfix.program.tree import Program
-from ncfix.program.writer import Edit
+from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
 
