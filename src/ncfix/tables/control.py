@@ -1,6 +1,6 @@
 """What a control's plugin brings: how its tables are made, written, read back and judged.
 
-A reader turns the files into a `Compensation`, with the control's own signs, digits, limits and rules outside the
+A reader turns the files into `Tables`, with the control's own signs, digits, limits and rules outside the
 range worked in; running that is the emulation. A plugin registers a function that returns its `Control` with the hook
 `register_controls`, so that nothing numeric is imported before tables are asked for.
 `ncfix.testing.check_control` is the contract that any plugin must pass.
@@ -17,7 +17,7 @@ from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugins import registry
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.neutral import Tables
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""
@@ -123,7 +123,7 @@ class Control(ABC):
         """The native files; raises `RefusedError` NCF484 for what the format cannot hold."""
 
     @abstractmethod
-    def read(self, files: Files) -> Compensation:
+    def read(self, files: Files) -> Tables:
         """What the control does with these files; raises `ConfigError` for files that it would not load."""
 
     @abstractmethod

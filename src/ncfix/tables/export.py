@@ -14,7 +14,7 @@ from ncfix.tables import manifest as side
 from ncfix.tables.control import Control, Files, Request
 from ncfix.tables.grid import Array
 from ncfix.tables.manifest import Manifest
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.neutral import Tables
 from ncfix.tables.poses import ranges_of
 from ncfix.tables.residual import POSES, Residual, residual
 from ncfix.tables.sheet import as_html, as_markdown
@@ -32,7 +32,7 @@ class Exported:
 
     native: Files
     files: Files
-    tables: Compensation
+    tables: Tables
     left: Residual
     notes: tuple[str, ...]
     messages: tuple[Message, ...]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -43,6 +44,25 @@ class Term:
         axis, sense = self.way
         weight: Array = (1 + sense * direction[:, [names.index(axis)]]) / 2
         return weight
+
+
+class Tables(Protocol):
+    """What a control does with its files: a sum of tables (`Compensation`), or whatever else it works out of them."""
+
+    def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
+        """Corrections of all axes `names` at commands q (n, n_axes) [mm, rad], to be added to them, (n, n_axes)."""
+
+    @property
+    def grids(self) -> tuple[Grid, ...]:
+        """Every table in it."""
+
+    @property
+    def axes(self) -> frozenset[str]:
+        """Every axis that it looks up or corrects."""
+
+    @property
+    def points(self) -> int:
+        """The nodes of all its tables."""
 
 
 @dataclass(frozen=True, slots=True)

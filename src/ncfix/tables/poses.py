@@ -52,3 +52,15 @@ def random_poses(space: Array, count: int, seed: int = 0) -> Array:
 def random_ways(n_axes: int, count: int, seed: int = 1) -> Array:
     """Directions of motion at random, (count, n_axes), -1 or 1."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, n_axes))
+
+
+def even_poses(space: Array, count: int) -> Array:
+    """Poses that fill the space more evenly than those at random, (count, n_axes): a lattice of irrational steps."""
+    dimensions = len(space)
+    ratio = 2.0
+    for _ in range(40):
+        ratio = (1 + ratio) ** (1 / (dimensions + 1))
+    steps = ratio ** -np.arange(1.0, dimensions + 1)
+    share = np.mod(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
+    poses: Array = space[:, 0] + share * (space[:, 1] - space[:, 0])
+    return poses

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.machine import Machine, State
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.neutral import Tables
 from ncfix.tables.poses import random_poses, random_ways
 
 POSES = 20_000
@@ -41,7 +41,7 @@ def _size(error: Array) -> dict[str, float]:
 
 
 def residual(
-    machine: Machine, tables: Compensation, space: Array, tool_length: float, count: int = POSES, seed: int = 7
+    machine: Machine, tables: Tables, space: Array, tool_length: float, count: int = POSES, seed: int = 7
 ) -> Residual:
     """Run the machine with the tables active over `count` random poses of the space (n_axes, 2).
 

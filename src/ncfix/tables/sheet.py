@@ -6,16 +6,16 @@ from collections.abc import Iterable, Iterator
 from html import escape
 
 from ncfix.tables.control import Control, Request, Written
-from ncfix.tables.neutral import Compensation
+from ncfix.tables.neutral import Tables
 from ncfix.tables.residual import Residual
 
 
-def as_markdown(control: Control, request: Request, tables: Compensation, left: Residual, written: Written) -> str:
+def as_markdown(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> str:
     """The sheet."""
     return "\n".join(_lines(control, request, tables, left, written)) + "\n"
 
 
-def _lines(control: Control, request: Request, tables: Compensation, left: Residual, written: Written) -> Iterator[str]:
+def _lines(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> Iterator[str]:
     machine, figures = request.machine, left.figures()
     before, after = figures["before"], figures["after"]
     yield f"# {control.title}: compensation tables for {machine.name}"

@@ -1,0 +1,25 @@
+"""Heidenhain controls: axis compensation tables (`.COM`, `.CMA`) and KinematicsComp."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.hookspecs import Register, hookimpl
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from ncfix.tables.control import Control
+
+
+@hookimpl
+def register_controls(register: Register[Callable[[], Control]]) -> None:
+    """Bring the control `heidenhain`: axis tables."""
+    register(axis_tables, name="heidenhain")
+
+
+def axis_tables() -> Control:
+    """The control with axis tables, imported when tables are asked for."""
+    from ncfix_heidenhain.control import Heidenhain
+
+    return Heidenhain()

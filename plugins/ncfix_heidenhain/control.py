@@ -1,0 +1,271 @@
+"""Heidenhain's axis compensation: `.COM` tables of the axes over one another, and the `.CMA` file that binds them.
+
+The rule (MANUALplus 620 technical manual, of the same NCK family as TNC 640): the axis that a column of a `.COM` file
+is named after is moved as a function of the axis in whose column of the `.CMA` file that `.COM` file is entered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.tables.additive import Line, additive
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Compensation, Term
+from ncfix_heidenhain.cma import CONFIG, LETTERS, cma_text, read_cma
+from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
+
+DEGREE = np.pi / 180
+MOST = 256
+"""Entries of a file of the older controls; of the newer ones no number is public."""
+SIGN = "sign.txt"
+LARGEST = 9.9999
+"""mm, degree: what the columns of the peer's files hold."""
+
+
+class Heidenhain(Control):
+    """The control `heidenhain`."""
+
+    name = "heidenhain"
+    title = "Heidenhain axis compensation (.COM, .CMA)"
+    reaches = "L-POS, L-STR, L-SQR and part of L-ANG"
+    properties = Properties(
+        value_sign="as --set sign says; Heidenhain's own parameter MP720 is an error",
+        input_signal="setpoint",
+        position_frame="machine datum (MP_refPosition)",
+        unit="mm, degree",
+        quantum=(1e-4, 1e-4 * DEGREE),
+        extrapolation="taken as held at the first and last row (HEID-2)",
+        bidirectional=True,
+        max_points=MOST,
+        max_tables=len(LETTERS),
+        combine="sum over the axes that are looked up",
+    )
+    assumptions = (
+        Assumption(
+            "HEID-1",
+            "The sign of the values is what --set sign says.",
+            "MP720 of the TNC 407/415 is positive if the travel is too long, and a public converter writes mean "
+            "deviations as they are: both speak for error; no text says it of these files",
+            "none: it must be given",
+            "Load a file with +0.010 in all rows: does the axis go 0.010 towards minus (error) or plus (correction)?",
+        ),
+        Assumption(
+            "HEID-2",
+            "Between rows the values are linear; beyond the first and last row they hold.",
+            "none public",
+            "so",
+            "Move beyond the last row and compare the nominal position with the encoder.",
+        ),
+        Assumption(
+            "HEID-3",
+            "BACKLASH is what counts for the axis itself instead of its own column while it travels towards minus.",
+            "MANUALplus 620 technical manual: values measured in negative travel",
+            "the column is left out; --set backlash=on writes it",
+            "Load 0.000 in the axis column and 0.010 in BACKLASH, and read a dial gauge from both sides.",
+        ),
+        Assumption(
+            "HEID-4",
+            "Axis n of a column n=F() of the iTNC 530 is the n-th axis column of config.cma.",
+            "none public",
+            "the axes in the order X Y Z A B C U V W of those that the machine has",
+            "The list of axes in the machine parameters.",
+        ),
+        Assumption(
+            "HEID-5",
+            "Four decimals, and columns as wide as those of a public converter.",
+            "a public converter's files",
+            "so",
+            "Open the files in the table editor of the control.",
+        ),
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        "sign": Option(None, "error: values are taken off the command; correction: they are added"),
+        "family": Option("tnc640", "tnc640: NCK controls; itnc530: datum and distance in the first line"),
+        "backlash": Option("off", "on: a column BACKLASH; off: the mean of both ways"),
+        "points": Option(str(MOST), f"most rows of a file, at most {MOST}"),
+    }
+    steps = (
+        "Settle HEID-1 on the machine.",
+        "Save the present .COM and .CMA files; they are machine data behind the code number, so that the machine's "
+        "maker or the service must load new ones.",
+        "Load the .COM files, then config.cma; if there are lines of your own in it, add the columns to the active "
+        "one.",
+        "Cancel other compensation of the same axes: MP720/MP730, linear factors, KinematicsComp.",
+        "Home all axes and compare the compensation of one position with ncfix emulate.",
+        "Measure one axis again: the positioning error must have become smaller, not twice as large.",
+    )
+    switch_off = "Mark a line of config.cma that has no files as active, or empty the columns."
+
+    def write(self, request: Request) -> Written:
+        """A `.COM` file for each axis over which anything changes, `config.cma`, and the sign in words."""
+        settings = self.settings(request.settings)
+        sense = sign_of(settings["sign"])
+        old = choice(settings, "family", ("tnc640", "itnc530")) == "itnc530"
+        both = choice(settings, "backlash", ("off", "on")) == "on"
+        axes = axes_of(request)
+        machine = request.machine
+        most = whole(settings, "points", 2, MOST)
+        lines = additive(machine, request.space, request.tool_length, most, request.target, both=both)
+        kept = [line for line in map(_rounded, lines) if line.values.any() or line.reverse.any()]
+        tables = {line.input: f"AXIS{'-' if old else '_'}{line.input}.COM" for line in kept}
+        files = {}
+        for line in kept:
+            com = _as_file(line, sense, axes if old else None, both)
+            _check_size(com, tables[line.input])
+            text = old_text if old else nck_text
+            files[tables[line.input]] = text(tables[line.input], com, 4)
+        files[CONFIG] = cma_text(axes, tables)
+        files[SIGN] = f"{settings['sign']}\n".encode()
+        return Written(files, _notes(lines, most, both))
+
+    def read(self, files: Files) -> Compensation:
+        """As the control would take them. Raises `ConfigError` NCF491."""
+        terms, remarks = self._read(files)
+        for each in remarks:
+            each.check()
+        return Compensation(tuple(terms))
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What the control would misread, and what is rarely meant."""
+        return tuple(message for each in self._read(files)[1] for message in each.messages)
+
+    def _read(self, files: Files) -> tuple[list[Term], list[Remarks]]:
+        axes, tables, config = read_cma(files)
+        remarks, terms = [config], []
+        sense = read_sign(files, config)
+        for axis, name in tables.items():
+            com, found = read_com(name, files[name])
+            remarks.append(found)
+            if com is not None:
+                terms += list(_terms(axis, com, axes, sense, found))
+        _check_entered(files, tables, config)
+        return terms, remarks
+
+
+def read_sign(files: Files, remarks: Remarks) -> float:
+    """What turns a value into a correction: the sign that was settled for the machine is kept beside the files."""
+    found = files.get(SIGN, b"").decode("latin-1").strip()
+    if found not in ("error", "correction"):
+        remarks.refuse(0, f"{SIGN} says {found!r}", "error or correction; HEID-1 says how to find out")
+    return 1.0 if found == "correction" else -1.0
+
+
+def _check_entered(files: Files, tables: Mapping[str, str], config: Remarks) -> None:
+    for name in files:
+        if name.upper().endswith(".COM") and name not in tables.values():
+            config.doubt(0, f"{name} is not entered in the active line: the control does not use it")
+
+
+def _terms(axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Remarks) -> Iterator[Term]:
+    nodes = com.nodes * unit_of(axis)
+    for name, values in com.columns.items():
+        output = _letter(name, axes, remarks)
+        if output is None:
+            continue
+        scale = sense * unit_of(output)
+        grid = Grid((axis,), (nodes,), (output,), scale * values[:, None])
+        if output == axis and com.backlash is not None:
+            back = Grid((axis,), (nodes,), (output,), scale * com.backlash[:, None])
+            yield from (Term((grid,), (axis, 1)), Term((back,), (axis, -1)))
+        else:
+            yield Term((grid,))
+    if com.backlash is not None and com.backlash.any() and axis not in {_letter(n, axes, None) for n in com.columns}:
+        remarks.doubt(0, f"BACKLASH without a column of {axis} itself is not used")
+
+
+def _letter(name: str, axes: tuple[str, ...], remarks: Remarks | None) -> str | None:
+    if not name.isdigit():
+        if name in axes:
+            return name
+        text = f"{name} is no axis of config.cma" if name in LETTERS else f"{name} needs a kinematics table"
+    elif 1 <= int(name) <= len(axes):
+        return axes[int(name) - 1]
+    else:
+        text = f"config.cma has no axis number {name}"
+    if remarks is not None:
+        remarks.refuse(0, text)
+    return None
+
+
+def unit_of(axis: str) -> float:
+    """Internal units per unit of the file."""
+    return DEGREE if axis in "ABC" else 1.0
+
+
+def _rounded(line: Line) -> Line:
+    """What is left of a line when its values have four decimals: columns of zeros go."""
+    units = np.array([unit_of(name) for name in line.outputs])
+    values = np.round(line.values / units, 4) * units
+    kept = [i for i, name in enumerate(line.outputs) if values[:, i].any() or name == line.input]
+    reverse = np.round(line.reverse / unit_of(line.input), 4) * unit_of(line.input)
+    return Line(line.input, line.nodes, tuple(line.outputs[i] for i in kept), values[:, kept], reverse)
+
+
+def _as_file(line: Line, sense: float, numbered: tuple[str, ...] | None, both: bool) -> Com:
+    columns = {
+        (str(numbered.index(name) + 1) if numbered else name): sense * line.values[:, i] / unit_of(name)
+        for i, name in sorted(enumerate(line.outputs), key=lambda pair: LETTERS.index(pair[1]))
+    }
+    unit = unit_of(line.input)
+    own: Array = sense * line.reverse / unit
+    if numbered and not both:
+        own = columns[str(numbered.index(line.input) + 1)]
+    return Com(line.nodes / unit, columns, own if both or numbered else None)
+
+
+def _check_size(com: Com, name: str) -> None:
+    largest = max(float(np.abs(values).max()) for values in com.columns.values())
+    if largest > LARGEST:
+        text = f"{name} would have to hold {largest:.3f}, and its columns end at {LARGEST}"
+        raise RefusedError.of("NCF484", text, hint="is the error in mm?")
+
+
+def axes_of(request: Request) -> tuple[str, ...]:
+    """The axes of the machine in the control's order; raises `RefusedError` NCF484 for one that it cannot have."""
+    names = request.machine.axis_names
+    if not set(names) <= set(LETTERS):
+        raise RefusedError.of("NCF484", f"the control knows {' '.join(LETTERS)}; the machine has {' '.join(names)}")
+    return tuple(letter for letter in LETTERS if letter in names)
+
+
+def sign_of(text: str) -> float:
+    """What turns a correction into a value."""
+    if text not in ("error", "correction"):
+        raise UsageError.of("NCF485", f"sign={text}", hint="error or correction; HEID-1 says how to find out")
+    return 1.0 if text == "correction" else -1.0
+
+
+def choice(settings: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
+    """A setting that is one of a few words; raises `UsageError` NCF485."""
+    if settings[key] not in allowed:
+        raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=f"one of {', '.join(allowed)}")
+    return settings[key]
+
+
+def whole(settings: Mapping[str, str], key: str, low: int, high: int) -> int:
+    """A setting that is a whole number; raises `UsageError` NCF485."""
+    text = settings[key]
+    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
+        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
+    return int(text)
+
+
+def _notes(lines: tuple[Line, ...], most: int, both: bool) -> tuple[str, ...]:
+    notes = [
+        "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves: "
+        "that part of the error is left, unless the control has KinematicsComp (heidenhain-kinematics)."
+    ]
+    full = [line.input for line in lines if len(line.nodes) >= most > 2]
+    if full:
+        notes.append(f"With {most} rows the target is not reached along {', '.join(full)}.")
+    if not both and any(
+        np.abs(line.values[:, line.outputs.index(line.input)] - line.reverse).max() > 0 for line in lines
+    ):
+        notes.append("The mean of both ways is written; --set backlash=on writes what the way back needs.")
+    return tuple(notes)
