@@ -67,12 +67,12 @@ class Parsed:
     comment: int
 
 
-def build(tree: Branch, text: str, squeezed: Squeezed) -> Parsed:
-    """Make the template of a block from its tree; raises `TooDeepError`."""
+def build(tree: Branch, text: str, squeezed: Squeezed, maker: type[Builder] | None = None) -> Parsed:
+    """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`."""
     tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
     spans = tuple(squeezed.span(*edges(token)) for token in tokens)
     slots = {edges(token): slot for slot, token in enumerate(tokens)}
-    items = Builder(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
+    items = (maker or Builder)(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
     comment = final_comment(tree)
     place = squeezed.span(*edges(comment))[0] if comment else -1
     return Parsed(Template(items, len(tokens)), spans, tuple(map(float, tokens)), place)
@@ -218,10 +218,14 @@ class Builder:
     def expression(self, node: Node, depth: int = 0) -> Expression:
         """The expression that a tree, or the terminal of a number, stands for."""
         if isinstance(node, Token):
-            return Literal(self.slots[edges(node)])
+            return self.literal(node)
         if depth > MAX_DEPTH:
             raise TooDeepError(edges(node)[0])
         return self.compound(node, depth + 1)
+
+    def literal(self, token: Token) -> Literal:
+        """A number."""
+        return Literal(self.slots[edges(token)])
 
     def compound(self, tree: Branch, depth: int) -> Expression:
         """The expression that a tree stands for."""

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import NUMERIC, find_numbers, table
+from ncfix.program.numbers import NUMERIC, POINT, find_numbers, table
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2
+POINTLESS_MARK = 3
+"""Of a number without a decimal point, in languages where it means something else than one with."""
 
-ODD = table(bytes([NUMBER_MARK, COMMENT_MARK]) + b"\r")
+ODD = table(bytes([NUMBER_MARK, COMMENT_MARK, POINTLESS_MARK]) + b"\r")
 """What a block may not hold to have a shape: the marks themselves, and carriage returns, where a comment might end."""
 
 FIXED = table(b"GgMmOo")
@@ -67,15 +69,18 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
     return np.stack((starts, stops), axis=1)
 
 
-def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
-    """Find the numbers and the shape of every block."""
+def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -> Scan:
+    """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
     text = np.frombuffer(source, dtype=np.uint8)
     starts, stops, last = comments_of(source)
     numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), starts, stops), FIXED)
     block_of_number = block_of(blocks, numbers.spans[:, 0])
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, starts[last])] = starts[last]
-    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1))
+    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
+    if pointless:
+        marks[without_point(text, numbers.spans)] = POINTLESS_MARK
+    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1), marks)
     for block in {*block_of_number[numbers.broken].tolist(), *odd_blocks(text, blocks)}:
         shapes[block] = None
     first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
@@ -114,15 +119,22 @@ def shape_keys(
     blocks: NDArray[np.int64],
     numbers: NDArray[np.int64],
     comments: NDArray[np.int64],
+    marks: NDArray[np.uint8],
 ) -> list[bytes | None]:
     """The key of each block: its bytes, with one mark for each number and for the comment at its end."""
     keep = cover(len(text) + 1, blocks[:, 0], blocks[:, 1])
     for spans in (numbers, comments):
         keep[:-1] &= ~cover(len(text), spans[:, 0], spans[:, 1])
     marked = np.append(text, ord("\n")).astype(np.uint8)
-    marked[numbers[:, 0]] = NUMBER_MARK
+    marked[numbers[:, 0]] = marks
     marked[comments[:, 0]] = COMMENT_MARK
     marked[blocks[:, 1]] = ord("\n")
     for places in (numbers[:, 0], comments[:, 0], blocks[:, 1]):
         keep[places] = True
     return list(marked[keep].tobytes().split(b"\n")[: len(blocks)])
+
+
+def without_point(text: NDArray[np.uint8], numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which numbers have no decimal point, (m,)."""
+    points = np.concatenate(([0], np.cumsum(text == POINT)))
+    return np.asarray(points[numbers[:, 1]] == points[numbers[:, 0]])

@@ -91,11 +91,12 @@ class Control:
         rotary: frozenset[str],
         dialect: Dialect,
         kinematics: Kinematics | None = None,
+        rules: Rules | None = None,
     ) -> None:
         self.setup = setup
         self.kinematics = kinematics
         self.dialect = dialect
-        self.rules: Rules = LINUXCNC if dialect.semantics == "linuxcnc" else ISO
+        self.rules: Rules = rules or (LINUXCNC if dialect.semantics == "linuxcnc" else ISO)
         self.machine = tuple(INDEX[axis] for axis in axes)
         self.rotary = tuple((letter in rotary) if letter in axes else letter in ROTARY_LETTERS for letter in LETTERS)
         self.builder = Builder(axes, rotary)

@@ -6,7 +6,12 @@ and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ncfix.program.rs274.expressions import Evaluate, compiled
+from ncfix.program.tree import Expression
 
 NON_MODAL = "non-modal"
 MOTION = "motion"
@@ -94,12 +99,20 @@ class Rules:
     strict      whatever LinuxCNC's interpreter refuses is an error: unknown codes, words that no code uses, no feed
     g_groups    the group of every G code that is followed
     harmless_g  G codes that are passed over
+    m_groups    the group of every M code that is followed
+    steps       G code -> what is done for it instead of what `order` says
+    takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    compiled    (expression, the address it stands behind) -> the function that computes it
     """
 
     strict: bool
     g_groups: dict[int, str]
     harmless_g: frozenset[int]
+    m_groups: Mapping[int, str] = field(default_factory=lambda: LINUXCNC_M)
+    steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
+    takes: frozenset[int] = frozenset()
+    compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
 
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset())
-ISO = Rules(False, ISO_G, ISO_HARMLESS_G)
+ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))

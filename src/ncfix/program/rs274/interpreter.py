@@ -263,7 +263,8 @@ class Interpreter:
         if MACHINE in codes.g.values():
             in_machine_coordinates(self.control, block, motion)
         else:
-            MOTIONS[motion](self.control, block, motion)
+            step = self.control.rules.steps.get(motion) or MOTIONS[motion]
+            step(self.control, block, motion)
         if motion not in CYCLES:
             self.control.modal.cycle.initial = None
 

@@ -116,10 +116,12 @@ MOTIONS: Mapping[int, Step] = {
 Steps = tuple[tuple[Step, int], ...]
 
 
-def steps_of(g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str]) -> Steps:
+def steps_of(
+    g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str], own: Mapping[int, Step]
+) -> Steps:
     """What a block does before its motion, in order: steps with their codes.
 
-    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words.
+    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words; `own` the dialect's own steps.
     """
     steps = [(step, g_codes[group]) for group, step in FIRST if group in g_codes]
     steps += [(step, 0) for letter, step in WORDS if letter in letters]
@@ -127,7 +129,7 @@ def steps_of(g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: fr
     single = g_codes.get(groups.NON_MODAL, -1)
     if single == DWELL:
         steps.append((dwell, single))
-    steps += [(step, g_codes[group]) for group, step in G_STEPS if group in g_codes]
-    if single in NON_MODAL:
-        steps.append((NON_MODAL[single], single))
+    steps += [(own.get(g_codes[group], step), g_codes[group]) for group, step in G_STEPS if group in g_codes]
+    if single in NON_MODAL or (single in own and single != DWELL):
+        steps.append((own.get(single) or NON_MODAL[single], single))
     return tuple(steps)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.rs274.expressions import Evaluate, compiled
+from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import Rules
 from ncfix.program.rs274.modal import NO_MOTION
@@ -97,6 +97,7 @@ class Plan:
     """What is done with every block of a shape.
 
     literals     (address, slot) of words with a plain number
+    pointless    addresses of words with a plain number without a decimal point, where the dialect tells them apart
     computed     words with an expression
     assignments  parameters that are set
     code_words   G and M words whose code is computed; else `codes` are the codes
@@ -112,6 +113,7 @@ class Plan:
 
     template: Template
     literals: tuple[tuple[str, int], ...] = ()
+    pointless: tuple[str, ...] = ()
     computed: tuple[tuple[str, Evaluate, Span], ...] = ()
     assignments: tuple[tuple[int | str | Evaluate, Evaluate, Span], ...] = ()
     code_words: tuple[tuple[Word, Evaluate], ...] = ()
@@ -135,13 +137,15 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     code_words = [word for word in words if word.address in "GM"]
     plan = Plan(template)
     plan.literals = tuple((w.address, w.value.slot) for w in values if isinstance(w.value, Literal))
-    plan.computed = tuple((w.address, compiled(w.value), w.span) for w in values if not isinstance(w.value, Literal))
+    computed = [word for word in values if not isinstance(word.value, Literal)]
+    plan.computed = tuple((w.address, rules.compiled(w.value, w.address), w.span) for w in computed)
+    plan.pointless = tuple(w.address for w in values if isinstance(w.value, Literal) and w.value.pointless)
     plan.letters = frozenset(word.address for word in values)
     plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
     if plan.letters & POLAR:
         plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
-    plan.assignments = tuple(assignment(item) for item in template.items if isinstance(item, Assignment))
-    plan.flow = next((flow_line(item) for item in template.items if isinstance(item, Flow)), None)
+    plan.assignments = tuple(assignment(item, rules) for item in template.items if isinstance(item, Assignment))
+    plan.flow = next((flow_line(item, rules) for item in template.items if isinstance(item, Flow)), None)
     plan.skip = any(isinstance(item, Skip) for item in template.items)
     plan.tape = any(isinstance(item, Tape) for item in template.items)
     plan.unread = any(isinstance(item, Opaque) and item.kind == "unread" for item in template.items)
@@ -153,22 +157,22 @@ def plan_of(template: Template, rules: Rules) -> Plan:
         except Fault as fault:
             plan.fault = fault
     else:
-        plan.code_words = tuple((word, compiled(word.value)) for word in code_words)
+        plan.code_words = tuple((word, rules.compiled(word.value, word.address)) for word in code_words)
     plan.lane = lane_of(plan)
     return plan
 
 
-def flow_line(item: Flow) -> FlowLine:
+def flow_line(item: Flow, rules: Rules) -> FlowLine:
     """A flow-control line with its expressions as functions."""
-    label = item.label if isinstance(item.label, str) else compiled(item.label)
-    return FlowLine(label, item.keyword, tuple(map(compiled, item.arguments)), item.span)
+    label = item.label if isinstance(item.label, str) else rules.compiled(item.label, "")
+    return FlowLine(label, item.keyword, tuple(rules.compiled(each, "") for each in item.arguments), item.span)
 
 
-def assignment(item: Assignment) -> tuple[int | str | Evaluate, Evaluate, Span]:
+def assignment(item: Assignment, rules: Rules) -> tuple[int | str | Evaluate, Evaluate, Span]:
     """Target and value of an assignment; a name as it is, a number as a function."""
     assert isinstance(item.target, NamedParameter | Parameter), "this family has no arrays"
-    target = item.target.name if isinstance(item.target, NamedParameter) else compiled(item.target.index)
-    return target, compiled(item.value), item.span
+    target = item.target.name if isinstance(item.target, NamedParameter) else rules.compiled(item.target.index, "")
+    return target, rules.compiled(item.value, ""), item.span
 
 
 def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], rules: Rules) -> Codes:
@@ -191,11 +195,11 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
     return Codes(
         g,
         m,
-        steps_of(g, m, letters),
+        steps_of(g, m, letters, rules.steps),
         g.get(groups.MOTION),
         m.get(groups.STOP),
         m.get(groups.CALL),
-        bool(AXES_TAKEN & set(g.values())),
+        bool((AXES_TAKEN | rules.takes) & set(g.values())),
         tuple(unknown),
     )
 
@@ -213,7 +217,7 @@ def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules
 
 def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
     """Note an M code; one that is not known changes no coordinates, but LinuxCNC refuses it."""
-    group = groups.LINUXCNC_M.get(code)
+    group = rules.m_groups.get(code)
     if group is not None:
         enter(codes, group, word, code, rules)
     elif rules.strict:

@@ -1,0 +1,7 @@
+"""Fanuc and its like: what differs from the RS274 family, whose tracer and renderer this one uses.
+
+A number may mean something else without its decimal point (`points`), flow control is Macro B (`flow`, `arithmetic`,
+`variables`), and some codes set other things (`data`, `tilt`, `polar`).
+Sources: Fanuc 30i operator's manual (lathe and machining centre, "Custom macro"; machining centre, "Tilted working
+plane indexing", "Polar coordinate command"), Haas mill operator's manual.
+"""
