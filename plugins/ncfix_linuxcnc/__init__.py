@@ -25,6 +25,7 @@ LINUXCNC = Dialect(
     needs_end=True,
     foreign=FOREIGN,
     semantics="linuxcnc",
+    feed_of="linear",
 )
 
 

@@ -82,6 +82,7 @@ def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[
     wanted, before = _feed_of(original)
     given, after = _feed_of(fixed)
     old, new = _length(original), _length(fixed)
+    pace, paces = _pace(original, wanted), _pace(fixed, given)
     turns = np.linalg.norm((original.end - original.start)[:, :3], axis=1) < 1e-9
     for k, (first, last) in enumerate(zip(segments.first, segments.last, strict=True)):
         if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or original.kind[k] == RAPID:
@@ -94,12 +95,32 @@ def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[
             if other is not None:
                 yield int(original.line[k]), f"feed {wanted[k]:g} became {other:g}"
         elif min(wanted[k], *(given[j] for j in pieces)) > 0:
-            time, total = old[k] / wanted[k], sum(new[j] / given[j] for j in pieces)
+            time, total = old[k] / pace[k], sum(new[j] / paces[j] for j in pieces)
             if abs(total - time) > time * (FEED_SLACK + sum(PRINTED / given[j] for j in pieces)):
                 yield (
                     int(original.line[k]),
                     f"{time * 60:g} s for {'a turn' if turns[k] else 'inverse time'}: {total * 60:g} s",
                 )
+
+
+def _pace(canon: Canon, feeds: list[float]) -> Floats:
+    """(n,) feeds in mm a minute, or as they are where only rotary axes turn.
+
+    The control takes F in the length unit in force where F stands, and in degrees whatever that unit is.
+    """
+    inch = np.zeros(len(canon), dtype=bool)
+    unit, inch_feed = False, False
+    position = 0
+    for call in (*canon.calls, Call("END", "", len(canon))):
+        inch[position : call.after] = inch_feed
+        position = call.after
+        if call.name == "USE_LENGTH_UNITS":
+            unit = "INCHES" in call.arguments
+        elif call.name == "SET_FEED_RATE":
+            inch_feed = unit
+    linear = np.linalg.norm((canon.end - canon.start)[:, :3], axis=1) > 1e-9
+    pace: Floats = np.array(feeds) * np.where(inch & (linear | (canon.kind == ARC)), 25.4, 1.0)
+    return pace
 
 
 def _length(canon: Canon) -> Floats:

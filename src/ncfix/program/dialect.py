@@ -33,6 +33,8 @@ class Dialect:
     closure_relative    the same relative to the radius (both must be exceeded)
     block_skip_executed blocks with `/` run unless the operator asks otherwise
     needs_end           the control wants M2/M30 or `%` at the end
+    feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
+                        "all" (of all axes together), or "" where that differs from control to control
     language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
     semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
                         refuses is an error) or "iso" (codes that cannot move anything are passed over)
@@ -50,5 +52,6 @@ class Dialect:
     closure_relative: float = 0.001
     block_skip_executed: bool = True
     needs_end: bool = False
+    feed_of: str = ""
     language: str = "ncfix.program.rs274.language:RS274"
     semantics: str = "iso"

@@ -21,6 +21,7 @@ from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS, Rendered, Target
 from ncfix.program.tree import Program
+from ncfix.program.turns import UNTIMED, is_dragged, minutes
 from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
@@ -50,11 +51,11 @@ class Emission:
     conflicts: dict[int, str]
     added_blocks: int
 
-
     @property
     def edits(self) -> tuple[Edit, ...]:
         """The replacements and insertions one by one."""
         return tuple(self.splices.edits())
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
@@ -120,8 +121,8 @@ class _Emitter:
         self.end = pieces.end.copy()
         self.centre = pieces.centre.copy()
         self.start = moves.start.copy()
-
         self.bulk = Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
+
     def run(self) -> Emission:
         """Walk all motions."""
         row = 0
@@ -141,8 +142,8 @@ class _Emitter:
                 self._retract(row)
             elif self.moves.kind[row] != Kind.DWELL:
                 self.cycle_end = None
-        edits, added = self._edits()
             row += 1
+        edits, added = self._edits()
         splices = Splices.joined([*self.bulk.parts, Splices.of(edits)])
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, added)
 
@@ -221,6 +222,8 @@ class _Emitter:
             return
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
+        if np.isinf(target.turn_minutes) and is_dragged(target):
+            self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.render(self.program, block, layout, target)
         frame = self.frames[self.reading.frame[row]]
         self.end[rows] = frame.command(np.array(rendered.ends))
@@ -273,7 +276,17 @@ class _Emitter:
             inverse_time=moves.feed_mode[row] == FeedMode.INVERSE_TIME and modal != 0,
             code=modal if arc else straight,
             active_code=modal if self.replaced is None else self.replaced,
+            feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
+            turn_minutes=self._turn_minutes(row),
+            turn_by_feed=self.program.dialect.feed_of == "linear",
         )
+
+    def _turn_minutes(self, row: int) -> float:
+        """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
+        if self.program.dialect.feed_of == "all":
+            return float("nan")
+        own = self.program.templates[int(self.program.template[self.moves.block[row]])].slots
+        return minutes(self.moves, row, own_feed="F" in own)
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""

@@ -9,6 +9,7 @@ from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program,
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"
 MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
+PER_MINUTE = frozenset((94.0,))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
 CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
@@ -24,6 +25,7 @@ class Layout:
     turns     its P word
     feed      the F word
     motion    the G0..G3 word
+    feed_mode the G94 word
     after     words that act after the motion (M0, M1, M2, M30, M60, M99)
     words_at  where a missing axis word goes: after the last axis word
     code_at   where a missing motion code goes: before the first axis word
@@ -37,6 +39,7 @@ class Layout:
     turns: Word | None
     feed: Word | None
     motion: Word | None
+    feed_mode: Word | None
     after: tuple[Word, ...]
     words_at: Anchor
     code_at: Anchor
@@ -60,6 +63,7 @@ def layout_of(program: Program, block: int) -> Layout:
         turns=by_letter.get("P"),
         feed=by_letter.get("F"),
         motion=_coded(program, block, words, "G", MOTION_CODES),
+        feed_mode=_coded(program, block, words, "G", PER_MINUTE),
         after=tuple(word for word in words if _code(program, block, word, "M") in CODES_AFTER_MOTION),
         words_at=last.span.stop,
         code_at=first.span.start,

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
 from ncfix.program.tree import Constant, Literal, Program, Word
+from ncfix.program.turns import is_dragged, number, way
 
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
+INVERSE_TIME, PER_MINUTE = "93", "94"
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be stated anew: G0 to G3."""
 
@@ -45,6 +47,9 @@ class Target:
     inverse_time the block's F is the time of the block
     code         motion code the pieces need, tenths
     active_code  motion code in force before the block, as emitted
+    feed         the number after F that is in force, NaN where there is none
+    turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
+    turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
     """
 
     letters: tuple[str, ...]
@@ -66,6 +71,9 @@ class Target:
     inverse_time: bool
     code: int
     active_code: int
+    feed: float = float("nan")
+    turn_minutes: float = float("nan")
+    turn_by_feed: bool = False
 
 
 @dataclass(slots=True)
@@ -95,6 +103,7 @@ class BlockRenderer:
         self.added: list[str] = []
         self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
+        self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
 
     def render(self) -> Rendered:
         """Write the motion."""
@@ -104,6 +113,8 @@ class BlockRenderer:
         for piece in range(1, len(target.ends)):
             position = self._further_piece(position, piece)
             self.out.ends.append(position)
+        if self.dragged:
+            self._feed_as_before()
         self._move_late_words()
         if self.added:
             at = self.program.position(self.block, self.layout.words_at)
@@ -123,7 +134,9 @@ class BlockRenderer:
             else:
                 self._present_axis(position, column, end[column], word)
         self._arc_words(base, position)
-        if self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
+        if self.dragged:
+            self._time_of_turn(base, position)
+        elif self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
             self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
         return position
 
@@ -231,7 +244,7 @@ class BlockRenderer:
     def _further_piece(self, position: FloatArray, piece: int) -> FloatArray:
         target = self.target
         end = target.ends[piece]
-        position = position.copy()
+        begin, position = position, position.copy()
         words = []
         for column, letter in self.columns:
             if not abs(end[column] - position[column]) >= self.half[column]:
@@ -240,7 +253,9 @@ class BlockRenderer:
             text = f"{end[column] - base:.{target.decimals[column]}f}"
             words.append(self._cased(letter) + text)
             position[column] = base + float(text)
-        if target.inverse_time:
+        if self.dragged:
+            words.append(self._cased("F") + self._turn_feed(piece, begin, position))
+        elif target.inverse_time:
             words.append(self._cased("F") + f"{self._feed_share(piece):.{FEED_DECIMALS}f}")
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + (self.layout.blank).join(words))
@@ -249,6 +264,47 @@ class BlockRenderer:
     def _feed_share(self, piece: int) -> float:
         assert self.layout.feed is not None
         return self._value(self.layout.feed, np.nan) / float(self.target.shares[piece])
+
+    # -- turns of rotary axes alone -----------------------------------------------------------------------------------
+
+    def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
+        """State the time of a turn in its own block."""
+        if not self.target.turn_by_feed:
+            self._inverse_time()
+        feed, text = self.layout.feed, self._turn_feed(0, begin, end)
+        if feed is None:
+            self._add("F", text)
+        else:
+            self.out.edits.append((*self.program.span(self.block, feed.value_span), text))
+
+    def _inverse_time(self) -> None:
+        code = self.layout.feed_mode
+        if code is not None:
+            self.out.edits.append((*self.program.span(self.block, code.value_span), INVERSE_TIME))
+            return
+        at = self.program.position(self.block, self.layout.code_at)
+        self.out.edits.append((at, at, self._cased("G") + INVERSE_TIME + self.layout.blank))
+
+    def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
+        """The number after F with which a piece of a turn takes its share of the time."""
+        minutes = self.target.turn_minutes * float(self.target.shares[piece])
+        reach = way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
+        return number(reach / minutes) if reach > 0 else self._feed_in_force()
+
+    def _feed_in_force(self) -> str:
+        feed = self.layout.feed
+        if feed is not None and isinstance(feed.value, Literal):
+            return self.program.slice(self.block, feed.value_span)
+        return f"{self.target.feed:.6f}".rstrip("0")
+
+    def _feed_as_before(self) -> None:
+        """Back to the feed per minute that was in force, for the blocks that follow."""
+        words = [] if self.target.turn_by_feed else [self._cased("G") + PER_MINUTE]
+        words.append(self._cased("F") + self._feed_in_force())
+        prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
+        self.out.lines.append(prefix + self.layout.blank.join(words))
+
+    # -- what belongs after the motion --------------------------------------------------------------------------------
 
     def _move_late_words(self) -> None:
         """M0, M1, M2, M30 and their like act after the motion: with several pieces they go to the last."""
