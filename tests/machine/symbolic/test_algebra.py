@@ -30,7 +30,8 @@ def test_what_is_written_is_what_was_meant(expression: sp.Expr, numbers: tuple[f
     written = algebra.expression(algebra.poly(expression))
     at = dict(zip((A, B, L, M), numbers, strict=True))
     assert float((written - expression).subs(at)) == pytest.approx(0, abs=1e-9)
-    assert sp.count_ops(written) <= sp.count_ops(sp.expand(expression))
+    # Equal expressions have one form, which is not the shortest of each: sin^4 + cos^2 becomes 1 - sin^2 cos^2.
+    assert sp.count_ops(written) <= sp.count_ops(sp.expand(expression)) + 2
 
 
 @pytest.mark.parametrize(
