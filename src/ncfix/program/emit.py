@@ -279,6 +279,8 @@ class _Emitter:
             feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
             turn_minutes=self._turn_minutes(row),
             turn_by_feed=self.program.dialect.feed_of == "linear",
+            increments=frame.frame.increments,
+            rotary=tuple(moves.rotary.tolist()),
         )
 
     def _turn_minutes(self, row: int) -> float:

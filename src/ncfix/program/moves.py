@@ -74,12 +74,15 @@ class Frame:
     rotation  (3, 3) acts on X Y Z (G68, G10 R)
     unit      mm per program unit of linear words: 1.0 or 25.4
     diameter  X is programmed as a diameter (G7)
+    increments  what one unit of a number without a decimal point is worth, linear and rotary words, in those of a
+              number with one: 0.001 where the control counts least increments in such words
     """
 
     offset: NDArray[np.float64]
     rotation: NDArray[np.float64]
     unit: float
     diameter: bool = False
+    increments: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
 INVERSE_TIME, PER_MINUTE = "93", "94"
+LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be stated anew: G0 to G3."""
 
@@ -50,6 +51,8 @@ class Target:
     feed         the number after F that is in force, NaN where there is none
     turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
     turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
+    increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
+    rotary       (n_axes,) which axes turn
     """
 
     letters: tuple[str, ...]
@@ -74,6 +77,8 @@ class Target:
     feed: float = float("nan")
     turn_minutes: float = float("nan")
     turn_by_feed: bool = False
+    increments: tuple[float, float] = (1.0, 1.0)
+    rotary: tuple[bool, ...] = ()
 
 
 @dataclass(slots=True)
@@ -321,17 +326,26 @@ class BlockRenderer:
         if isinstance(word.value, Constant):
             return word.value.value
         if isinstance(word.value, Literal):
-            return float(self.program.values_of(self.block)[word.value.slot])
+            return float(self.program.values_of(self.block)[word.value.slot]) * self._increment(word)
         return otherwise
+
+    def _increment(self, word: Word) -> float:
+        """What the word's number counts: other than 1 only for a length or angle without a decimal point."""
+        if not (isinstance(word.value, Literal) and word.value.pointless):
+            return 1.0
+        if word.address in self.target.letters:
+            return self.target.increments[1 if self.target.rotary[self.target.letters.index(word.address)] else 0]
+        return self.target.increments[0] if word.address in LENGTHS else 1.0
 
     def _rewrite(self, word: Word, value: float, decimals: int) -> float:
         """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
         start, stop = self.program.span(self.block, word.value_span)
         literal = isinstance(word.value, (Literal, Constant))
         style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
-        text = style.write(value, decimals)
+        increment = self._increment(word)
+        text = style.write(value / increment, decimals if increment == 1.0 else 0)
         self.out.edits.append((start, stop, text))
-        return float(text)
+        return float(text) * increment
 
     def _remove(self, word: Word) -> None:
         start, stop = self.program.span(self.block, word.span)

@@ -104,7 +104,7 @@ class Builder:
         self._stretches: list[Stretch] = []
         self._styles: dict[Style, int] = {}
         self._reasons: dict[str, int] = {"": 0}
-        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool], int] = {}
+        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
 
     # -- what is shared -----------------------------------------------------------------------------------------------
@@ -117,9 +117,16 @@ class Builder:
         """The index of a reason."""
         return self._reasons.setdefault(text, len(self._reasons))
 
-    def frame(self, offset: Vector, rotation: Rotation, unit: float, diameter: bool) -> int:
+    def frame(
+        self,
+        offset: Vector,
+        rotation: Rotation,
+        unit: float,
+        diameter: bool,
+        increments: tuple[float, float] = (1.0, 1.0),
+    ) -> int:
         """The index of a frame; `offset` has one number per letter."""
-        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter)
+        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter, increments)
         return self._frames.setdefault(key, len(self._frames))
 
     # -- motions ------------------------------------------------------------------------------------------------------
@@ -190,8 +197,8 @@ class Builder:
 
     def _frame_table(self) -> tuple[Frame, ...]:
         return tuple(
-            Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter)
-            for offset, rotation, unit, diameter in self._frames
+            Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
+            for offset, rotation, unit, diameter, increments in self._frames
         )
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -81,6 +81,7 @@ class Control:
     shaky      letter index -> why the offset of the letter is not known
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force
+    increments what a number without a decimal point counts, linear and rotary words
     saved      the modal states that M70 saved, one place for each call level
     """
 
@@ -110,6 +111,7 @@ class Control:
         self.foreign: dict[str, Message] = {}
         self.refusal = ""
         self.suspended: dict[str, str] = {}
+        self.increments = (1.0, 1.0)
         self.external = ""
         self.tcp = setup.tcp
         self.shaky: Unknown = {}
@@ -150,9 +152,10 @@ class Control:
         centre = offsets.centre
         if offsets.rotation is not IDENTITY:
             turned = rotated(offsets.rotation, centre)
-            inner = [s + c - t for s, c, t in zip(offsets.shift, centre, turned, strict=True)]
+            parts = zip(offsets.shift, centre, turned, offsets.feature, strict=True)
+            inner = [s + c - t + f for s, c, t, f in parts]
         else:
-            inner = offsets.shift
+            inner = [s + f for s, f in zip(offsets.shift, offsets.feature, strict=True)]
         outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
         tool = zeros() if self.tcp else offsets.tool
         self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
@@ -168,7 +171,9 @@ class Control:
     def frame(self) -> int:
         """The index of the frame that is in force."""
         if self._frame < 0:
-            self._frame = self.builder.frame(self.offset, self.rotation, self.modal.unit, self.modal.diameter)
+            self._frame = self.builder.frame(
+                self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
+            )
         return self._frame
 
     def program_position(self) -> Vector:

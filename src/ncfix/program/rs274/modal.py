@@ -80,8 +80,8 @@ class Saved:
 class Offsets:
     """What lies between a program's numbers and commands, mm and rad, each a position in the order of `LETTERS`.
 
-    `command = origin + tool + turn @ (shift + centre + rotation @ (program - centre))`, `turn` that of the work offset
-    (G10 R) and `rotation` that of G68.
+    `command = origin + tool + turn @ (shift + feature + centre + rotation @ (program - centre))`, `turn` that of the
+    work offset (G10 R), `rotation` that of G68, or of the tilted plane (G68.2) whose origin is `feature`.
     """
 
     origin: Vector = field(default_factory=zeros)
@@ -89,4 +89,5 @@ class Offsets:
     shift: Vector = field(default_factory=zeros)
     tool: Vector = field(default_factory=zeros)
     centre: Vector = field(default_factory=zeros)
+    feature: Vector = field(default_factory=zeros)
     rotation: Rotation = IDENTITY
