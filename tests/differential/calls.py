@@ -83,7 +83,7 @@ def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[
     given, after = _feed_of(fixed)
     old, new = _length(original), _length(fixed)
     pace, paces = _pace(original, wanted), _pace(fixed, given)
-    turns = np.linalg.norm((original.end - original.start)[:, :3], axis=1) < 1e-9
+    turns = (np.linalg.norm((original.end - original.start)[:, :3], axis=1) < 1e-9) & (old > 0)
     for k, (first, last) in enumerate(zip(segments.first, segments.last, strict=True)):
         if segments.fate[k] in (Fate.WRONG, Fate.CONTOUR) or original.kind[k] == RAPID:
             continue

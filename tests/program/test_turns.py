@@ -1,0 +1,98 @@
+"""Turns of rotary axes whose correction moves linear axes: they take as long as before."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from ncfix.program.emit import emit
+from ncfix.program.moves import FeedMode, Kind, Moves
+from ncfix.program.pieces import Pieces
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+from ncfix.program.trace import trace
+from ncfix.program.tree import Program
+from ncfix.program.turns import UNTIMED
+from ncfix.program.writer import apply
+
+AXES = ("X", "Y", "Z", "A")
+STEP = np.array([0.001, 0.001, 0.001, np.deg2rad(0.001)])
+HEAD = "G0 X10 Y0 Z0 A0\n"
+
+
+def traced(text: str, dialect: str) -> tuple[Program, Moves]:
+    program = read((HEAD + text + "M2\n").encode(), "test.ngc", dialect)
+    return program, trace(program, Setup(assume_zero=True), AXES, frozenset("A")).moves
+
+
+def corrected(text: str, dialect: str, pieces: int = 1, shift: float = 0.02) -> tuple[str, dict[int, str]]:
+    """The text with every turn shifted along Y in proportion to its angle, in so many pieces."""
+    program, moves = traced(text, dialect)
+    move = np.repeat(np.arange(len(moves)), pieces)
+    fraction = np.tile(np.arange(1, pieces + 1) / pieces, len(moves))
+    end = moves.start[move] + fraction[:, None] * (moves.end - moves.start)[move]
+    end[:pieces] = moves.end[0]
+    end[:, 1] += shift * end[:, 3] / np.deg2rad(90)
+    first = (move > 0) | (fraction == 1)
+    n = int(first.sum())
+    columns = Pieces(
+        move[first], fraction[first], end[first], np.zeros(n, bool), np.full((n, 3), np.nan), np.zeros(n, bool)
+    )
+    emission = emit(program, moves, columns, STEP)
+    return apply(program.source, emission.edits).decode()[len(HEAD) :], emission.conflicts
+
+
+def minutes(text: str, dialect: str) -> float:
+    """The time of the motions at feed, by LinuxCNC's rule: F is the speed of X Y Z where they move, else of A."""
+    _, moves = traced(text.removesuffix("M2\n"), dialect)
+    rows = np.flatnonzero(moves.kind == Kind.FEED)
+    way = moves.end[rows] - moves.start[rows]
+    linear, turn = np.linalg.norm(way[:, :3], axis=1), np.abs(np.rad2deg(way[:, 3]))
+    inverse = moves.feed_mode[rows] == FeedMode.INVERSE_TIME
+    length = np.where(inverse, 1.0, np.where(linear > 0, linear, turn))
+    return float(np.sum(length / moves.feed[rows]))
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso"])
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_a_turn_takes_as_long_as_before(dialect: str, pieces: int) -> None:
+    text = "G1 A90 F450\nX12\nA0\n"
+    after, conflicts = corrected(text, dialect, pieces)
+    assert not conflicts
+    assert after.count("A") == 2 * pieces
+    assert minutes(after, dialect) == pytest.approx(minutes(text, dialect), rel=1e-4)  # F has six digits; X2 its own
+
+
+def test_where_the_control_goes_by_linear_axes_f_is_theirs() -> None:
+    assert corrected("G1 A90 F450 M8\nX12\n", "linuxcnc") == ("G1 A90 Y0.020 F0.100000 M8\nF450\nX12\nM2\n", {})
+
+
+def test_where_that_is_not_known_the_time_itself_is_written() -> None:
+    assert corrected("/g94 g1 a90 f450\nx12\n", "iso") == (
+        "/g93 g1 a90 y0.020 f5.00000\n/g94 f450\nx12\nm2\n".replace("m2", "M2"),
+        {},
+    )
+
+
+def test_what_acts_after_the_motion_stays_after_it() -> None:
+    text, _ = corrected("G1 A90 F450 M1\n", "linuxcnc", pieces=2)
+    assert re.search(r"\nF450 M1\n", text)
+
+
+def test_a_turn_that_needs_no_linear_motion_stays_as_it_is() -> None:
+    assert corrected("G1 A90 F450\n", "iso", shift=0.0004) == ("G1 A90 F450\nM2\n", {})
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["G95 S100 M3 G1 A90 F1\n", "F450\nG20\nG1 A90\n", "#1=450\nG1 A90 F[#1]\nG20\nX1 F1\n"],
+)
+def test_a_turn_of_unknown_time_is_not_written(text: str) -> None:
+    _, conflicts = corrected(text, "linuxcnc")
+    assert list(conflicts.values()) == [UNTIMED]
+
+
+def test_a_turn_in_inverse_time_keeps_its_time_by_itself() -> None:
+    assert corrected("G93 G1 A90 F5\n", "iso") == ("G93 G1 A90 Y0.020 F5\nM2\n", {})
