@@ -24,6 +24,7 @@ VERBS = (
     "simulate",
     "plan",
     "calibrate",
+    "diagnose",
     "export",
     "emulate",
     "derive",

@@ -1,0 +1,63 @@
+"""`ncfix diagnose`: why a machine disagrees with its model."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import force_option, json_option, load_machine, machine_option
+from ncfix.cli.targets import read, shown, targets
+from ncfix.diagnostics import ExitCode
+
+if TYPE_CHECKING:
+    from ncfix.diagnose.diagnosis import Diagnosis
+
+
+@click.command()
+@click.argument("measured", nargs=-1, required=True)
+@machine_option
+@click.option("-o", "--output", metavar="FILE", help="Where to write the machine with the effects added (TOML).")
+@click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered; repeatable.")
+@click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
+@force_option
+@json_option
+def diagnose(
+    measured: tuple[str, ...],
+    machine_path: str,
+    output: str | None,
+    without: tuple[str, ...],
+    check: bool,
+    force: bool,
+    as_json: bool,
+) -> int:
+    """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
+    from ncfix.diagnose import result, words
+    from ncfix.diagnose.diagnosis import NOTHING
+    from ncfix.diagnose.diagnosis import diagnose as diagnosed
+    from ncfix.machine import dumps
+    from ncfix.measure.reader import reads
+
+    target = targets([measured[0]], output, False, force, (machine_path, *measured[1:]))[0] if output else None
+    machine = load_machine(machine_path)
+    data = [reads(read(path), machine, shown(path)) for path in measured]
+    for each in data:
+        console.tell_some(each.remarks)
+    with console.busy("diagnosing"):
+        found = diagnosed(data, machine, without)
+    written = None
+    if target is not None and found.machine is not None:
+        target.write(dumps(result.with_provenance(found)).encode())
+        written = target.path
+    if as_json:
+        console.put_json(**result.as_dict(found, written))
+    else:
+        console.put(words.text(found))
+        _say_written(found, output, written)
+    return ExitCode.FINDINGS if check and found.verdict != NOTHING else ExitCode.DONE
+
+
+def _say_written(found: Diagnosis, output: str | None, written: str | None) -> None:
+    if output and written is None:
+        console.say("no machine file was written: there is nothing to add to the model")

@@ -1,0 +1,131 @@
+"""The named effects in the model: all coefficients fitted together, and the machine file that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from ncfix.diagnose.background import SHARES
+from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.groups import Group
+from ncfix.machine import Effect, Machine
+from ncfix.machine.basis import Basis
+from ncfix.machine.smooth import Fourier, Polynomial
+from ncfix.measure.measurement import Array
+
+WIDE = 1e3
+"""um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
+NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Everything fitted at once.
+
+    constants   (k,) changes of the free constants of the machine file
+    numbers     for each member (p,) the numbers behind its coefficients; `covariances` of them
+    shown       for each member (m,) what it shows, um
+    before      (m,) residual with the constants alone; after with the members
+    """
+
+    constants: Array
+    numbers: tuple[Array, ...]
+    covariances: tuple[Array, ...]
+    shown: tuple[Array, ...]
+    before: Array
+    after: Array
+
+    def only(self, chosen: Sequence[int]) -> Joint:
+        """The same with some of the members; what they are stays as it was fitted with all."""
+        parts = (tuple(each[k] for k in chosen) for each in (self.numbers, self.covariances, self.shown))
+        return Joint(self.constants, *parts, self.before, self.after)
+
+
+def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:
+    """The most probable coefficients of constants and members together, and the residuals."""
+    view, free = court.background.view, court.background.view.base
+    covariance = court.background.covariance(share)
+    base, widths = free / _lengths(free), [court.groups[m.group].columns.shape[1] for m in members]
+    columns = np.concatenate([base, *(court.groups[m.group].columns for m in members)], axis=1)
+    prior = np.concatenate(
+        [np.full(base.shape[1], WIDE**-2), *(np.full(w, m.size**-2) for m, w in zip(members, widths, strict=True))]
+    )
+    factor = cho_factor(covariance)
+    z, spread = _solved(columns, view.y, factor, prior)
+    alone, _ = _solved(base, view.y, factor, prior[: base.shape[1]])
+    ends = base.shape[1] + np.cumsum([0, *widths])
+    parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    numbers = tuple(z[part] for part in parts)
+    shown = tuple(court.groups[m.group].columns @ n for m, n in zip(members, numbers, strict=True))
+    k = view.problem.design.shape[1]
+    constants = (z[: base.shape[1]] / _lengths(free))[base.shape[1] - k :]
+    return Joint(
+        constants, numbers, tuple(spread[p, p] for p in parts), shown, view.y - base @ alone, view.y - columns @ z
+    )
+
+
+def _lengths(columns: Array) -> Array:
+    """Sizes of columns as root mean squares, one for those that are zero."""
+    size = np.sqrt((columns**2).mean(axis=0))
+    return np.where(size > 0, size, 1.0)
+
+
+def _solved(columns: Array, y: Array, factor: tuple[Array, bool], prior: Array) -> tuple[Array, Array]:
+    weighed = cho_solve(factor, columns)
+    spread = np.linalg.inv(columns.T @ weighed + np.diag(prior))
+    return spread @ (weighed.T @ y), spread
+
+
+def likeliest_share(null: Array) -> float:
+    """The share of everything that the members leave."""
+    return SHARES[int(null.argmax())]
+
+
+def machine_with(court: Court, members: Sequence[Member], joint: Joint) -> tuple[Machine, list[tuple[Effect, ...]]]:
+    """The machine with constants changed and effects added; and the effects that each member brought."""
+    view = court.background.view
+    coefficients = view.estimate.coefficients + joint.constants
+    machine = view.problem.selection.machine(view.machine, coefficients.tolist())
+    added = [
+        effects(court.groups[m.group], numbers, spread)
+        for m, numbers, spread in zip(members, joint.numbers, joint.covariances, strict=True)
+    ]
+    every = (*machine.effects, *(effect for each in added for effect in each))
+    return machine.replace(effects=every), added
+
+
+def effects(group: Group, numbers: Array, spread: Array) -> tuple[Effect, ...]:
+    """The effects of a form with their coefficients, without those that are zero."""
+    values = group.loading @ numbers
+    covariance = group.loading @ spread @ group.loading.T
+    found, start = [], 0
+    for effect in group.owner.effects:
+        part = slice(start, start + effect.basis.size)
+        start = part.stop
+        own = np.abs(group.loading[part]).sum(axis=1) > NOTHING * np.abs(group.loading).sum()
+        if own.any():
+            found.append(_trimmed(effect, values[part], covariance[part, part], own))
+    return tuple(found)
+
+
+def _trimmed(effect: Effect, values: Array, covariance: Array, own: Array) -> Effect:
+    """The effect with its coefficients; orders and powers that the form does not have are left out."""
+    basis, keep = _fewer(effect.basis, own)
+    even = (covariance + covariance.T)[np.ix_(keep, keep)] / 2
+    return replace(
+        effect, basis=basis, coefficients=tuple(float(v) for v in values[keep]),
+        covariance=tuple(tuple(float(v) for v in row) for row in even),
+    )  # fmt: skip
+
+
+def _fewer(basis: Basis, own: Array) -> tuple[Basis, Array]:
+    if isinstance(basis, Fourier):
+        pairs = own.reshape(-1, 2).any(axis=1)
+        orders = tuple(k for k, kept in zip(basis.order, pairs, strict=True) if kept)
+        return replace(basis, order=orders), np.repeat(pairs, 2)
+    if isinstance(basis, Polynomial):
+        return replace(basis, degree=tuple(k for k, kept in zip(basis.degree, own, strict=True) if kept)), own
+    return basis, np.ones(len(own), dtype=bool)

@@ -1,0 +1,44 @@
+"""Shapes: bases with priors on their coefficients. A curve is smooth, harmonics decay, play grows along the travel."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from ncfix.machine.piecewise import Spline
+from ncfix.measure.measurement import Array
+
+PIECES = 14
+"""Pieces of a spline over what was measured: bends down to a seventh of the travel."""
+SMOOTH = (0.18, 0.4, 0.9)
+"""Distances, of half the travel, over which a curve bends: wear, a scale's or guide's own shape, a bow."""
+HARMONICS = (1.0, 0.5, 0.2, 0.1)
+"""Variance of the orders of an error that repeats with a turn."""
+LOST = (1.0, 0.15, 0.1)
+"""Variance of play: constant, growing, bowed along the travel."""
+
+
+@lru_cache(maxsize=64)
+def spline(low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Spline:
+    """Cubic pieces over low ... high of u."""
+    inner = np.linspace(low, high, pieces + 1)
+    knots = (low,) * 3 + tuple(float(x) for x in inner) + (high,) * 3
+    return Spline(knots=knots)
+
+
+@lru_cache(maxsize=64)
+def smooth(length: float, low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Array:
+    """The loading of a spline that is a Gaussian process of this length, (k, k)."""
+    knots = np.asarray(spline(low, high, pieces).knots)
+    places = np.array([knots[i + 1 : i + 4].mean() for i in range(pieces + 3)])
+    apart = (places[:, None] - places) / length
+    values, vectors = np.linalg.eigh(np.exp(-0.5 * apart**2))
+    kept = values > 1e-5 * values[-1]
+    loading: Array = vectors[:, kept] * np.sqrt(values[kept])
+    return loading
+
+
+def harmonics(count: int = 4) -> tuple[float, ...]:
+    """Variances of cos and sin of the first orders."""
+    return tuple(v for v in HARMONICS[:count] for _ in range(2))

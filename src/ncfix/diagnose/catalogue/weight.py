@@ -1,0 +1,224 @@
+"""What weight and load do: sag, droop, nod, tilt. Rows 28 to 36 of the catalogue.
+
+A beam that sags turns what rides on it: the deflection f and its slope f' are one effect with one size. Which way is
+down is not in a machine file, so every way across an axis is a form of the effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
+from ncfix.machine import Effect
+from ncfix.machine.axis import Axis
+from ncfix.machine.effect import SPINDLE
+from ncfix.machine.smooth import Fourier, Polynomial
+from ncfix.measure.measurement import Array
+
+POWERS = (0, 1, 2, 3, 4)
+FOOT = 30.0
+"""mm: how far the point about which a sagging slide turns lies from the reference point stated."""
+LOAD = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
+BOW = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, 0, 0.3]])
+"""Columns: u^2, u^3, u^4 with their sizes: a bed between its supports."""
+FREE_END = np.array([[1, 0.3], [2, 0.9], [1, 0.9], [0, 0.3], [0, 0]])
+"""Columns: (1 + u)^2 and (1 + u)^3, a beam that is longer the further it is out."""
+MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0])
+
+
+def candidates(reach: Reach) -> Iterator[Candidate]:
+    """All of them."""
+    for axis in reach.linear:
+        yield from _beam(reach, axis)
+        yield from _nod(reach, axis)
+        yield _foundation(reach, axis)
+    for axis in reach.rotary:
+        if along(axis) is not None:
+            yield _table(axis)
+            yield from _unbalanced(reach, axis)
+            yield _sag(reach, axis)
+            yield from _twist(reach, axis)
+    yield from _droop(reach)
+
+
+def _beam(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+    q, family = axis.name, f"{axis.name} weight"
+    sorts = [("bed sag", f"bed of {q} sags under the slide", (BOW,), "re-level the bed")]
+    if not axis.workpiece_side:
+        forms = (FREE_END, MIRROR @ FREE_END)
+        sorts.append(("ram droop", f"ram droop: {q} hangs the further it is out", forms, "a counterweight, or tables"))
+    own = along(axis)
+    if own is None:
+        return
+    for kind, title, forms, remedy in sorts:
+        effects, loadings = _deflected(reach, axis, own, forms)
+        yield Candidate(f"{kind} {q}", title, q, family, effects, loadings, (), remedy)
+
+
+def _deflected(
+    reach: Reach, axis: Axis, own: int, forms: tuple[Array, ...]
+) -> tuple[tuple[Effect, ...], tuple[Array, ...]]:
+    """Shift across, its slope as a tilt, and the small shifts of a tilt about another point."""
+    span = reach.scaled(axis)
+    effects: list[Effect] = []
+    parts: list[list[Array]] = []
+    basis = Polynomial(degree=POWERS)
+    for way in across(axis):
+        turn = ({0, 1, 2} - {own, way}).pop()
+        pair = np.zeros((2, 3))
+        pair[0, :] = np.asarray(axis.error_axes[own]) * (np.asarray(axis.direction) @ np.asarray(axis.error_axes[own]))
+        pair[1, :] = axis.error_axes[way]
+        sign = float(np.cross(pair[0], pair[1]) @ np.asarray(axis.error_axes[turn]))
+        effects += [Effect(f"E{LETTERS[way]}{axis.name}", (), basis, **span)]
+        effects += [Effect(f"E{TURNS[turn]}{axis.name}", (), basis, **span)]
+        effects += [Effect(f"E{LETTERS[k]}{axis.name}", (), basis, **span) for k in (own, way)]
+        parts.append([_sloped(form, sign / span["scale"]) for form in forms])
+    zeros = np.zeros((4 * len(POWERS), 0))
+    loadings = [stacked(each, zeros) for each in parts[0]] + [stacked(zeros, each) for each in parts[1]]
+    return zero(effects), tuple(loadings)
+
+
+def _sloped(form: Array, factor: float) -> Array:
+    """The loading of [f, f', shifts of a foot elsewhere] for f with these columns of powers."""
+    slope = np.zeros_like(form)
+    slope[:-1] = factor * form[1:] * np.arange(1, len(form))[:, None]
+    both = np.concatenate([form, slope])
+    return stacked(both, FOOT * slope, FOOT * slope)
+
+
+def _nod(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+    """A slide tilts by where another one is, the more the further out it is itself."""
+    others = [each for each in reach.linear if each is not axis and each.workpiece_side == axis.workpiece_side]
+    others = others or [each for each in reach.linear if each is not axis]
+    effects, count = [], 0
+    for other in others:
+        for turn in TURNS:
+            common = reach.scaled(axis) | reach.factor(other)
+            for name in (
+                f"E{turn}{axis.name}",
+                *(f"E{x}{axis.name}" for x in LETTERS if TURNS[LETTERS.index(x)] != turn),
+            ):
+                effects.append(Effect(name, (), Polynomial(degree=(1, 2)), **common))  # type: ignore[arg-type]
+            count += 1
+    if not effects:
+        return
+    one = stacked(weighed((1.0, 0.1)), FOOT * weighed((1.0, 0.1)), FOOT * weighed((1.0, 0.1)))
+    loadings = tuple(_placed(one, k, count) for k in range(count))
+    title = f"column nod: {axis.name} tilts under a weight that moves, by the product of two positions"
+    yield Candidate(
+        f"column nod {axis.name}", title, axis.name, f"{axis.name} weight", zero(effects), loadings, (),
+        "compensate with a table over both positions",
+    )  # fmt: skip
+
+
+def _placed(block: Array, index: int, count: int) -> Array:
+    """One block of several, the others zero."""
+    whole = np.zeros((count * block.shape[0], block.shape[1]))
+    whole[index * block.shape[0] : (index + 1) * block.shape[0]] = block
+    return whole
+
+
+def _foundation(reach: Reach, axis: Axis) -> Candidate:
+    """The whole of one branch tilts against the other as the slide's mass moves; the pivot stays where it is."""
+    basis = Polynomial(degree=(1, 2))
+    held = by_foundation(reach)
+    span = reach.scaled(axis)
+    effects = [Effect(f"E{turn}0{held.name}", (), basis, input=axis.name, carried=True, **span) for turn in TURNS]
+    loading = weighed((1.0, 0.15) * 3)
+    title = f"foundation or frame tilts as {axis.name} moves"
+    return Candidate(
+        f"foundation tilt {axis.name}", title, axis.name, f"{axis.name} weight", zero(effects), (loading,), (),
+        "check levelling feet and anchors",
+    )  # fmt: skip
+
+
+def by_foundation(reach: Reach) -> Axis:
+    """An axis next to the foundation, on the tool's side if there is one."""
+    axes = reach.machine.axes
+    tool = [axis for axis in axes if not axis.workpiece_side]
+    return tool[0] if tool else axes[-1]
+
+
+def _table(axis: Axis) -> Candidate:
+    """A table that is softer one way than the other: a tilt twice a turn whose direction turns along."""
+    first, second = across(axis)
+    effects = zero([Effect(f"E{TURNS[k]}{axis.name}", (), Fourier(order=(2,))) for k in (first, second)])
+    turning = np.array([[1, 0], [0, 1], [0, -1], [1, 0]], dtype=np.float64)
+    back = np.array([[1, 0], [0, 1], [0, 1], [-1, 0]], dtype=np.float64)
+    title = f"table of {axis.name} is softer one way: table stiffness differs, twice a turn"
+    return Candidate(
+        f"table stiffness {axis.name}", title, axis.name, f"{axis.name} turning", effects, (turning, back), (),
+        "place the load in the middle",
+    )  # fmt: skip
+
+
+def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+    """The load's weight turns the axis, once a turn and in proportion to the mass."""
+    own = along(axis)
+    if own is None or "load_kg" not in reach.columns:
+        return
+    effects = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Fourier(order=(1,)), **LOAD)])  # type: ignore[arg-type]
+    title = f"unbalanced load on {axis.name}: its weight turns the axis"
+    yield Candidate(
+        f"unbalanced load {axis.name}", title, axis.name, f"{axis.name} weight", effects, (np.eye(2),), ("load_kg",),
+        "balance the load",
+    )  # fmt: skip
+
+
+def _sag(reach: Reach, axis: Axis) -> Candidate:
+    """A swivelling body sags by its own weight and its load, as the sine and cosine of the angle."""
+    first, second = across(axis)
+    own = along(axis) or 0
+    wave = Fourier(order=(1,))
+    loaded = [{}, LOAD] if "load_kg" in reach.columns else [{}]
+    forms = ((TURNS[own],), (LETTERS[first], LETTERS[second]), (TURNS[first], TURNS[second]), (LETTERS[own],))
+    names = [f"E{letter}{axis.name}" for form in forms for letter in form]
+    effects = zero([Effect(name, (), wave, **state) for state in loaded for name in names])  # type: ignore[arg-type]
+    loadings, at = [], 0
+    for form in forms:
+        size = np.zeros((len(loaded), len(names), 2))
+        size[:, at : at + len(form)] = 1.0
+        if len(loaded) == 2:
+            size[0] *= 0.3
+        columns = np.diag(size.ravel())
+        loadings.append(columns[:, columns.any(axis=0)])
+        at += len(form)
+    title = f"gravity sag of {axis.name}: its body hangs, as sine and cosine of the angle, with the load"
+    return Candidate(
+        f"gravity sag {axis.name}", title, axis.name, f"{axis.name} weight", effects, tuple(loadings),
+        ("load_kg",) if len(loaded) == 2 else (), "",
+    )  # fmt: skip
+
+
+def _twist(reach: Reach, axis: Axis) -> Iterator[Candidate]:
+    """Driven from one side, a trunnion twists: its angle lags the more the further along it one looks."""
+    own = along(axis)
+    line = np.abs(np.asarray(axis.direction))
+    others = [each for each in reach.linear if line @ np.abs(np.asarray(each.direction)) > 0.3]
+    if own is None or not others:
+        return
+    name = f"E{TURNS[own]}{axis.name}"
+    loaded = "load_kg" in reach.columns
+    effects = zero([Effect(name, (), Fourier(order=(1,)), **reach.factor(other)) for other in others])  # type: ignore[arg-type]
+    title = f"trunnion twist of {axis.name}: driven from one side, the angle lags along the axis"
+    yield Candidate(
+        f"trunnion twist {axis.name}", title, axis.name, f"{axis.name} weight", effects,
+        (weighed((1.0,) * 2 * len(effects)),), ("load_kg",) if loaded else (), "drive from both sides",
+    )  # fmt: skip
+
+
+def _droop(reach: Reach) -> Iterator[Candidate]:
+    """Tool and holder hang by their weight; seen where the tool's way to the weight changes."""
+    heads = [axis for axis in reach.rotary if not axis.workpiece_side]
+    if "tool_length" not in reach.columns or not heads:
+        return
+    long = {"times": "tool_length", "times_center": 0.0, "times_scale": 100.0}
+    tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
+    names = [f"E{TURNS[k]}{SPINDLE}" for k in range(3) if k != tool]
+    wave = Fourier(order=(1,))
+    effects = zero([Effect(n, (), wave, input=head.name, **long) for head in heads for n in names])  # type: ignore[arg-type]
+    loading = weighed((1.0,) * 2 * len(effects))
+    title = "tool droop: tool and holder hang by their weight as the head turns"
+    yield Candidate("tool droop", title, "", "spindle", effects, (loading,), ("tool_length",), "a stiffer holder")

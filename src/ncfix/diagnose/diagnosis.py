@@ -1,0 +1,223 @@
+"""The whole way from measurements and a machine to a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnose import addition, checks, gapmap, holdout, mistakes, noise, outliers
+from ncfix.diagnose.background import Background, background
+from ncfix.diagnose.catalogue import Candidate, catalogue, without
+from ncfix.diagnose.evidence import Court
+from ncfix.diagnose.groups import Gathered, gather
+from ncfix.diagnose.rivals import rivals, scaled
+from ncfix.diagnose.selection import UNNAMED, Selected, aliases, select
+from ncfix.diagnose.view import View, view
+from ncfix.machine import Effect, Machine
+from ncfix.measure.measurement import Array, Measurement
+
+NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
+MATERIAL_UM = 0.8
+"""An effect that moves the tool tip by less is not worth a name."""
+MOSTLY = 0.5
+"""Share of the largest named effect from which on an unknown one decides the verdict."""
+LACKING = 0.01
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One named effect.
+
+    candidate   what it is
+    odds        log odds against its not being there, given the others; p_value by chance for any name
+    aliases     names that explain its part nearly as well
+    size_um     rms of what it shows
+    effects     as they stand in the machine file; empty for what belongs to the measurement
+    shown       (m,) what it shows, um
+    """
+
+    candidate: Candidate
+    odds: float
+    p_value: float
+    aliases: tuple[str, ...]
+    size_um: float
+    effects: tuple[Effect, ...]
+    shown: Array
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Root mean square of residual lengths, um: before, after, the noise floor, and the first two on held-out poses."""
+
+    before: float
+    after: float
+    floor: float
+    holdout_before: float
+    holdout_after: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found, and everything a report needs.
+
+    verdict      nothing-missing, found, ambiguous, unknown-effect
+    findings     likeliest first
+    unknown_um   rms of what has no name, and `unknown_kind` what it depends on
+    machine      with the findings added, or None if there is nothing to add
+    p_lack       probability of the residuals before by chance; p_left after
+    """
+
+    verdict: str
+    findings: tuple[Finding, ...]
+    unknown_um: float
+    unknown_kind: str
+    gap: Gap
+    floor: noise.Floor
+    machine: Machine | None
+    patterns: tuple[gapmap.Pattern, ...]
+    clustering: tuple[float, float]
+    outlying: NDArray[np.bool_]
+    p_lack: float | None
+    p_left: float | None
+    view: View
+    gathered: Gathered
+    considered: tuple[Candidate, ...]
+    unheard_of: tuple[str, ...]
+    selected: Selected | None = None
+    before: Array = field(default_factory=lambda: np.zeros(0))
+    after: Array = field(default_factory=lambda: np.zeros(0))
+    mistake: mistakes.Mistake | None = None
+    court: Court | None = None
+
+
+def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Diagnosis:
+    """Compare, name, add, and show how far the gap shrank. `refused` are names that must not be used.
+
+    Raises `UsageError` NCF630, NCF637 and NCF650 ... NCF659 where the data cannot carry a diagnosis.
+    """
+    checks.before(measurements, machine)
+    wrong = mistakes.find(measurements, machine, refused)
+    if wrong is not None:
+        measurements, machine = wrong.measurements, wrong.machine
+    seen = view(measurements, machine)
+    candidates, unheard_of = without(catalogue(seen.reach), refused)
+    gathered = gather(seen, candidates)
+    ground, outlying = _ground(seen, gathered)
+    checks.after(seen, ground, gathered)
+    court = Court(ground, (*gathered.groups, *rivals(seen)))
+    selected = _gated(court, select(court))
+    found = _concluded(court, selected, gathered, candidates, outlying, unheard_of)
+    return mistakes.told(found, wrong) if wrong else found
+
+
+def _ground(seen: View, gathered: Gathered) -> tuple[Background, NDArray[np.bool_]]:
+    """The background, outliers put aside."""
+    rough = background(seen, gathered.groups, seen.relative, wanders=False)
+    relative, outlying = outliers.weighed(rough)
+    return background(seen, gathered.groups, relative), outlying
+
+
+def _gated(court: Court, selected: Selected) -> Selected:
+    """Without the members that do not predict held-out poses, or that are too small to matter."""
+    while selected.members:
+        members = list(selected.members.values())
+        share = addition.likeliest_share(court.heard(members).null)
+        held = holdout.held_out(court, members, share)
+        joint = addition.fitted(court, members, share)
+        names = list(selected.members)
+        failed = [
+            name
+            for k, name in enumerate(names)
+            if not _passes(holdout.gain(held, held.less[k])) or court.background.view.rms(joint.shown[k]) < MATERIAL_UM
+        ]
+        if not failed:
+            break
+        weakest = min(failed, key=lambda name: selected.odds[name])
+        selected = selected.without(weakest, court)
+    return selected
+
+
+def _passes(gain: tuple[float, float]) -> bool:
+    mean, error = gain
+    return mean > error
+
+
+def _concluded(
+    court: Court,
+    selected: Selected,
+    gathered: Gathered,
+    candidates: tuple[Candidate, ...],
+    outlying: NDArray[np.bool_],
+    unheard_of: tuple[str, ...],
+) -> Diagnosis:
+    ground, seen = court.background, court.background.view
+    members = list(selected.members.values())
+    null = court.heard(members).null
+    share = addition.likeliest_share(null)
+    joint = addition.fitted(court, members, share)
+    keep = ~outlying[np.maximum(seen.row, 0)] & (seen.row >= 0)
+    sigma = _sigma(court, selected, share)
+    floor = noise.floor(seen, ground, sigma, keep)
+    named = [(name, k) for k, name in enumerate(selected.members) if name not in UNNAMED]
+    machine, added = addition.machine_with(court, [members[k] for _, k in named], joint.only([k for _, k in named]))
+    findings = tuple(
+        Finding(
+            court.groups[members[k].group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
+            tuple(aliases(selected, name)), seen.rms(joint.shown[k], keep), effects, joint.shown[k],
+        )
+        for (name, k), effects in zip(named, added, strict=True)
+    )  # fmt: skip
+    rest = [k for k, name in enumerate(selected.members) if name in UNNAMED]
+    unknown = sum((joint.shown[k] for k in rest), np.zeros(len(seen.y)))
+    unknown_um = seen.rms(unknown, keep) if rest else 0.0
+    held = holdout.held_out(court, members, share)
+    known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
+    parameters = float(np.linalg.matrix_rank(seen.base))
+    after = joint.after + unknown
+    return Diagnosis(
+        verdict=_verdict(findings, unknown_um),
+        findings=findings,
+        unknown_um=unknown_um,
+        unknown_kind=" and ".join(court.groups[members[k].group].owner.title for k in rest),
+        gap=Gap(
+            seen.rms(joint.before, keep), seen.rms(after, keep), _length(seen, keep, floor.sigma_um),
+            seen.rms(held.without, known), seen.rms(_with_unknown_left(held, joint, unknown), known),
+        ),
+        floor=floor,
+        machine=machine if any(added) else None,
+        patterns=tuple(gapmap.patterns(ground, sigma)),
+        clustering=tuple(gapmap.clustering(ground, each, scaled(seen)) for each in (joint.before, after)),  # type: ignore[arg-type]
+        outlying=outlying,
+        p_lack=noise.lack_of_fit(floor, joint.before[keep], parameters),
+        p_left=noise.lack_of_fit(floor, joint.after[keep], parameters + sum(len(n) for n in joint.numbers) / 2),
+        view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
+        before=joint.before, after=after, court=court,
+    )  # fmt: skip
+
+
+def _with_unknown_left(held: holdout.HeldOut, joint: addition.Joint, unknown: Array) -> Array:
+    """Errors on held-out poses; what has no name is not predicted by the machine file."""
+    return held.with_all + unknown
+
+
+def _sigma(court: Court, selected: Selected, share: float) -> float:
+    """Noise of one value, um, with the members there."""
+    y, _, _ = court.whitened(share, list(selected.members.values()))
+    freedom = court.background.freedom
+    return court.background.sigma * float(np.sqrt((y @ y + freedom) / (len(y) + freedom)))
+
+
+def _length(seen: View, keep: NDArray[np.bool_], sigma: float) -> float:
+    """The noise of a row's length, um."""
+    return seen.rms(np.where(seen.row >= 0, sigma * seen.relative, 0.0), keep)
+
+
+def _verdict(findings: Sequence[Finding], unknown_um: float) -> str:
+    if not findings:
+        return UNKNOWN if unknown_um > 0 else NOTHING
+    if unknown_um >= MOSTLY * max(each.size_um for each in findings):
+        return UNKNOWN
+    return AMBIGUOUS if any(each.aliases for each in findings) else FOUND

@@ -1,0 +1,133 @@
+"""Where model and measurement disagree: the largest patterns of the residual, in words.
+
+Each pattern is one function of the state for one measured component: a slope, a bow, a wave, a direction, a direction
+that grows along an axis, time, a temperature, a tool. They only show; they do not decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ncfix.diagnose.background import Background
+from ncfix.diagnose.view import View
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
+
+SHOWN = 6
+UNLIKELY = 1e-3
+NEAR = 6
+"""Neighbours of a pose."""
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """One pattern: in words, its size (rms, um) and how unlikely it is by chance, all looked at considered."""
+
+    text: str
+    rms_um: float
+    p_value: float
+
+
+def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
+    """The largest ones, those that explain the same left out."""
+    view = ground.view
+    weight = 1 / ground.relative
+    basis = orthonormal(view.base * weight[:, None])
+    y = without(basis, (view.y * weight)[:, None])[:, 0]
+    offered = list(_offered(view))
+    found: list[Pattern] = []
+    while len(found) < SHOWN and offered:
+        gains = [(_gain(basis, y, column * weight), text, column * weight) for text, column in offered]
+        (best, size), text, column = max(gains, key=lambda each: each[0][0])
+        p = min(1.0, len(offered) * float(stats.chi2.sf(best / sigma_um**2, 1)))
+        if p > UNLIKELY:
+            break
+        left = without(basis, column[:, None])[:, 0]
+        explained = left * (left @ y) / (left @ left)
+        found.append(Pattern(text.format(_signed(size)), view.rms(explained * ground.relative), p))
+        basis = np.column_stack([basis, left / np.linalg.norm(left)])
+        y = y - explained
+    return found
+
+
+def _gain(basis: Array, y: Array, column: Array) -> tuple[float, float]:
+    left = without(basis, column[:, None])[:, 0]
+    squares = float(left @ left)
+    if squares < 1e-6 * float(column @ column) or squares == 0:
+        return 0.0, 0.0
+    return float(left @ y) ** 2 / squares, float(left @ y) / squares
+
+
+def _signed(size: float) -> str:
+    return f"{size:+.1f} um"
+
+
+def _offered(view: View) -> Iterator[tuple[str, Array]]:
+    """(words with a place for the size, column) of everything that is looked at."""
+    names = list(dict.fromkeys(name for name, row in zip(view.names, view.row, strict=True) if row >= 0))
+    for text, feature in _features(view):
+        for name in names:
+            own = np.array([each == name for each in view.names]) & (view.row >= 0)
+            if own.any() and np.ptp(feature) > 0:
+                yield f"{name} {text}", np.where(own, feature[np.maximum(view.row, 0)], 0.0)
+
+
+def _features(view: View) -> Iterator[tuple[str, Array]]:
+    u, linear = {}, []
+    for index, axis in enumerate(view.machine.axes):
+        if view.reach.moved(axis):
+            low, high = view.reach.spans[axis.name]
+            u[axis.name] = (view.q[:, index] / axis.unit - (low + high) / 2) * 2 / (high - low)
+            if axis.rotary:
+                yield f"swings with {axis.name} once a turn ({{}})", np.cos(view.q[:, index])
+                yield f"swings with {axis.name} once a turn, a quarter later ({{}})", np.sin(view.q[:, index])
+                yield f"swings with {axis.name} twice a turn ({{}})", np.cos(2 * view.q[:, index])
+            else:
+                linear.append(axis.name)
+                yield f"grows with {axis.name} ({{}} from the middle to the end)", u[axis.name]
+            yield f"is bowed along {axis.name} ({{}})", u[axis.name] ** 2 - 1 / 3
+            yield f"is bent like an S along {axis.name} ({{}})", u[axis.name] ** 3 - 0.6 * u[axis.name]
+    for axis in view.machine.axis_names:
+        side = view.column(f"dir_{axis}")
+        if np.ptp(side) > 0:
+            yield f"depends on the direction of {axis} ({{}} when it moves in plus)", side
+            for other in linear:
+                yield (
+                    f"grows with {other} by the direction of {axis} ({{}} at the end of {other}, {axis} in plus)",
+                    side * u[other],
+                )
+    for k, first in enumerate(linear):
+        for other in linear[k + 1 :]:
+            yield f"grows with {first} where {other} is far out ({{}})", u[first] * u[other]
+    for name in ("time_s", "load_kg", "tool_length", *view.reach.sensors):
+        values = view.column(name)
+        if np.ptp(values) > 0:
+            scaled = (2 * values - values.max() - values.min()) / np.ptp(values)
+            yield f"changes with {name} ({{}} from the middle to the end)", scaled
+            if name.startswith("temp_") or name == "time_s":
+                for other in linear:
+                    yield f"grows with {other} as {name} rises ({{}})", scaled * u[other]
+
+
+def clustering(ground: Background, residual: Array, places: Array) -> float:
+    """Moran's I of neighbouring poses: 0 for residuals that do not know of their neighbours, 1 for equal ones."""
+    from scipy.spatial import cKDTree
+
+    view = ground.view
+    if view.count <= NEAR + 1:
+        return 0.0
+    _, near = cKDTree(places).query(places, k=NEAR + 1)
+    total, count, square = 0.0, 0, 0.0
+    for name in dict.fromkeys(view.names):
+        own = np.array([each == name for each in view.names]) & (view.row >= 0)
+        value = np.full(view.count, np.nan)
+        value[view.row[own]] = residual[own] / ground.relative[own]
+        known = np.isfinite(value[near]).all(axis=1)
+        products = value[near[known, :1]] * value[near[known, 1:]]
+        total, count = total + float(products.sum()), count + products.size
+        square += float((value[known] ** 2).sum()) * NEAR
+    return total / square if count and square else 0.0

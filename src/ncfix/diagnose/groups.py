@@ -1,0 +1,80 @@
+"""Candidates as columns of the data: what each form of an effect would show, with a size of 1 um.
+
+The size is the root mean square over rows of the length of what a row shows, before anything else is fitted. So all
+effects compete on one scale, that of the tool tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.diagnose.catalogue import Candidate
+from ncfix.diagnose.view import View
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
+
+VISIBLE = 0.05
+"""Share of an effect's squares that must be left beside what is free."""
+NEGLIGIBLE = 1e-3
+"""Share of a form's squares that may be dropped."""
+UNSEEN_UM = 1e-9
+
+
+@dataclass(frozen=True)
+class Group:
+    """One form of a candidate.
+
+    owner     the candidate
+    loading   (k, p) from p independent numbers to its coefficients, per um
+    columns   (m, p) what those show, um
+    """
+
+    owner: Candidate
+    loading: Array
+    columns: Array
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The groups that the data show, and the candidates that they cannot show, with the share that is left."""
+
+    groups: tuple[Group, ...]
+    invisible: tuple[tuple[Candidate, float], ...]
+
+
+def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
+    """All forms of all candidates that can be seen."""
+    basis = orthonormal(view.base / view.relative[:, None])
+    groups: list[Group] = []
+    invisible = []
+    for candidate in candidates:
+        design = view.design(candidate.effects)
+        forms = [
+            form for loading in candidate.loadings if (form := _form(view, candidate, loading, design)) is not None
+        ]
+        shares = [_left(basis, form.columns / view.relative[:, None]) for form in forms]
+        seen = [form for form, share in zip(forms, shares, strict=True) if share >= VISIBLE]
+        groups += seen
+        if not seen:
+            invisible.append((candidate, max(shares, default=0.0)))
+    return Gathered(tuple(groups), tuple(invisible))
+
+
+def _form(view: View, candidate: Candidate, loading: Array, design: Array) -> Group | None:
+    """The form at a size of 1 um, with as few columns as it needs."""
+    used = loading.any(axis=1)
+    columns = design[:, used] @ loading[used]
+    size = view.rms(np.linalg.norm(columns, axis=1))
+    if size < UNSEEN_UM:
+        return None
+    left, values, right = np.linalg.svd(columns / size, full_matrices=False)
+    energy = np.cumsum(values[::-1] ** 2)[::-1] / np.sum(values**2)
+    kept = energy > NEGLIGIBLE
+    return Group(candidate, loading @ right[kept].T / size, left[:, kept] * values[kept])
+
+
+def _left(basis: Array, columns: Array) -> float:
+    return float((without(basis, columns) ** 2).sum() / (columns**2).sum())

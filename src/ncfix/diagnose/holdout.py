@@ -1,0 +1,94 @@
+"""Does it predict what was not used to find it? Whole regions of the poses are left out, one quarter at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnose.addition import WIDE
+from ncfix.diagnose.background import Background
+from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.outliers import ASIDE
+from ncfix.diagnose.rivals import scaled
+from ncfix.measure.measurement import Array, Index
+
+CELLS = 16
+FOLDS = 4
+BLIND = 1e2
+"""Times the noise: a value predicted no better than this has a set-up that nothing else shares; it does not count."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Prediction errors of all values while they were held out, um, (m,); NaN where none was possible."""
+
+    without: Array
+    with_all: Array
+    less: tuple[Array, ...]
+    cell: Index
+
+
+def held_out(court: Court, members: Sequence[Member], share: float) -> HeldOut:
+    """Predict each region from the others: without members, with all, and with all but each one."""
+    ground = court.background
+    view = ground.view
+    cell = cells(scaled(view))[np.maximum(view.row, 0)]
+    base = view.base / np.where((s := np.sqrt((view.base**2).mean(axis=0))) > 0, s, 1.0)
+    free = WIDE**2 * base @ base.T
+    shown = [court.groups[m.group].columns * m.size for m in members]
+    parts = [each @ each.T for each in shown]
+    models = [[], list(range(len(parts))), *([k for k in range(len(parts)) if k != out] for out in range(len(parts)))]
+    cover = ground.covariance(share)
+    errors = [np.full(len(view.y), np.nan) for _ in models]
+    for fold in range(FOLDS):
+        test = (cell % FOLDS == fold) & (view.row >= 0)
+        for error, chosen in zip(errors, models, strict=True):
+            signal = free + sum((parts[k] for k in chosen), np.zeros_like(free))
+            error[test] = _predicted(ground, signal, cover, test)
+    return HeldOut(errors[0], errors[1], tuple(errors[2:]), cell)
+
+
+def _predicted(ground: Background, signal: Array, cover: Array, test: NDArray[np.bool_]) -> Array:
+    """Errors of the predictions of the held-out values."""
+    if not test.any() or test.all():
+        return np.full(int(test.sum()), np.nan)
+    train, y = ~test, ground.view.y
+    both = signal[np.ix_(train, train)] + cover[np.ix_(train, train)]
+    cross = signal[np.ix_(test, train)]
+    weights = np.linalg.solve(both, np.column_stack([y[train], cross.T]))
+    error: Array = y[test] - cross @ weights[:, 0]
+    variance = np.diag(signal)[test] - np.einsum("ij,ji->i", cross, weights[:, 1:])
+    error[variance > (BLIND * ground.sigma) ** 2] = np.nan
+    error[ground.relative[test] > 0.1 * ASIDE] = np.nan
+    return error
+
+
+def cells(u: Array, count: int = CELLS) -> Index:
+    """Regions of the poses with equally many rows: halved at the median of the widest direction, again and again."""
+    label = np.zeros(len(u), dtype=np.int64)
+    for _ in range(int(np.log2(count))):
+        new = np.empty_like(label)
+        for each in np.unique(label):
+            rows = np.flatnonzero(label == each)
+            wide = int(np.ptp(u[rows], axis=0).argmax())
+            order = np.argsort(u[rows, wide], kind="stable")
+            upper = np.zeros(len(rows), dtype=np.int64)
+            upper[order[len(rows) // 2 :]] = 1
+            new[rows] = 2 * each + upper
+        label = new
+    # neighbours go to different folds
+    return np.random.default_rng(0).permutation(count)[label] if count else label
+
+
+def gain(held: HeldOut, worse: Array) -> tuple[float, float]:
+    """How much larger the squares are with another model, per region, and the standard error of that."""
+    known = np.isfinite(held.with_all) & np.isfinite(worse)
+    per = [
+        float((worse[k] ** 2 - held.with_all[k] ** 2).sum())
+        for c in np.unique(held.cell)
+        if (k := known & (held.cell == c)).any()
+    ]
+    return float(np.mean(per)), float(np.std(per) / np.sqrt(max(len(per) - 1, 1)))

@@ -1,0 +1,89 @@
+"""How large the noise is, from what, and whether anything is left beyond it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from ncfix.diagnose.background import Background
+from ncfix.diagnose.view import View
+from ncfix.measure.measurement import Array, groups
+
+ENOUGH = 10
+"""Degrees of freedom of repeats from which on they say something."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The noise floor.
+
+    sigma_um  standard deviation of one value
+    source    repeats, given, or neighbours (what smooth effects leave)
+    freedom   degrees of freedom
+    squares   sum of squares of the repeats about their means, um^2
+    """
+
+    sigma_um: float
+    source: str
+    freedom: int
+    squares: float = 0.0
+
+
+def floor(view: View, ground: Background, sigma_um: float, keep: NDArray[np.bool_]) -> Floor:
+    """From repeats if there are enough, else as given, else as estimated from neighbouring poses."""
+    squares, freedom = repeats(view, keep)
+    if freedom >= ENOUGH:
+        return Floor(float(np.sqrt(squares / freedom)), "repeats", freedom, squares)
+    if all(each.noise[0] is not None for each in view.measurements):
+        return Floor(ground.sigma, "given", 0)
+    return Floor(sigma_um, "neighbours", 0)
+
+
+def repeats(view: View, keep: NDArray[np.bool_]) -> tuple[float, int]:
+    """Sum of squares about the means of values taken at one commanded state one after another, and its freedom."""
+    same = states(view)
+    keys = [
+        f"{same[row]} {name}" for row, name, kept in zip(view.row, view.names, keep, strict=True) if row >= 0 and kept
+    ]
+    values = view.y[(view.row >= 0) & keep]
+    if not keys:
+        return 0.0, 0
+    _, index = groups(keys)
+    counts = np.bincount(index)
+    mean = np.bincount(index, values) / counts
+    return float(((values - mean[index]) ** 2).sum()), int((counts - 1).sum())
+
+
+def states(view: View) -> list[int]:
+    """Number of the commanded state of each row; rows of one state follow one another."""
+    seen: list[int] = []
+    number, before = -1, None
+    for each in view.measurements:
+        names = [
+            n
+            for n in each.columns
+            if n not in each.measured and not n.startswith("temp_") and n not in ("time_s", "run")
+        ]
+        labels = [value for name, value in each.labels.items() if name != "repeat"]
+        for i in range(len(each)):
+            key = (each.path, *(label[i] for label in labels), *(round(float(each.columns[n][i]), 4) for n in names))
+            number += key != before
+            before = key
+            seen.append(number)
+    return seen
+
+
+def lack_of_fit(floor: Floor, residual: Array, parameters: float) -> float | None:
+    """The probability that residuals are no larger than repeats by chance alone; None without repeats or a given noise."""
+    n = len(residual)
+    squares = float((residual**2).sum())
+    if floor.source == "repeats":
+        left = n - parameters - floor.freedom
+        ratio = ((squares - floor.squares) / left) / (floor.squares / floor.freedom)
+        return float(stats.f.sf(ratio, left, floor.freedom)) if left > 0 else None
+    if floor.source == "given":
+        return float(stats.chi2.sf(squares / floor.sigma_um**2, max(n - parameters, 1)))
+    return None

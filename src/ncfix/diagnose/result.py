@@ -1,0 +1,77 @@
+"""A diagnosis as a JSON object, and its machine with provenance."""
+
+from __future__ import annotations
+
+import datetime
+from typing import Any
+
+import numpy as np
+
+from ncfix.diagnose.diagnosis import Diagnosis, Finding
+from ncfix.diagnose.words import why
+from ncfix.machine import Machine
+
+
+def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
+    """The fields of docs/formats.md, section 4, and some more."""
+    return {
+        "verdict": found.verdict,
+        "effects": [_effect(found, each) for each in found.findings],
+        "unknown": {"share_um": found.unknown_um, "where": found.unknown_kind},
+        "gap_um": {name: getattr(found.gap, name) for name in found.gap.__dataclass_fields__},
+        "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in found.patterns],
+        "next_measurements": [],
+        "machine": machine,
+        "noise": {"sigma_um": found.floor.sigma_um, "source": found.floor.source, "freedom": found.floor.freedom},
+        "lack_of_fit": {"before": found.p_lack, "after": found.p_left},
+        "invisible": [{"name": c.name, "visible_share": share} for c, share in found.gathered.invisible],
+        "considered": len(found.considered),
+        "outliers": _outliers(found),
+    }
+
+
+def _effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
+    return {
+        "name": finding.candidate.name,
+        "title": finding.candidate.title,
+        "axis": finding.candidate.axis or None,
+        "why": why(found, finding),
+        "size_um": finding.size_um,
+        "coefficients": [
+            {"name": each.name, "basis": each.basis.name, "labels": each.basis.labels, "values": each.coefficients}
+            for each in finding.effects
+        ],
+        "sigma": [
+            np.sqrt(np.maximum(np.diag(np.asarray(each.covariance)), 0.0)).tolist() if each.covariance else None
+            for each in finding.effects
+        ],
+        "log_odds": finding.odds,
+        "p_value": finding.p_value,
+        "aliases": list(finding.aliases),
+        "remedy": finding.candidate.remedy,
+    }
+
+
+def _outliers(found: Diagnosis) -> list[dict[str, Any]]:
+    places, first = [], 0
+    for each in found.view.measurements:
+        for row in np.flatnonzero(found.outlying[first : first + len(each)]):
+            place = each.place(int(row))
+            places.append({"path": place.path, "line": place.line})
+        first += len(each)
+    return places
+
+
+def with_provenance(found: Diagnosis) -> Machine:
+    """The machine with where its new effects come from."""
+    assert found.machine is not None
+    notes = {
+        "date": datetime.date.today(),
+        "source": ", ".join(dict.fromkeys(each.path for each in found.view.measurements)),
+        "diagnosed_from": found.view.machine.hash,
+        "added": ", ".join(each.candidate.name for each in found.findings),
+        "gap_before_um": round(found.gap.before, 3),
+        "gap_after_um": round(found.gap.after, 3),
+        "noise_um": round(found.gap.floor, 3),
+    }
+    return found.machine.replace(provenance={**found.machine.provenance, **notes})

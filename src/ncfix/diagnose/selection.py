@@ -1,0 +1,157 @@
+"""Which effects are there: one after another, exchanged while that helps, stopped where noise could do as well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ncfix.diagnose.background import SHARES
+from ncfix.diagnose.evidence import Court, Evidence, Member, log_odds
+from ncfix.diagnose.rivals import RIVALS
+
+MOST = 6
+"""Effects that are named at most."""
+TRIALS = 300
+FALSE_ALARM = 0.01
+"""How often noise alone may name anything."""
+LEAST = 3.0
+"""Log odds (20 to 1) that a name must have at least."""
+UNNAMED = frozenset(rival.name for rival in RIVALS)
+
+
+@dataclass(frozen=True)
+class Null:
+    """What the largest log odds of all names are when there is nothing but noise: a Gumbel distribution."""
+
+    place: float
+    scale: float
+
+    @property
+    def threshold(self) -> float:
+        """Log odds that noise alone exceeds in one of a hundred measurements."""
+        quantile = self.place - self.scale * np.log(-np.log1p(-FALSE_ALARM))
+        return float(max(LEAST, quantile))
+
+    def p_value(self, odds: float) -> float:
+        """The probability that noise alone gives such odds for any name."""
+        return float(-np.expm1(-np.exp(-(odds - self.place) / self.scale)))
+
+
+@dataclass(frozen=True)
+class Selected:
+    """The names that are there, likeliest first, with what was considered.
+
+    members   name -> form and size
+    odds      name -> log odds given the other members
+    runners   name -> {other name: log odds of that one in its place}
+    first     log odds of all names before anything was named
+    null      what noise alone does
+    """
+
+    members: dict[str, Member]
+    odds: dict[str, float]
+    runners: dict[str, dict[str, float]]
+    first: dict[str, float]
+    null: Null
+    steps: list[tuple[str, float]] = field(default_factory=list)
+
+    @property
+    def named(self) -> list[str]:
+        """The members that have a name."""
+        return [name for name in self.members if name not in UNNAMED]
+
+    def without(self, name: str, court: Court) -> Selected:
+        """The same with one member fewer."""
+        members = {key: value for key, value in self.members.items() if key != name}
+        return _judged(court, members, self.first, self.null, self.steps)
+
+    @property
+    def unnamed(self) -> list[str]:
+        """The members that have none."""
+        return [name for name in self.members if name in UNNAMED]
+
+
+def select(court: Court) -> Selected:
+    """Add the likeliest effect as long as noise could not have made it, exchanging members on the way."""
+    empty = court.heard([])
+    first = {name: empty.of(forms) for name, forms in court.forms.items()}
+    null = noise_alone(court, empty)
+    members: dict[str, Member] = {}
+    steps: list[tuple[str, float]] = []
+    evidence, odds = empty, first
+    while len(members) < MOST:
+        name = max((each for each in odds if each not in members), key=lambda each: odds[each], default=None)
+        if name is None or odds[name] < null.threshold:
+            break
+        steps.append((name, odds[name]))
+        members[name] = evidence.best(court.forms[name])
+        members = _exchanged(court, members)
+        evidence = court.heard(list(members.values()))
+        odds = {each: evidence.of(forms) for each, forms in court.forms.items()}
+    return _judged(court, members, first, null, steps)
+
+
+def _exchanged(court: Court, members: dict[str, Member]) -> dict[str, Member]:
+    """Every member replaced by whatever explains its part better, sizes and forms anew; until nothing changes."""
+    for _ in range(3):
+        before = list(members)
+        for name in before:
+            others = {key: value for key, value in members.items() if key != name}
+            evidence = court.heard(list(others.values()))
+            odds = {key: evidence.of(forms) for key, forms in court.forms.items() if key not in others}
+            best = max(odds, key=lambda key: odds[key])
+            chosen = best if odds[best] > odds[name] + 1.0 else name
+            members = {key if key != name else chosen: value for key, value in members.items()}
+            members[chosen] = evidence.best(court.forms[chosen])
+        if list(members) == before:
+            break
+    return members
+
+
+def _judged(
+    court: Court, members: dict[str, Member], first: dict[str, float], null: Null, steps: list[tuple[str, float]]
+) -> Selected:
+    """Members that the others have made superfluous leave; what else could stand in each one's place."""
+    odds: dict[str, float] = {}
+    runners: dict[str, dict[str, float]] = {}
+    for name in list(members):
+        others = [value for key, value in members.items() if key != name]
+        evidence = court.heard(others)
+        here = {key: evidence.of(forms) for key, forms in court.forms.items() if key == name or key not in members}
+        if here[name] < null.threshold:
+            members = {key: value for key, value in members.items() if key != name}
+            continue
+        odds[name], runners[name] = here[name], {k: v for k, v in here.items() if k != name}
+    ranked = dict(sorted(members.items(), key=lambda item: -odds[item[0]]))
+    return Selected(ranked, odds, runners, first, null, steps)
+
+
+def noise_alone(court: Court, evidence: Evidence, seed: int = 0) -> Null:
+    """Simulate residuals of this design without any effect and see which odds the best name has."""
+    share = SHARES[int(evidence.null.argmax())]
+    _, columns, _ = court.whitened(share, [])
+    noise = np.random.default_rng(seed).normal(size=(TRIALS, columns.shape[0]))
+    total, freedom = (noise**2).sum(axis=1) + court.background.freedom, columns.shape[0] + court.background.freedom
+    projected = noise @ columns
+    best = np.full(TRIALS, -np.inf)
+    for forms in court.forms.values():
+        parts = [_trial_odds(columns[:, court.part(k)], projected[:, court.part(k)], total, freedom) for k in forms]
+        best = np.maximum(best, np.log(np.exp(np.clip(np.stack(parts), -50, 50)).mean(axis=(0, 2))))
+    scale = float(np.std(best)) * np.sqrt(6) / np.pi
+    return Null(float(np.mean(best)) - 0.5772 * scale, scale)
+
+
+def _trial_odds(columns: np.ndarray, projected: np.ndarray, total: np.ndarray, freedom: float) -> np.ndarray:  # type: ignore[type-arg]
+    eigen, vectors = np.linalg.eigh(columns.T @ columns)
+    return log_odds(np.broadcast_to(np.maximum(eigen, 0), projected.shape), (projected @ vectors) ** 2, total, freedom)
+
+
+def aliases(selected: Selected, name: str, within: float = 3.0) -> list[str]:
+    """Names that explain a member's part nearly as well: odds of less than 20 to 1 against them."""
+    rest = selected.runners[name]
+    found = [key for key, value in rest.items() if value > selected.odds[name] - within and key not in UNNAMED]
+    return sorted(found, key=lambda key: -rest[key])
+
+
+__all__ = ["Null", "Selected", "aliases", "noise_alone", "select"]

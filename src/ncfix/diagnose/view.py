@@ -1,0 +1,152 @@
+"""What several measurement files show of one machine: residuals, what explains them already, and where each came from.
+
+All values in um; one entry per measured value, m in all. `base` are the columns of what is free anyway: the unknowns of
+the set-ups, and the constants of the machine file (lines, squareness, gains), which a day and a set-up change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ncfix.diagnose.catalogue.candidate import Reach
+from ncfix.machine import Effect, Machine
+from ncfix.machine.smooth import Constant, Polynomial
+from ncfix.measure import weights
+from ncfix.measure.calibrate import Estimate, Problem, settle
+from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.selection import Selection
+
+UM = 1e3
+
+
+@dataclass(frozen=True)
+class View:
+    """One entry per value.
+
+    problem   the stacked observations with the free constants as unknown effects
+    estimate  least squares of those, at which everything is taken to first order
+    y         (m,) values minus what the machine file and the fitted set-up say, um
+    base      (m, k) columns of what is free
+    row       (m,) number of the row among the rows of all files; -1 for calibrated distances
+    relative  (m,) standard deviation against that of a plain value
+    """
+
+    problem: Problem
+    estimate: Estimate
+    y: Array
+    base: Array
+    row: Index
+    relative: Array
+
+    @property
+    def machine(self) -> Machine:
+        """The machine file as it was given."""
+        return self.problem.machine
+
+    @property
+    def measurements(self) -> list[Measurement]:
+        """The files."""
+        return [each.measurement for each in self.problem.observations]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return sum(len(each) for each in self.measurements)
+
+    def design(self, effects: Sequence[Effect]) -> Array:
+        """The derivative of all values by the coefficients of effects, um, (m, k)."""
+        return UM * np.concatenate([each.design(effects) for each in self.problem.observations])
+
+    @cached_property
+    def q(self) -> Array:
+        """Axis positions of all rows, (n, n_axes)."""
+        return np.concatenate([each.q for each in self.problem.observations])
+
+    def column(self, name: str) -> Array:
+        """A state column of all rows, zero where a file lacks it."""
+        return np.concatenate([each.column(name) for each in self.measurements])
+
+    @cached_property
+    def component(self) -> Index:
+        """Number of the component of each value in its row; -1 for calibrated distances."""
+        parts = []
+        for each in self.problem.observations:
+            own = np.tile(np.arange(len(each.components)), len(each.measurement))
+            parts.append(np.concatenate([own, np.full(len(each.extra_values), -1)]))
+        return np.concatenate(parts)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """The name of each value's component."""
+        return [
+            name
+            for each in self.problem.observations
+            for name in [*each.components * len(each.measurement), *["distance"] * len(each.extra_values)]
+        ]
+
+    @cached_property
+    def file(self) -> Index:
+        """Number of the file of each row."""
+        return np.repeat(np.arange(len(self.measurements)), [len(each) for each in self.measurements])
+
+    @cached_property
+    def sets(self) -> tuple[str, ...]:
+        """File and set of each row."""
+        many = len(self.measurements) > 1
+        return tuple(
+            f"{each.path} set {name}" if many else f"set {name}" for each in self.measurements for name in each.sets
+        )
+
+    def rms(self, values: Array, keep: Array | None = None) -> float:
+        """Root mean square over rows of the length of what a row shows, um."""
+        inside = self.row >= 0 if keep is None else (self.row >= 0) & keep
+        rows = len(np.unique(self.row[inside]))
+        return float(np.sqrt((values[inside] ** 2).sum() / max(rows, 1)))
+
+    @cached_property
+    def reach(self) -> Reach:
+        """What was measured."""
+        units = np.array([axis.unit for axis in self.machine.axes])
+        places = np.concatenate([*self._ends, self.q]) / units
+        spans = dict(
+            zip(self.machine.axis_names, zip(places.min(0).tolist(), places.max(0).tolist(), strict=True), strict=True)
+        )
+        shared = set.intersection(*(set(each.columns) for each in self.measurements))
+        moving = {name for name in shared if np.ptp(self.column(name)) > 0}
+        time = self.column("time_s")
+        return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())))
+
+    @property
+    def _ends(self) -> list[Array]:
+        return [end for each in self.problem.observations for end in getattr(each, "ends", [])]
+
+
+def view(measurements: Sequence[Measurement], machine: Machine) -> View:
+    """Fit what is free and take everything else to first order about it. Raises `UsageError` NCF630, NCF637."""
+    selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
+    problem = Problem.of(measurements, machine, selection)
+    estimate = settle(problem, weights.NONE)
+    base = np.concatenate([problem.nuisance(estimate.unknowns), problem.design], axis=1)
+    sigma = problem.sigma / np.median(problem.sigma)
+    return View(problem, estimate, UM * estimate.residual, UM * base, _rows(problem), sigma)
+
+
+def is_free(effect: Effect) -> bool:
+    """Whether an effect is a constant of the set-up and the day: where an axis lies, or a gain."""
+    if effect.input is not None or effect.times is not None:
+        return False
+    if isinstance(effect.basis, Constant):
+        return True
+    return type(effect.basis) is Polynomial and max(effect.basis.degree) <= 1
+
+
+def _rows(problem: Problem) -> Index:
+    rows, first = [], 0
+    for each in problem.observations:
+        rows.append(np.where(each.rows < 0, -1, each.rows + first))
+        first += len(each.measurement)
+    return np.concatenate(rows)

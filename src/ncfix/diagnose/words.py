@@ -1,0 +1,43 @@
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, Finding
+
+SAID = {
+    NOTHING: "nothing is missing: model and measurement agree within the noise",
+    FOUND: "the model lacks something that has a name",
+    AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
+    UNKNOWN: "the model lacks something that is not in the catalogue",
+}
+
+
+def text(found: Diagnosis) -> str:
+    """The report for a terminal."""
+    gap = found.gap
+    lines = [
+        f"verdict: {found.verdict}: {SAID[found.verdict]}",
+        f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um ({found.floor.source}); "
+        f"held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
+    ]
+    for finding in found.findings:
+        lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(found, finding)}"]
+        if finding.aliases:
+            lines.append(f"  as likely: {', '.join(finding.aliases)}")
+    if found.unknown_um:
+        lines += ["", f"unknown: {found.unknown_um:.1f} um of {found.unknown_kind}"]
+    if found.patterns:
+        lines += ["", "where:", *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns)]
+    return "\n".join(lines) + "\n"
+
+
+def why(found: Diagnosis, finding: Finding) -> str:
+    """One sentence on why this name."""
+    total = len(found.considered)
+    best = (
+        max(found.selected.runners[finding.candidate.name].items(), key=lambda item: item[1])
+        if found.selected
+        else None
+    )
+    rival = f"; next best {best[0]}, e^{finding.odds - best[1]:.0f} times less likely" if best else ""
+    return f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g}) among {total} effects{rival}"
