@@ -14,8 +14,9 @@ if TYPE_CHECKING:
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `heidenhain`: axis tables."""
+    """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
     register(axis_tables, name="heidenhain")
+    register(kinematics, name="heidenhain-kinematics")
 
 
 def axis_tables() -> Control:
@@ -23,3 +24,10 @@ def axis_tables() -> Control:
     from ncfix_heidenhain.control import Heidenhain
 
     return Heidenhain()
+
+
+def kinematics() -> Control:
+    """The control with KinematicsComp."""
+    from ncfix_heidenhain.kinematics import KinematicsComp
+
+    return KinematicsComp()

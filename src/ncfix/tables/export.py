@@ -58,7 +58,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     tables = control.read(written.files)
     messages = control.lint(written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
-    _check_size(request.machine, left)
+    _check_size(request.machine, left, request.target)
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
     more = {
@@ -126,7 +126,7 @@ def _check_finite(machine: Machine) -> None:
         raise RefusedError.of("NCF489", "an error of the machine is not a number", hint="calibrate it again")
 
 
-def _check_size(machine: Machine, left: Residual) -> None:
+def _check_size(machine: Machine, left: Residual, target: float) -> None:
     allowed: Array = np.where(machine.rotary, machine.max_correction[1], machine.max_correction[0])
     for name, value, limit, rotary in zip(left.names, left.largest, allowed, machine.rotary, strict=True):
         if value > limit:
@@ -135,5 +135,5 @@ def _check_size(machine: Machine, left: Residual) -> None:
             )
             text = f"the correction of {name} is larger than this machine allows: {shown}"
             raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
-    if np.mean(left.after**2) > np.mean(left.before**2) + 1e-12:
+    if np.mean(left.after**2) > np.mean(left.before**2) + (target / 10) ** 2:
         raise RefusedError.of("NCF490", "these tables would leave more error than there is without them")

@@ -18,12 +18,13 @@ WITHIN = 4
 
 def hats(places: Array, nodes: Array) -> Array:
     """The weight of every node (m) at every place (n), linear between nodes and held beyond the ends: (n, m)."""
-    return np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
+    found: Array = np.stack([np.interp(places, nodes, row) for row in np.eye(len(nodes))], axis=1)
+    return found
 
 
 def projector(places: Array, nodes: Array) -> Array:
     """What turns values at places (n) into the values at nodes (m) that come nearest to them in all: (m, n)."""
-    found: Array = np.linalg.pinv(hats(places, nodes))
+    found: Array = np.asarray(np.linalg.pinv(hats(places, nodes)), dtype=np.float64)
     return found
 
 
@@ -31,7 +32,8 @@ def between(nodes: Array, within: int = WITHIN) -> Array:
     """The nodes and evenly spaced places in the cells between them, ascending."""
     share = np.arange(within) / within
     inner = nodes[:-1, None] + share * np.diff(nodes)[:, None]
-    return np.append(inner.reshape(-1), nodes[-1])
+    found: Array = np.append(inner.reshape(-1), nodes[-1])
+    return found
 
 
 def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Array:
@@ -40,5 +42,6 @@ def fitted(values: Array, places: Sequence[Array], nodes: Sequence[Array]) -> Ar
     The weights of a multilinear table are products of those along its axes, so that one axis after another will do.
     """
     for axis, (line, knots) in enumerate(zip(places, nodes, strict=True)):
-        values = np.moveaxis(np.tensordot(projector(line, knots), values, axes=(1, axis)), 0, axis)
+        summed = np.tensordot(projector(line, knots), values, axes=(1, axis))
+        values = np.moveaxis(summed, 0, axis)
     return values

@@ -52,6 +52,9 @@ class Tables(Protocol):
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
         """Corrections of all axes `names` at commands q (n, n_axes) [mm, rad], to be added to them, (n, n_axes)."""
 
+    def for_tool(self, length: float) -> Tables:
+        """What it does with a tool of this length, mm, if the control takes that into account."""
+
     @property
     def grids(self) -> tuple[Grid, ...]:
         """Every table in it."""
@@ -82,6 +85,10 @@ class Compensation:
             columns = [names.index(name) for name in term.outputs]
             total[:, columns] += term.at(names, q, way)
         return total
+
+    def for_tool(self, length: float) -> Compensation:
+        """The same: tables know nothing of tools."""
+        return self
 
     @property
     def grids(self) -> tuple[Grid, ...]:

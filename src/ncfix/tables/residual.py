@@ -50,7 +50,7 @@ def residual(
     q = random_poses(space, count, seed)
     ways = random_ways(len(space), count, seed + 1)
     state = State(tool_length, ways)
-    correction = tables.at(machine.axis_names, q, ways)
+    correction = tables.for_tool(tool_length).at(machine.axis_names, q, ways)
     meant = machine.tip(q, tool_length)
     return Residual(
         machine.axis_names,

@@ -1,0 +1,203 @@
+"""Heidenhain's KinematicsComp (iTNC 530, option 52): the errors of every axis in a description of the whole machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.grid import Grid
+from ncfix.tables.lines import Remarks
+from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
+from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
+from ncfix_heidenhain.com import Com, old_text, read_com
+from ncfix_heidenhain.control import MOST, axes_of, choice, sign_of, unit_of, whole
+from ncfix_heidenhain.described import Component, component, rows
+
+TABLE = "kinematics.tab"
+UNITS = "units.txt"
+ANGLES = {"deg": np.pi / 180, "rad": 1.0}
+
+
+class KinematicsComp(Control):
+    """The control `heidenhain-kinematics`."""
+
+    name = "heidenhain-kinematics"
+    title = "Heidenhain KinematicsComp (iTNC 530)"
+    reaches = "L-VOL, and the position part of R-VOL"
+    properties = Properties(
+        value_sign="as --set sign says",
+        input_signal="setpoint",
+        position_frame="machine datum",
+        unit="mm, degree; angles under C4 to C6 and COMPTAB as --set angle_unit says",
+        quantum=(1e-7, 1e-7),
+        extrapolation="taken as held at the first and last row",
+        bidirectional=False,
+        max_points=MOST,
+        max_tables=18,
+        combine="a kinematic chain with the errors of all axes",
+    )
+    assumptions = (
+        Assumption(
+            "KINE-1",
+            "The chain is read from the machine base along the head, then from MachBase along the table; errors stand "
+            "before their axis; a table axis moves the tool against the workpiece the way its letter says.",
+            "iTNC 530 technical manual: errors are entered before the affected axis; the order of the rest is not "
+            "public",
+            "so",
+            "Compare the rows without COMPTAB with the kinematics table that the machine has.",
+        ),
+        Assumption(
+            "KINE-2",
+            "The sign of errors is what --set sign says.",
+            "none public",
+            "none: it must be given",
+            "Enter a fixed error of 0.010 under COMPTAB in X and see which way X moves.",
+        ),
+        Assumption(
+            "KINE-3",
+            "The unit of angles under C4 to C6 and COMPTAB is what --set angle_unit says.",
+            "none public; the manual's example has 0.0015 for an angle",
+            "none: it must be given",
+            "Enter an angle of 0.01 before a rotary axis and see how far the tip moves at a known lever.",
+        ),
+        Assumption(
+            "KINE-4",
+            "Seven decimals are read.",
+            "none public",
+            "so",
+            "Open the files in the table editor of the control.",
+        ),
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        "sign": Option(None, "error: entries say how the machine is wrong; correction: the opposite"),
+        "angle_unit": Option(None, "deg or rad"),
+        "points": Option(str(MOST), f"most rows of an axis table, at most {MOST}"),
+    }
+    steps = (
+        "Settle KINE-1 to KINE-3 on the machine.",
+        "Have the machine's maker or the service enter the COMPTAB column in the kinematics table of the machine, "
+        "with the rows that only errors need; do not replace it by the one written here.",
+        "Load the .COM files and config.cma.",
+        "Cancel other compensation of the same errors: .COM columns of axes, MP720/MP730, MP960.",
+        "Home all axes and measure: the errors must have become smaller, not twice as large.",
+    )
+    switch_off = "Empty the COMPTAB column, and mark a line of config.cma that has no files as active."
+
+    def write(self, request: Request) -> Written:
+        """The kinematics table, an axis table for each axis, and `config.cma`."""
+        settings = self.settings(request.settings)
+        sense = -sign_of(settings["sign"])
+        angle = ANGLES[choice(settings, "angle_unit", tuple(ANGLES))]
+        machine, axes = request.machine, axes_of(request)
+        _check_axes(machine.axis_names)
+        most = whole(settings, "points", 2, MOST)
+        found = [component(machine, request.space, i, most, request.target) for i in range(len(axes))]
+        components = [each for each, _ in found]
+        chain = rows(machine, components, angle, sense)
+        for text in over_limits(chain):
+            raise RefusedError.of("NCF484", f"the kinematics table would have {text}", hint="ncfix fix has no limit")
+        files, tables = {TABLE: kinematics_text(chain)}, {}
+        for each in components:
+            com = _com(each, axes, sense, angle)
+            if com.columns:
+                tables[each.axis] = f"AXIS-{each.axis}.COM"
+                files[tables[each.axis]] = old_text(tables[each.axis], com, 7)
+        files[CONFIG] = cma_text(axes, tables)
+        files[UNITS] = f"{settings['sign']} {settings['angle_unit']}\n".encode()
+        return Written(files, tuple(_notes(components, [flag for _, flag in found], most)))
+
+    def read(self, files: Files) -> Kinematics:
+        """As the control would follow the chain. Raises `ConfigError` NCF491."""
+        kinematics, remarks = self._read(files)
+        for each in remarks:
+            each.check()
+        return kinematics
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What the control would misread, and what is rarely meant."""
+        return tuple(message for each in self._read(files)[1] for message in each.messages)
+
+    def _read(self, files: Files) -> tuple[Kinematics, list[Remarks]]:
+        axes, tables, config = read_cma(files)
+        table = Remarks.of(TABLE, files.get(TABLE, b""))
+        chain = read_rows(table, files.get(TABLE, b""))
+        remarks = [config, table]
+        sense, angle = _read_units(files, config)
+        components: dict[tuple[str, str], Grid] = {}
+        own: list[Grid] = []
+        for axis, name in tables.items():
+            com, found = read_com(name, files[name])
+            remarks.append(found)
+            if com is not None:
+                _take(axis, com, axes, sense, components, own, found)
+        _check_names(chain, components, table)
+        return Kinematics(chain, sense, angle, components, tuple(own)), remarks
+
+
+def _check_axes(names: tuple[str, ...]) -> None:
+    if not {"X", "Y", "Z"} <= set(names) <= set(LETTERS):
+        text = f"the chain needs X, Y and Z and takes A, B and C; the machine has {' '.join(names)}"
+        raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+
+
+def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -> Com:
+    """The table of an axis: C1 to C6 where there is anything in them, and the own angle of a rotary axis."""
+    columns = {}
+    if np.abs(errors.own).max() > 1e-9:
+        columns[str(axes.index(errors.axis) + 1)] = sense * errors.own / unit_of(errors.axis)
+    for index in range(6):
+        if errors.used(index):
+            columns[f"C{index + 1}"] = sense * errors.values[:, index] / (angle if index >= 3 else 1.0)
+    return Com(errors.nodes / unit_of(errors.axis), columns)
+
+
+def _take(
+    axis: str,
+    com: Com,
+    axes: tuple[str, ...],
+    sense: float,
+    components: dict[tuple[str, str], Grid],
+    own: list[Grid],
+    remarks: Remarks,
+) -> None:
+    nodes = com.nodes * unit_of(axis)
+    for name, values in com.columns.items():
+        if name.startswith("C") and name != "C":
+            components[axis, name] = Grid((axis,), (nodes,), (axis,), values[:, None])
+        elif name.isdigit() and 1 <= int(name) <= len(axes) and axes[int(name) - 1] == axis:
+            own.append(Grid((axis,), (nodes,), (axis,), -sense * unit_of(axis) * values[:, None]))
+        else:
+            remarks.refuse(0, f"the column {name} is not that of the axis itself, nor C1 to C6")
+
+
+def _check_names(chain: tuple[Row, ...], components: Mapping[tuple[str, str], Grid], remarks: Remarks) -> None:
+    named = [error for error in (row.error for row in chain) if isinstance(error, tuple)]
+    for error in named:
+        if error not in components:
+            remarks.refuse(0, f"{'..'.join(error)} is in no axis table of the active line")
+    for axis, column in components:
+        if (axis, column) not in named:
+            remarks.doubt(0, f"the column {column} of axis {axis} is used nowhere in the chain")
+
+
+def _read_units(files: Files, remarks: Remarks) -> tuple[float, float]:
+    words = files.get(UNITS, b"").decode("latin-1").split()
+    if len(words) != 2 or words[0] not in ("error", "correction") or words[1] not in ANGLES:
+        remarks.refuse(0, f"{UNITS} says {' '.join(words)!r}", "error or correction, deg or rad; see KINE-2, KINE-3")
+        return 1.0, 1.0
+    return 1.0 if words[0] == "error" else -1.0, ANGLES[words[1]]
+
+
+def _notes(components: list[Component], depends: list[bool], most: int) -> list[str]:
+    notes = ["The direction of the tool is corrected only as far as rotary axes can turn themselves right."]
+    some = [each.axis for each, flag in zip(components, depends, strict=True) if flag]
+    if some:
+        notes.append(f"Errors of {', '.join(some)} depend on more than the position of the axis: the mean is written.")
+    full = [each.axis for each in components if len(each.nodes) >= most]
+    if full:
+        notes.append(f"With {most} rows the target is not reached along {', '.join(full)}.")
+    return notes
