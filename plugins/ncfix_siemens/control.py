@@ -1,0 +1,183 @@
+"""SINUMERIK 840D sl, 828D, 802D sl: interpolatory compensation by tables of one input each, added and multiplied.
+
+Sources: Function Manual Extended Functions, 03/2013, chapter K3; 802D sl Function Manual, 11/2012; S. Esmaeili
+Marzdashti (Polytechnique Montreal, 2021), chapter 7, where 40 such tables were loaded. The sign of CEC values, and
+whether factors of a product are added by themselves, too, is in no public text: both must be said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.machine import State
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.poses import random_poses
+from ncfix.tables.scheme import Job, Scheme, automatic
+from ncfix.tables.scheme_fixed import fixed
+from ncfix.tables.scheme_rotary import orientation_error
+from ncfix_siemens.cec import cec_text
+from ncfix_siemens.combine import Reading, tables_of
+from ncfix_siemens.eec import eec_text
+from ncfix_siemens.facts import ASSUMPTIONS, OFF, PROPERTIES, STEPS
+from ncfix_siemens.options import OPTIONS, Settings, checked
+from ncfix_siemens.probe import probe_files
+from ncfix_siemens.reading import as_corrections, read_folder, reading_of
+from ncfix_siemens.table import Table
+
+CEC = "NC_CEC.INI"
+ROOM = 1.5
+"""MD32720 as a multiple of the largest correction."""
+WORTH = 0.9
+"""Rotary axes keep their values if that leaves less than this share of what correcting them leaves at the tip."""
+CHECKS = 1000
+
+
+class Siemens(Control):
+    """The control `siemens`."""
+
+    name = "siemens"
+    title = "Siemens SINUMERIK compensation tables (CEC, EEC)"
+    reaches = "L-VOL, and R-VOL as far as sums and products of pairs can say it"
+    properties: ClassVar[Properties] = PROPERTIES
+    assumptions: ClassVar[tuple[Assumption, ...]] = ASSUMPTIONS
+    options: ClassVar[Mapping[str, Option]] = OPTIONS
+    steps: ClassVar[tuple[str, ...]] = STEPS
+    switch_off = OFF
+
+    def write(self, request: Request) -> Written:
+        """`NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
+        settings = checked(self.settings(request.settings), request.machine.axis_names)
+        scheme = _scheme(request, settings)
+        own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
+        others = [term for term in scheme.tables.terms if term not in own]
+        reading = _reading(settings, others)
+        cec = tables_of(others, reading)
+        if len(cec) > settings.limits.tables:
+            text = f"{len(cec)} tables are needed, and {settings.model} has {settings.limits.tables}"
+            raise RefusedError.of("NCF484", text, hint="--set tables=N if yours has more; product_terms=only needs least")
+        eec = [replace(table, index=0) for table in tables_of(own, Reading(settings.axes, -1, ""))]
+        files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
+        if cec or not eec:
+            files[CEC] = cec_text(cec, _heads(settings), _titles(cec, settings), settings.style)
+        return Written(files, tuple(_notes(request, settings, scheme, cec)))
+
+    def probe(self, request: Request) -> Written:
+        """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
+        settings = checked(request.settings, request.machine.axis_names)
+        ranges = {
+            axis.name: (low / axis.unit, high / axis.unit)
+            for axis, (low, high) in zip(request.machine.axes, request.space.tolist(), strict=True)
+        }
+        return Written(probe_files(dict(settings.axes), ranges, settings.style))
+
+    def read(self, files: Files) -> Compensation:
+        """As the control would run them. Raises `ConfigError` NCF491."""
+        folder = read_folder(files)
+        reading, unsaid = reading_of(folder)
+        for each in (*folder.remarks, unsaid):
+            each.check()
+        assert reading is not None
+        return as_corrections(folder, reading)
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """What the control would stumble over, ignore or take otherwise than it looks, and what is rarely meant."""
+        folder = read_folder(files)
+        _, unsaid = reading_of(folder)
+        return tuple(message for each in (*folder.remarks, unsaid) for message in each.messages)
+
+
+def _scheme(request: Request, settings: Settings) -> Scheme:
+    """The tables that the settings ask for."""
+    job = Job(request.machine, request.space, request.tool_length, request.target, settings.limits)
+    if settings.scheme != "auto":
+        return fixed(job, settings.scheme)
+    if settings.rotary != "auto" or not request.machine.rotary.any():
+        return automatic(job, settings.rotary != "keep")
+    turning, keeping = automatic(job, True), automatic(job, False)
+    return keeping if _left(keeping) < WORTH * _left(turning) else turning
+
+
+def _left(scheme: Scheme) -> float:
+    return float(np.hypot(scheme.rest, scheme.dropped))
+
+
+def _own(term: Term) -> bool:
+    return len(term.factors) == 1 and term.way is None and term.factors[0].inputs == term.outputs
+
+
+def _reading(settings: Settings, terms: Sequence[Term]) -> Reading:
+    if any(len(term.factors) > 1 for term in terms) and not settings.terms:
+        text = "siemens needs the option 'product_terms' for these tables, since some are multiplied"
+        raise UsageError.of("NCF485", text, hint="--probe settles it; the 802D manual's example only makes sense as only")
+    return Reading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
+
+
+def _heads(settings: Settings) -> list[str]:
+    """What the reader must know, and people."""
+    said = [f"value_sign={settings.sign}", f"product_terms={settings.terms}"]
+    said += [f"{letter}={axis}" for letter, axis in settings.axes.items()]
+    said += [f"most_tables={settings.limits.tables}", f"most_points={settings.limits.points}"]
+    return [f"ncfix: {' '.join(said)}", "assumptions SIEMENS-1 to SIEMENS-7: see hand-over.md"]
+
+
+def _titles(tables: Sequence[Table], settings: Settings) -> dict[int, str]:
+    """A comment for each table; numbers are those that MULT_BY_TABLE takes."""
+    letters = {axis: letter for letter, axis in settings.axes.items()}
+    pointed = {table.multiply for table in tables}
+    found = {}
+    for table in tables:
+        what = f"table {table.index + 1}: {letters[table.output]} over {letters[table.input]}"
+        if table.index + 1 in pointed:
+            what += ", multiplies others"
+        if table.multiply:
+            what += f", multiplied by table {table.multiply}"
+        if table.direction:
+            what += f", while {letters[table.input]} moves towards {'plus' if table.direction > 0 else 'minus'}"
+        found[table.index] = what
+    return found
+
+
+def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[Table]) -> Iterator[str]:
+    products = sum(bool(table.multiply) for table in cec)
+    yield f"Scheme {settings.scheme}: {len(cec)} tables of {settings.limits.tables}, {products} of them multiplied."
+    if scheme.rest > request.target / 10:
+        yield f"{1e3 * scheme.rest:.2f} um rms of the correction cannot be said in this form and are left."
+    if scheme.dropped > request.target / 10:
+        yield f"{1e3 * scheme.dropped:.2f} um rms were left out because they take tables that there are not or that are not worth it."
+    yield from _turned(request, scheme)
+    yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
+    yield from _sums(request, settings, scheme)
+    if products:
+        yield "Products hold in millimetres only: do not switch the control to inches with these tables on."
+
+
+def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
+    """What becomes of the orientation of the tool."""
+    if not request.machine.rotary.any():
+        return
+    q = random_poses(request.space, CHECKS, seed=9)
+    state = State(request.tool_length)
+    done = scheme.tables.at(request.machine.axis_names, q)
+    before, after = (orientation_error(request.machine, q, each, state) for each in (np.zeros_like(q), done))
+    sizes = [1e6 * float(np.sqrt(np.mean(angle**2))) for angle in (before, after)]
+    yield f"Orientation of the tool, spin included: {sizes[0]:.1f} urad rms without the tables, {sizes[1]:.1f} with them."
+
+
+def _sums(request: Request, settings: Settings, scheme: Scheme) -> Iterator[str]:
+    """Limits of the total correction, in case that an assumption is wrong."""
+    q = random_poses(request.space, CHECKS, seed=9)
+    largest = np.abs(scheme.tables.at(request.machine.axis_names, q)).max(axis=0)
+    parts = []
+    for axis, value in zip(request.machine.axes, (ROOM * largest).tolist(), strict=True):
+        if value:
+            parts.append(f"{settings.axes[axis.name]} {value / axis.unit:.4f} {'degree' if axis.rotary else 'mm'}")
+    if parts:
+        yield f"MD32720 $MA_CEC_MAX_SUM, 1.5 times the largest correction: {', '.join(parts)}."
+
+

@@ -1,0 +1,113 @@
+"""The settings of the control `siemens`, checked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ncfix.diagnostics import RefusedError, UsageError
+from ncfix.tables.control import Option
+from ncfix.tables.scheme import Limits
+from ncfix_siemens.cec import Style
+from ncfix_siemens.combine import TERMS
+
+MODELS = {"840D": (40, 1000), "828D": (8, 200), "802D": (2, 350)}
+"""Tables and points of each. 828D and 802D sl from the manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
+MOST_TABLES, MOST_POINTS = 128, 5000
+SCHEMES = ("auto", "poly25", "trigo23", "fik40", "fik20")
+SIGNS = ("error", "correction")
+ORDER = "XYZABCUVW"
+AXIS = re.compile(r"\w{1,16}", re.ASCII)
+
+OPTIONS: Mapping[str, Option] = {
+    "value_sign": Option(None, "error: values are taken off the command; correction: they are added. --probe settles it"),
+    "product_terms": Option("", "what a product adds: only, plus_multiplier, plus_base, plus_both. --probe settles it"),
+    "scheme": Option("auto", "auto, or the thesis's poly25, trigo23, fik40, fik20"),
+    "model": Option("840D", "840D (40 tables of 1000 points), 828D (8 of 200), 802D (2 of 350)"),
+    "tables": Option("", "most tables, if not those of the model"),
+    "points": Option("", "most points of a table, if not those of the model"),
+    "rotary": Option("auto", "correct the rotary axes, too: correct, keep, or auto: unless the tip is better without"),
+    "positioning": Option("cec", "where an axis over itself goes: cec, or eec, the encoder tables"),
+    "axes": Option("", "machine axes, e.g. X:AX1,Y:AX2,Z:AX3,A:AX4,C:AX5"),
+    "brackets": Option("yes", "axis names in brackets, (AX1), as in the manuals"),
+    "metric_line": Option("no", "a line METRIC at the top"),
+    "path_line": Option("", "a path for a line ;$PATH=..."),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """All of them, in a form to work with."""
+
+    sign: str
+    terms: str
+    scheme: str
+    model: str
+    limits: Limits
+    rotary: str
+    axes: Mapping[str, str]
+    style: Style
+
+    @property
+    def eec(self) -> bool:
+        """Whether encoder tables are used."""
+        return self.limits.own_free
+
+
+def checked(given: Mapping[str, str], names: tuple[str, ...]) -> Settings:
+    """The settings for a machine with axes `names`; raises `UsageError` NCF485, `RefusedError` NCF484."""
+    model = _one_of(given, "model", tuple(MODELS))
+    tables, points = MODELS[model]
+    eec = _one_of(given, "positioning", ("cec", "eec")) == "eec"
+    limits = Limits(
+        _whole(given, "tables", 1, MOST_TABLES) if given["tables"] else tables,
+        _whole(given, "points", 3, MOST_POINTS) if given["points"] else points,
+        eec,
+    )
+    style = Style(_yes(given, "brackets"), _yes(given, "metric_line"), given["path_line"])
+    return Settings(
+        _one_of(given, "value_sign", ("", *SIGNS)),
+        _one_of(given, "product_terms", ("", *TERMS)),
+        _one_of(given, "scheme", SCHEMES),
+        model,
+        limits,
+        _one_of(given, "rotary", ("auto", "correct", "keep")),
+        machine_axes(given["axes"], names),
+        style,
+    )
+
+
+def machine_axes(given: str, names: tuple[str, ...]) -> dict[str, str]:
+    """Axis letter -> machine axis."""
+    odd = [name for name in names if name not in ORDER]
+    if odd:
+        raise RefusedError.of("NCF484", f"axes {' '.join(odd)}: letters {' '.join(ORDER)} are known")
+    if not given:
+        return {name: f"AX{number}" for number, name in enumerate(sorted(names, key=ORDER.index), 1)}
+    pairs = [pair.strip().partition(":")[::2] for pair in given.split(",")]
+    found = {letter.strip().upper(): axis.strip().upper() for letter, axis in pairs}
+    fine = all(AXIS.fullmatch(axis) for axis in found.values()) and len(set(found.values())) == len(pairs)
+    if not fine or sorted(found) != sorted(names):
+        hint = f"LETTER:AXIS for each of {' '.join(names)}, separated by commas"
+        raise UsageError.of("NCF485", f"axes={given}", hint=hint)
+    return {name: found[name] for name in sorted(found, key=ORDER.index)}
+
+
+def _one_of(given: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
+    if given[key] not in allowed:
+        raise UsageError.of("NCF485", f"{key}={given[key]}", hint=f"one of {', '.join(filter(None, allowed))}")
+    return given[key]
+
+
+def _yes(given: Mapping[str, str], key: str) -> bool:
+    return _one_of(given, key, ("yes", "no")) == "yes"
+
+
+def _whole(given: Mapping[str, str], key: str, low: int, high: int) -> int:
+    text = given[key]
+    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
+        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
+    return int(text)
+
+
