@@ -138,3 +138,36 @@ def test_isg_end_to_end(shop: Any, ncfix: Any) -> None:
     assert result["limits"]["points"] == 8
     assert result["residual_um"]["after"]["max"] < 0.01  # 1e-6 mm in the file, bilinear is exact here
     assert ncfix("emulate", "isg", folder, "-m", shop.machine).code == ExitCode.DONE
+
+
+GRIDS = {"fanuc": ("sign=error",), "heidenhain-kinematics": ("sign=error", "angle_unit=deg"), "gcode": ()}
+
+
+@pytest.mark.parametrize("control", GRIDS)
+def test_one_figure_for_tables_and_rewritten_programs(shop: Any, ncfix: Any, control: str) -> None:
+    """The corner of the shop's program on a machine that is 0.1 um per mm too long in X: 21 um at X210."""
+    folder = shop.folder / control
+    options = [word for each in GRIDS[control] for word in ("--set", each)]
+    assert ncfix("export", control, "-m", shop.machine, "-o", folder, *options).code == ExitCode.DONE
+    found = ncfix("emulate", control, folder, "-m", shop.machine, "--program", shop.program, "--assume-zero", "--json")
+    error = found.json()["program"]
+    assert error["error_before_um"]["max"] == pytest.approx(21, abs=0.1)
+    assert error["error_after_um"]["max"] < 1.0
+
+
+def test_export_writes_the_rewritten_program(shop: Any, ncfix: Any) -> None:
+    arguments = ("-m", shop.machine, "-o", shop.folder / "g", "--program", shop.program, "--assume-zero")
+    result = ncfix("export", "gcode", *arguments)
+    assert result.code == ExitCode.DONE
+    assert f"{shop.program} after: max" in result.out.decode()
+    assert (shop.folder / "g" / shop.program.name).read_bytes() != shop.program.read_bytes()
+
+
+def test_tables_on_top_of_a_corrected_program_are_refused(shop: Any, ncfix: Any, tables: Path) -> None:
+    fixed = shop.folder / "fixed.nc"
+    assert ncfix("fix", shop.program, "-m", shop.machine, "-o", fixed, "--assume-zero").code == ExitCode.DONE
+    arguments = ("emulate", "linuxcnc", tables, "-m", shop.machine, "--program", fixed, "--assume-zero")
+    result = ncfix(*arguments)
+    assert result.code == ExitCode.REFUSED
+    assert "NCF493" in result.err
+    assert "corrected twice" in result.err

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import click
 
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.export import tell
-from ncfix.cli.options import json_option, load_machine, machine_option
+from ncfix.cli.following import Following
+from ncfix.cli.options import dialect_option, json_option, machine_option
+from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.diagnostics import ExitCode
 
 
@@ -17,22 +20,42 @@ from ncfix.diagnostics import ExitCode
 @click.argument("control")
 @click.argument("folder", metavar="TABLEDIR")
 @machine_option
+@click.option("--program", metavar="FILE", help="Also run this program with the tables active.")
 @click.option("--other-machine", is_flag=True, help="Run tables that were made for another machine or other errors.")
+@dialect_option
+@setup_options
 @json_option
-def emulate(control: str, folder: str, machine_path: str, other_machine: bool, as_json: bool) -> int:
+def emulate(
+    control: str,
+    folder: str,
+    machine_path: str,
+    program: str | None,
+    other_machine: bool,
+    dialect: str | None,
+    given: SetupOptions,
+    as_json: bool,
+) -> int:
     """Say what the tables in TABLEDIR, which `ncfix export` wrote for CONTROL, leave on this machine.
 
     Exit code 1 if there is something to remark on the files.
     """
+    from ncfix.cli.tabled import along
     from ncfix.tables.control import get_control
     from ncfix.tables.export import emulate as emulated
+    from ncfix.tables.manifest import NAME, loads
 
     chosen = get_control(control)
-    machine = load_machine(machine_path)
+    following = Following.of(machine_path, dialect, given)
+    assert following.machine is not None
+    content = read_folder(folder)
+    more: dict[str, Any] = {}
     with console.busy("running the tables"):
-        found = emulated(chosen, read_folder(folder), machine, folder.rstrip(os.sep), other_machine)
+        found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
+        if program is not None:
+            settings = loads(content[NAME], NAME).settings
+            more["program"] = along(following, chosen, found.tables, settings, program)
     console.tell_some(found.messages)
-    tell(found, as_json, control=chosen.name, reaches=chosen.reaches)
+    tell(found, as_json, control=chosen.name, reaches=chosen.reaches, **more)
     return ExitCode.FINDINGS if found.messages else ExitCode.DONE
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix import files
 from ncfix.cli import console
-from ncfix.cli.options import Positive, force_option, json_option, load_machine, machine_option
+from ncfix.cli.following import Following
+from ncfix.cli.options import Positive, dialect_option, force_option, json_option, machine_option
+from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.diagnostics import ExitCode, Place, UsageError
 
 if TYPE_CHECKING:
     from ncfix.machine import Machine
+    from ncfix.tables.control import Written
     from ncfix.tables.export import Exported
 
 
@@ -33,7 +37,11 @@ if TYPE_CHECKING:
 )
 @click.option("--range", "ranges", metavar="X=LOW:HIGH", multiple=True, help="Cover less than the travel; mm, degree.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control.")
+@click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
+@click.option("--program", metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables.")
 @force_option
+@dialect_option
+@setup_options
 @json_option
 def export(
     control: str,
@@ -43,26 +51,44 @@ def export(
     target_um: float,
     ranges: tuple[str, ...],
     settings: tuple[str, ...],
+    probe: bool,
+    program: str | None,
     force: bool,
+    dialect: str | None,
+    given: SetupOptions,
     as_json: bool,
 ) -> int:
     """Write compensation tables for CONTROL, with a hand-over sheet and what they leave.
 
     The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
     """
+    from ncfix.cli.tabled import along, rewritten_file
     from ncfix.tables.control import Request, get_control
     from ncfix.tables.export import export as exported
     from ncfix.tables.poses import ranges_of
 
     chosen = get_control(control)
-    machine = load_machine(machine_path)
+    following = Following.of(machine_path, dialect, given)
+    machine = following.machine
+    assert machine is not None
     space = ranges_of(machine, given_ranges(machine, ranges))
-    options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings))
+    options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings), complete=not probe)
+    request = Request(machine, space, tool_length, 1e-3 * target_um, options)
+    if probe:
+        found = chosen.probe(request)
+        write_folder(output, found, force)
+        _tell_of_probe(found, chosen.name, as_json)
+        return ExitCode.DONE
+    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("making tables"):
-        made = exported(chosen, Request(machine, space, tool_length, 1e-3 * target_um, options))
+        made = exported(chosen, request)
+        if program is not None:
+            more["program"] = along(following, chosen, made.tables, options, program)
+        if program is not None and chosen.rewrites:
+            made = replace(made, files={**made.files, **rewritten_file(following, options, program)})
     write_folder(output, made, force)
     console.tell_some(made.messages)
-    tell(made, as_json, control=chosen.name, reaches=chosen.reaches, assumptions=chosen.described()["assumptions"])
+    tell(made, as_json, control=chosen.name, reaches=chosen.reaches, **more)
     return ExitCode.DONE
 
 
@@ -88,7 +114,14 @@ def _pair(text: str, form: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def write_folder(folder: str, made: Exported, force: bool) -> None:
+def _tell_of_probe(found: Written, control: str, as_json: bool) -> None:
+    if as_json:
+        console.put_json(control=control, files=sorted(found.files), notes=found.notes)
+        return
+    console.put("".join(f"{name}\n" for name in sorted(found.files)))
+
+
+def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
     """Write all files, or none if one is there already; raises `UsageError` NCF004 or NCF007."""
     if os.path.lexists(folder) and not os.path.isdir(folder):
         raise UsageError.of("NCF007", "is not a folder", Place(folder))
@@ -103,7 +136,7 @@ def write_folder(folder: str, made: Exported, force: bool) -> None:
 def tell(made: Exported, as_json: bool, **more: object) -> None:
     """Say what the tables leave."""
     figures = made.left.figures()
-    reaches = more.pop("reaches")
+    reaches, program = more.pop("reaches"), more.get("program")
     if as_json:
         entries = {**more, "class": reaches, "files": sorted(made.files), "residual_um": figures}
         warnings = [message.as_dict() for message in made.messages]
@@ -114,5 +147,8 @@ def tell(made: Exported, as_json: bool, **more: object) -> None:
     pose = " ".join(f"{name}{value:g}" for name, value in figures["after"]["at"].items())
     limits = made.limits()
     console.put(f"class {reaches}; {limits['tables']} tables, {limits['points']} points; most is left at {pose}\n")
+    if isinstance(program, dict):
+        for when in ("before", "after"):
+            console.put(f"{program['path']} {when}: {console.error_figures(program[f'error_{when}_um'])}\n")
     for note in made.notes:
         console.say(note)

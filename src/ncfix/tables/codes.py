@@ -75,4 +75,10 @@ CODES = {
         "the travel, values lost to rounding, a setting that compensates twice.",
         "The message has the place and says why.",
     ),
+    "NCF493": Code(
+        "tables on top of a program that has been corrected already",
+        "The program carries the stamp of `ncfix fix`. Run with tables of the same errors it would be corrected twice, "
+        "which is as wrong as not at all, the other way round.",
+        "Give the original program, or run the corrected one with the tables switched off.",
+    ),
 }

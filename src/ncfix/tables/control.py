@@ -107,6 +107,7 @@ class Control(ABC):
     options      `--set`
     steps        what to do at the machine, in order
     switch_off   how to be rid of it
+    rewrites     it has no tables, but programs that are rewritten
     """
 
     name: ClassVar[str]
@@ -117,6 +118,7 @@ class Control(ABC):
     options: ClassVar[Mapping[str, Option]] = {}
     steps: ClassVar[tuple[str, ...]]
     switch_off: ClassVar[str]
+    rewrites: ClassVar[bool] = False
 
     @abstractmethod
     def write(self, request: Request) -> Written:
@@ -130,14 +132,22 @@ class Control(ABC):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What is wrong or doubtful in these files, each with its place; empty if nothing is."""
 
-    def settings(self, given: Mapping[str, str]) -> dict[str, str]:
-        """All options with those given; raises `UsageError` NCF485 for one that is unknown or missing."""
+    def probe(self, request: Request) -> Written:
+        """Small files that settle on the machine what must be said in options; raises `UsageError` NCF485 if none do.
+
+        Options without a default may be missing in the request; they are empty then.
+        """
+        text = f"there is nothing to probe for {self.name}"
+        raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
+
+    def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
+        """All options with those given; raises `UsageError` NCF485 for one that is unknown, or missing if `complete`."""
         for key in given:
             if key not in self.options:
                 known = ", ".join(self.options) or "none"
                 raise UsageError.of("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
         for key, option in self.options.items():
-            if option.default is None and key not in given:
+            if complete and option.default is None and key not in given:
                 text = f"{self.name} needs the option {key!r}: {option.text}"
                 raise UsageError.of("NCF485", text, hint=f"--set {key}=VALUE")
         return {key: given.get(key, option.default or "") for key, option in self.options.items()}

@@ -92,8 +92,8 @@ class Compensation:
 
     @property
     def grids(self) -> tuple[Grid, ...]:
-        """Every table in it."""
-        return tuple(grid for term in self.terms for grid in term.factors)
+        """Every table in it, once: several may be multiplied by the same."""
+        return tuple({id(grid): grid for term in self.terms for grid in term.factors}.values())
 
     @property
     def axes(self) -> frozenset[str]:

@@ -1,0 +1,73 @@
+"""A program run with tables active: one figure for tables and for rewritten programs."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from ncfix.cli.following import Following, figures, lines_of
+from ncfix.cli.options import subprograms
+from ncfix.cli.targets import shown
+from ncfix.diagnostics import Message, Place, RefusedError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ncfix.compensate.fix import Fixed
+    from ncfix.compensate.following import Followed
+    from ncfix.program.tree import Program
+    from ncfix.tables.control import Control
+    from ncfix.tables.neutral import Tables
+
+
+def along(
+    following: Following, control: Control, tables: Tables, settings: Mapping[str, str], path: str
+) -> dict[str, Any]:
+    """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um}`.
+
+    Raises `RefusedError` NCF493 for a program that carries a stamp of ncfix: it would be corrected twice.
+    """
+    if control.rewrites:
+        entry = rewritten(following, settings, path).report.as_dict()
+        return {"path": shown(path), **{key: entry[key] for key in ("error_before_um", "error_after_um")}}
+    from ncfix.compensate.simulation import tip_error
+    from ncfix.compensate.tabled import tip_error_with
+
+    program, followed = _followed(following, path)
+    names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
+    lines = lines_of(program, moves.block)
+    after = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
+    before = figures(tip_error(machine, moves), lines)
+    return {"path": shown(path), "error_before_um": before, "error_after_um": figures(after, lines)}
+
+
+def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
+    """The program as `ncfix fix` rewrites it under these settings of the control."""
+    from ncfix.compensate.fix import FixOptions, fix_program
+
+    assert following.machine is not None
+    options = FixOptions(strategy=settings["strategy"], tolerance_um=float(settings["tolerance_um"]))
+    return fix_program(following.read(path), following.machine, following.setup, options, subprograms(path))
+
+
+def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
+    """Its file; raises `RefusedError` with what could not be corrected, if anything could not."""
+    fixed = rewritten(following, settings, path)
+    refused = [Message(each.code, each.reason, Place(shown(path), each.line)) for each in fixed.report.refused]
+    if refused:
+        raise RefusedError.collected(refused)
+    return {os.path.basename(path): fixed.text}
+
+
+def _followed(following: Following, path: str) -> tuple[Program, Followed]:
+    from ncfix.compensate.following import follow
+    from ncfix.program import stamp
+
+    assert following.machine is not None
+    program = following.read(path)
+    block = stamp.find(program)
+    if block is not None:
+        text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
+        place = program.place(block) or Place(shown(path))
+        raise RefusedError.of("NCF493", text, place, "give the original program, or run this one without tables")
+    return program, follow(program, following.machine, following.setup, subprograms(path))
