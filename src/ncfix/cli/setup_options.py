@@ -113,6 +113,11 @@ OPTIONS = (
         multiple=True,
         help="What the machine's errors depend on besides its axes.",
     ),
+    click.option(
+        "--no-point",
+        type=click.Choice(("calculator", "IS-A", "IS-B", "IS-C"), case_sensitive=False),
+        help="What a number without a decimal point means: units, or least increments (IS-B: X50 is 0.050 mm).",
+    ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
 )
 
@@ -127,6 +132,7 @@ class SetupOptions:
     tool_table: str | None = None
     initial: dict[str, float] | None = None
     inputs: tuple[tuple[str, float], ...] = ()
+    no_point: str | None = None
     assume_zero: bool = False
 
     @property
@@ -151,6 +157,7 @@ class SetupOptions:
             tools=tools,
             initial={**setup.initial, **(self.initial or {})},
             inputs={**setup.inputs, **dict(self.inputs)},
+            no_point=self.no_point or setup.no_point,
             assume_zero=setup.assume_zero or self.assume_zero,
         )
 
@@ -167,10 +174,11 @@ def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
         tool_table: str | None,
         initial: dict[str, float] | None,
         inputs: tuple[tuple[str, float], ...],
+        no_point: str | None,
         assume_zero: bool,
         **others: Any,
     ) -> Any:
-        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, inputs, assume_zero)
+        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, inputs, no_point, assume_zero)
         return command(*arguments, given=given, **others)
 
     for option in reversed(OPTIONS):

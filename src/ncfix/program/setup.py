@@ -4,6 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Increments(NamedTuple):
+    """The least increments of a control's input: mm, inch, degree."""
+
+    mm: float
+    inch: float
+    degree: float
+
+
+POINTLESS = {
+    "IS-A": Increments(0.01, 0.001, 0.01),
+    "IS-B": Increments(0.001, 0.0001, 0.001),
+    "IS-C": Increments(0.0001, 0.00001, 0.0001),
+}
+"""Increment systems of controls that count them in numbers without a decimal point (Fanuc and its like)."""
+
+CALCULATOR = "calculator"
+"""A number means the same with and without a decimal point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +47,8 @@ class Setup:
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     tcp               X Y Z are tool-tip coordinates from the start of the program
     assume_zero       what is not given is zero (named in warnings and in the stamp), else it is an error
+    no_point          what numbers without a decimal point mean to controls that tell: "calculator" (X50 is 50 mm), or an
+                      increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 
@@ -40,3 +62,4 @@ class Setup:
     tcp: bool = False
     assume_zero: bool = False
     block_skip: bool = False
+    no_point: str = ""

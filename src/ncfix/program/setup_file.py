@@ -11,7 +11,7 @@ from typing import Any
 
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
-from ncfix.program.setup import Setup, Tool
+from ncfix.program.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.program.tool_table import load_tool_table
 
 __all__ = ["load", "load_tool_table", "loads"]
@@ -71,6 +71,7 @@ class Reading:
             "tcp": self.flag,
             "assume_zero": self.flag,
             "block_skip": self.flag,
+            "no_point": self.no_point,
         }
         if key not in readers:
             close = get_close_matches(key, readers, 1)
@@ -105,6 +106,12 @@ class Reading:
         if not isinstance(value, bool):
             self.fault(WRONG_VALUE, key, f"expected true or false, found {value!r}")
         return value is True
+
+    def no_point(self, key: str, value: Any) -> str:
+        """What numbers without a decimal point mean."""
+        if value not in (CALCULATOR, *POINTLESS):
+            self.fault(WRONG_VALUE, key, f"expected {CALCULATOR} or {', '.join(POINTLESS)}, found {value!r}")
+        return str(value)
 
     def triple(self, key: str, value: Any) -> tuple[float, float, float]:
         """Three numbers."""

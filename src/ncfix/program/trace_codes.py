@@ -158,6 +158,30 @@ TRACE_CODES: dict[str, Code] = {
         "The control gets to a line that is not written in its language.",
         "Correct the line.",
     ),
+    "NCF240": Code(
+        "Number without a decimal point",
+        "To controls of the Fanuc family X50 is 50 mm or 0.050 mm, as a parameter of theirs says; the program does "
+        "not. Corrected for the wrong one, it would move a thousand times too far or not at all.",
+        "--no-point IS-B (least increments, the control's own default) or --no-point calculator, or no_point in the "
+        "setup file.",
+    ),
+    "NCF241": Code(
+        "Program reads a position",
+        "A macro reads where the machine stands. In the corrected program it will find the corrected position there, "
+        "so what is computed from it would be another value than here.",
+        "Motions that depend on it are refused; write the position as a number, or keep it in a variable of its own.",
+    ),
+    "NCF242": Code(
+        "Jump to nowhere",
+        "GOTO, M99 or a loop refers to a block that is not in the program: an N word, an END or an M99 is missing.",
+        "The message names it.",
+    ),
+    "NCF243": Code(
+        "Several ways to turn to a tilted plane",
+        "G53.1 turns the rotary axes until the tool stands square to the plane, and there is more than one way. Which "
+        "one a control takes depends on its parameters and on its travels; here it is the nearest.",
+        "State the rotary axes in the program if they are others.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

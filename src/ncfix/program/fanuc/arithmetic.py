@@ -13,13 +13,13 @@ from collections.abc import Callable
 from ncfix.program.rs274.arithmetic import ARITHMETIC, divide, exponential, inverse, logarithm, power, square_root
 from ncfix.program.rs274.expressions import Evaluate, Scope
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
+from ncfix.program.tree import Binary, Constant, Expression, Literal, Parameter, Unary
 
 VACANT = math.nan
 """The value of a variable that has none."""
 
 NEARLY = 1e-8
-"""Numbers that differ by less, relative to their size, but do differ: a control with other rounding may see it otherwise."""
+"""Numbers that differ by less, relative to their size, may be equal to a control with other rounding."""
 
 
 def number(value: float) -> float:
@@ -153,8 +153,7 @@ def compiled(expression: Expression, address: str = "") -> Evaluate:
             return unary(operator, compiled(operand, address), address)
         case Binary(operator, left, right):
             return binary(operator, compiled(left, address), compiled(right, address))
-        case NamedParameter() | Exists():
-            raise AssertionError("the grammar has no named variables")
+    raise AssertionError("the grammar has no other expressions")
 
 
 def variable_number(value: float) -> int:

@@ -60,7 +60,7 @@ class MacroBuilder(Builder):
     def statement(self, tree: Branch, keyword: str) -> Flow:
         """A control statement: what it tests, and where it leads."""
         branches = [node for node in tree.children if not isinstance(node, Token)]
-        label: str | Expression = next((str(int(n)) for n in tree.children if is_label(n)), "")
+        label: str | Expression = next((str(int(str(n))) for n in tree.children if is_label(n)), "")
         tests = branches[:1] if keyword in ("if goto", "if then", "do") else []
         if not label and len(branches) > len(tests):
             label = self.expression(branches[-1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.diagnostics import Message, Place
@@ -82,6 +82,8 @@ class Control:
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force
     increments what a number without a decimal point counts, linear and rotary words
+    extended   additional work offsets (G54.1) that the program has set, and the name of that in force
+    tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
     saved      the modal states that M70 saved, one place for each call level
     """
 
@@ -112,6 +114,10 @@ class Control:
         self.refusal = ""
         self.suspended: dict[str, str] = {}
         self.increments = (1.0, 1.0)
+        self.extended: dict[str, Mapping[str, float]] = {}
+        self.extended_name = ""
+        self.tilted = False
+        self.tip_control = False
         self.external = ""
         self.tcp = setup.tcp
         self.shaky: Unknown = {}

@@ -8,8 +8,9 @@ Source: LinuxCNC documentation, "O codes"; what it leaves open was tried out on 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Control
@@ -48,6 +49,43 @@ class Call:
     by_code: bool = False
     saved: list[tuple[float, bool]] = field(default_factory=list)
     remaining: int = 0
+
+
+class Course(Protocol):
+    """Where execution stands: what the walk through a program asks of any flow control.
+
+    unit, block    what is executed next
+    skipping       the label that execution waits for; None while it does not skip
+    skipping_from  where that began
+    calls          calls that have not returned
+    """
+
+    unit: Unit
+    block: int
+    skipping: str | None
+    skipping_from: tuple[Unit, int]
+
+    @property
+    def calls(self) -> Sequence[object]:
+        """Calls that have not returned."""
+
+    def next_flow(self) -> bool:
+        """While skipping: go to the next flow-control line of this text; False if there is none."""
+
+    def follow(self, flow: FlowLine) -> None:
+        """Do what a flow-control line says; `block` is already that of the next line."""
+
+    def unfinished(self) -> Fault | None:
+        """What is wrong if the text ends here."""
+
+    def missing_end(self) -> Fault:
+        """The fault of a text that ends while something is still looked for."""
+
+    def call_by_code(self, label: str, times: int) -> None:
+        """M98."""
+
+    def finish(self) -> None:
+        """Return from a subprogram, or run it again if M98 asked for it several times."""
 
 
 class FlowControl:

@@ -13,7 +13,7 @@ from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.flow import FlowControl
+from ncfix.program.rs274.flow import Course, FlowControl
 from ncfix.program.rs274.groups import CYCLES
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
@@ -52,12 +52,18 @@ class Interpreter:
         self.files: dict[str, Unit | None] = {}
         self.axes = sum(1 << index for index in control.machine)
         self.main = Unit(program, control.rules, self.axes)
-        self.flow = FlowControl(control, self.main, self.find)
+        self.flow: Course = self.prepared()
         self.span: Span | None = None
         control.locate = self.place
-        control.parameters.persistent = lambda number: systems.before_persistent(control, number)
-        predefined.install(control, self.flow)
         systems.load_setup(control)
+
+    def prepared(self) -> Course:
+        """Give the control its own parameters; where execution begins."""
+        control = self.control
+        flow = FlowControl(control, self.main, self.find)
+        control.parameters.persistent = lambda number: systems.before_persistent(control, number)
+        predefined.install(control, flow)
+        return flow
 
     def place(self) -> Place:
         """Where in the program we are."""

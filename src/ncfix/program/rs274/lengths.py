@@ -48,7 +48,8 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
         control.refusal = control.refusal or "a tool length offset is known only at run time"
     if code == 435:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
-    on = control.setup.tcp or code in (434, 435)
+    control.tip_control = code in (434, 435)
+    on = control.setup.tcp or control.tip_control or control.tilted
     if on or control.tcp:
         tcp.switch(control, tool, on)
     control.offsets.tool, control.tools.offset = tool, number

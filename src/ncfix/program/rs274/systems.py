@@ -131,7 +131,8 @@ def mark_shaky(control: Control) -> None:
 def extended_system(control: Control, block: Block) -> None:
     """G54.1 Pn: an additional work offset, `G54.1P1` in the setup."""
     name = f"G54.1P{whole(block.get('P', 1.0), 'P of G54.1')}"
-    given = control.setup.work_offsets.get(name)
+    given = control.extended.get(name, control.setup.work_offsets.get(name))
+    control.extended_name = name
     if given is None:
         control.knowledge.work_offset(name)
     for index, letter in enumerate(LETTERS):

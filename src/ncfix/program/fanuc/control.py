@@ -1,0 +1,60 @@
+"""The control while it follows a program of the Fanuc family: what it keeps besides that of RS274."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Message
+from ncfix.program.dialect import Dialect
+from ncfix.program.fanuc.rules import RULES
+from ncfix.program.fanuc.variables import Variables
+from ncfix.program.moves import Kinematics
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.setup import POINTLESS, Setup
+
+NO_POINT = "NCF240"
+DEFAULT_SYSTEM = "IS-B"
+
+
+class MacroControl(Control):
+    """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
+
+    polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        dialect: Dialect,
+        kinematics: Kinematics | None = None,
+    ) -> None:
+        super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
+        self.parameters: Variables = Variables()
+        self.polar: tuple[float, float] | None = None
+
+    def refresh(self) -> None:
+        """Compose the offsets; a number without a point counts increments of the unit in force."""
+        steps = POINTLESS.get(self.setup.no_point)
+        if steps is not None:
+            self.increments = (steps.mm if self.modal.unit == 1.0 else steps.inch, steps.degree)
+        super().refresh()
+
+    def least_increment(self, address: str) -> float:
+        """The least increment of an address in its own unit, of the usual increment system if none is given."""
+        steps = POINTLESS.get(self.setup.no_point) or POINTLESS[DEFAULT_SYSTEM]
+        if address in INDEX and self.rotary[INDEX[address]]:
+            return steps.degree
+        return steps.mm if self.modal.unit == 1.0 else steps.inch
+
+    def without_point(self, address: str, value: float, *, angle: bool = False) -> float:
+        """What a number without a decimal point means; asked of the setup, for nobody can see it in the program."""
+        if value == 0.0 or self.setup.no_point == "calculator":
+            return value
+        if self.setup.no_point in POINTLESS:
+            turning = angle or (address in INDEX and self.rotary[INDEX[address]])
+            return value * self.increments[1 if turning else 0]
+        text = f"{address}{value:g} has no decimal point, and whether it counts units or least increments is not given"
+        hint = "--no-point IS-B: X50 is 0.050 mm; --no-point calculator: X50 is 50 mm"
+        self.knowledge.missing.setdefault(NO_POINT, Message(NO_POINT, text, self.place(), hint))
+        return value

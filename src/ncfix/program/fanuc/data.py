@@ -1,0 +1,102 @@
+"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); the other kinds change what is not followed.
+
+Source: Fanuc 30i operator's manual (machining centre), "Programmable data input".
+"""
+
+from __future__ import annotations
+
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.coordinates import DEGREE, LETTERS
+from ncfix.program.rs274.systems import (
+    SYSTEM_NAMES,
+    activate,
+    extended_system,
+    first_parameter,
+    store,
+    stored,
+    words_of,
+)
+
+WORK_OFFSETS = 6
+LENGTHS = (10,)
+UNFOLLOWED = {
+    11: "tool wear (G10 L11)",
+    12: "tool radii (G10 L12)",
+    13: "tool radii (G10 L13)",
+    50: "parameters of the control (G10 L50)",
+    52: "parameters of the control (G10 L52)",
+}
+HARMLESS = frozenset({3, 12, 13})
+"""Tool life, and tool radii, which only the control's cutter compensation uses."""
+
+
+def nothing(control: Control, block: Block, code: int) -> None:
+    """A code without an effect on the path."""
+
+
+def extended(control: Control, block: Block, code: int) -> None:
+    """G154 Pn of Haas: an additional work offset."""
+    extended_system(control, block)
+
+
+def set_data(control: Control, block: Block, code: int) -> None:
+    """G10; a block without L takes tool lengths on old controls."""
+    kind = whole(block.get("L", 10.0 if "P" in block.values else -1.0), "L of G10")
+    if kind == 2:
+        set_offset(control, block)
+    elif kind == 20:
+        set_extended(control, block)
+    elif kind in LENGTHS:
+        set_length(control, block)
+    elif kind not in HARMLESS:
+        what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
+        control.refusal = control.refusal or f"the program sets {what}, which ncfix does not follow"
+
+
+def set_offset(control: Control, block: Block) -> None:
+    """L2 Pn: the words are the offset of G54 (P1) to G59 (P6), or are added to it in G91."""
+    system = whole(block.get("P"), "P of G10")
+    if not 1 <= system <= WORK_OFFSETS:
+        control.refusal = control.refusal or "the program sets the external work offset (G10 L2 P0)"
+        return
+    first = first_parameter(system)
+    before = stored(control, first)
+    if control.modal.incremental and SYSTEM_NAMES[system - 1] not in control.setup.work_offsets:
+        control.knowledge.work_offset(SYSTEM_NAMES[system - 1])
+    for index in words_of(block):
+        value = control.scale[index] * block.values[LETTERS[index]]
+        value += before[index] if control.modal.incremental else 0.0
+        store(control, first, index, value, LETTERS[index] in block.runtime)
+    if system == control.modal.system:
+        activate(control, system)
+
+
+def set_extended(control: Control, block: Block) -> None:
+    """L20 Pn: the words are the offset of G54.1 Pn, or are added to it in G91."""
+    name = f"G54.1P{whole(block.get('P'), 'P of G10')}"
+    given = dict(control.setup.work_offsets.get(name, {}))
+    if control.modal.incremental and not given:
+        control.knowledge.work_offset(name)
+    for index in words_of(block):
+        letter = LETTERS[index]
+        value = control.scale[index] * block.values[letter] / (DEGREE if control.rotary[index] else 1.0)
+        given[letter] = value + (given.get(letter, 0.0) if control.modal.incremental else 0.0)
+    if block.runtime:
+        control.refusal = control.refusal or f"the work offset {name} is known only at run time"
+    control.extended[name] = given
+    if control.modal.system == 0 and control.extended_name == name:
+        extended_system(control, block)
+
+
+def set_length(control: Control, block: Block) -> None:
+    """L10 Pn R: the length of tool offset n; in G91 it is added."""
+    number = whole(block.get("P"), "P of G10")
+    if "R" not in block.values:
+        return
+    length = control.modal.unit * block.values["R"]
+    if control.modal.incremental:
+        length += control.tools.lengths.get(number, control.knowledge.tool_length(number))
+    control.tools.lengths[number] = length
+    if "R" in block.runtime:
+        control.tools.measured.add(number)

@@ -1,0 +1,264 @@
+"""The walk through a program of the Fanuc family."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from ncfix.program.fanuc import polar, system
+from ncfix.program.fanuc.calls import LENGTHS, local_variables
+from ncfix.program.fanuc.control import MacroControl
+from ncfix.program.fanuc.flow import MacroFlow
+from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
+from ncfix.program.fanuc.variables import POSITION_READ, is_system
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block
+from ncfix.program.rs274.expressions import Evaluate
+from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
+from ncfix.program.rs274.parameters import Store
+from ncfix.program.rs274.plans import Codes, Plan, plan_of
+from ncfix.program.tree import Literal, Opaque, Program, Template, Word
+
+G65, G66, G66_1, G67 = 650, 660, 661, 670
+DRILLING = frozenset("KLQ")
+SCALED = frozenset("XYZABCUVWIJKRQ")
+CORNER = frozenset((",R", ",C", ",A"))
+ROUNDED_CORNER = "the control rounds or breaks the corner (,R ,C) by itself"
+COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
+NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
+
+
+@dataclass(frozen=True, slots=True)
+class ModalCall:
+    """A macro that is called after every motion (G66)."""
+
+    label: str
+    times: int
+    arguments: Store
+    depth: int
+
+
+class MacroInterpreter(Interpreter):
+    """Follows one program."""
+
+    control: MacroControl
+    flow: MacroFlow
+
+    def __init__(
+        self,
+        control: MacroControl,
+        program: Program,
+        resolve: Callable[[str], bytes | None] | None,
+        max_blocks: int,
+    ) -> None:
+        super().__init__(control, program, resolve, max_blocks)
+        self.modal_calls: list[ModalCall] = []
+        self.reduced: dict[tuple[int, frozenset[str]], Plan] = {}
+        self.moved = False
+
+    def prepared(self) -> MacroFlow:
+        """Give the control its own variables; where execution begins."""
+        control = self.control
+        control.parameters.persistent = lambda number: None
+        control.parameters.live = system.getters(control)
+        control.parameters.position = self.position_read
+        return MacroFlow(control, self.main, self.find)
+
+    def position_read(self, number: int) -> None:
+        """The program reads where the machine stands, which compensation changes."""
+        text = f"the program reads the position #{number}: on the machine it finds the corrected one there"
+        self.control.warn(POSITION_READ, text, "motions that are computed from it are refused")
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan) -> bool:
+        """Execute the block before `flow.block`; True if the program ends there."""
+        block = self.flow.block
+        ended = super().execute(plan)
+        if plan.flow is not None and plan.flow.keyword == "if then" and self.flow.passed and self.flow.block == block:
+            return self.execute_words(plan, block - 1)
+        return ended
+
+    def execute_words(self, plan: Plan, index: int) -> bool:
+        """Execute a block of words and assignments."""
+        self.moved = False
+        self.note_command(plan)
+        plan = self.without_vacant(plan)
+        codes = plan.codes
+        if codes is not None and codes.g.get(MACRO) and plan.fault is None:
+            self.macro(plan, codes)
+            return False
+        refusal = self.control.refusal
+        if plan.letters & CORNER:
+            self.control.refusal = refusal or ROUNDED_CORNER
+        ended = super().execute_words(plan, index)
+        if plan.letters & CORNER:
+            self.control.refusal = refusal
+        return ended
+
+    def note_command(self, plan: Plan) -> None:
+        """A command of a machine's own: nobody knows what it does."""
+        for item in plan.template.items:
+            if isinstance(item, Opaque) and item.kind == "unknown command" and not self.control.refusal:
+                text = self.flow.unit.program.slice(self.flow.block - 1, item.span).strip()
+                self.control.refusal = COMMAND_NOT_KNOWN.format(text.split()[0][:30])
+                self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
+
+    def without_vacant(self, plan: Plan) -> Plan:
+        """The plan without the words whose value is a vacant variable: they count as not written."""
+        if not plan.computed:
+            return plan
+        vacant = frozenset(letter for letter, function, _ in plan.computed if math.isnan(function(self.control)))
+        if not vacant:
+            return plan
+        key = id(plan), vacant
+        if key not in self.reduced:
+            items = plan.template.items
+            kept = tuple(item for item in items if not (isinstance(item, Word) and item.address in vacant))
+            self.reduced[key] = plan_of(Template(kept, plan.template.n_numbers), self.control.rules)
+        return self.reduced[key]
+
+    def evaluate(self, plan: Plan, index: int) -> Block:
+        """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
+        block = super().evaluate(plan, index)
+        for letter in plan.pointless:
+            if self.is_scaled(letter, plan.codes):
+                self.span = next(word.span for word in plan.template.words if word.address == letter)
+                block.values[letter] = self.control.without_point(letter, block.values[letter])
+        self.span = None
+        if self.control.polar is not None and plan.codes is not None and not plan.codes.takes:
+            block = polar.cartesian(self.control, block)
+        return block
+
+    def is_scaled(self, letter: str, codes: Codes | None) -> bool:
+        """Whether the number of a word counts least increments when it has no point."""
+        if letter not in SCALED:
+            return False
+        if codes is None:
+            return letter not in DRILLING
+        if codes.g.get("non-modal") == 40:
+            return False
+        cycle = (self.control.modal.motion if codes.motion is None else codes.motion) in ALL_CYCLES
+        return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
+
+    def assign(self, plan: Plan) -> None:
+        """Set the variables that a block sets, one after the other."""
+        parameters = self.control.parameters
+        for target, function, span in plan.assignments:
+            self.span = span
+            parameters.touched = False
+            number = whole(target(self.control), "the number of a variable") if callable(target) else int(target)
+            parameters.check_writable(number)
+            value = function(self.control)
+            runtime = parameters.touched
+            parameters.assign(number, value, runtime)
+            if is_system(number):
+                system.was_set(self.control, number, value, runtime)
+
+    def move(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block."""
+        before = self.control.builder.count
+        super().move(block, codes, motion)
+        self.moved = self.control.builder.count > before
+
+    # -- calls and ends -----------------------------------------------------------------------------------------------
+
+    def after(self, codes: Codes, block: Block) -> bool:
+        """What a block does last: M2, M30, calls and returns. True if the program ends."""
+        if codes.stop in PROGRAM_ENDS:
+            return True
+        match codes.call:
+            case 980 | 1980:
+                self.subprogram(block)
+            case 970:
+                self.flow.enter_local(whole(block.get("P"), "P of M97"), whole(block.get("L", 1.0), "L of M97"))
+            case 990:
+                return self.returned(block)
+            case _:
+                self.call_modal()
+        return False
+
+    def returned(self, block: Block) -> bool:
+        """M99: back to the caller; in the main program, to block P or to the start, where ncfix takes it as the end."""
+        target = whole(block.get("P"), "P of M99") if "P" in block.values else None
+        if self.flow.calls:
+            self.flow.finish(target)
+            return False
+        if target is None:
+            return True
+        self.flow.go_to(target)
+        return False
+
+    def subprogram(self, block: Block) -> None:
+        """M98 Pn Ln; the repeats may stand before four digits of the number."""
+        name = self.named_program()
+        if name:
+            self.flow.begin(name, whole(block.get("L", 1.0), "L of M98"), None)
+            return
+        number, times = whole(block.get("P"), "P of M98"), whole(block.get("L", 1.0), "L of M98")
+        if "L" not in block.values and number > LAST_PROGRAM and not self.is_there(str(number)):
+            times, number = divmod(number, LAST_PROGRAM + 1)
+        self.flow.begin(str(number), times, None)
+
+    def is_there(self, label: str) -> bool:
+        """Whether there is a program of that number."""
+        outline = self.flow.outline_of(self.main)
+        return label in outline.programs or self.find(label) is not None
+
+    def named_program(self) -> str:
+        """The name of a program that is called by name, `M98<NAME>`."""
+        unit, block = self.flow.unit, self.flow.block - 1
+        for item in unit.program.items_of(block):
+            if isinstance(item, Opaque) and item.kind == "text word":
+                found = NAME.search(unit.program.slice(block, item.span))
+                return (found["angle"] or found["quoted"]) if found else ""
+        return ""
+
+    # -- macros -------------------------------------------------------------------------------------------------------
+
+    def macro(self, plan: Plan, codes: Codes) -> None:
+        """G65 calls a macro once, G66 after every motion that follows, G67 ends that."""
+        code = codes.g[MACRO]
+        if code == G67:
+            if self.modal_calls:
+                self.modal_calls.pop()
+            return
+        values = {word.address: self.argument(word) for word in plan.template.words if word.address not in "GMN"}
+        name = self.named_program()
+        label = name or str(whole(values.get("P", (0.0, False))[0], f"P of G{code // 10}"))
+        times = whole(values.get("L", (1.0, False))[0], "L")
+        store = local_variables(self.arguments(plan))
+        if code == G65:
+            self.flow.begin(label, times, store)
+            return
+        if code == G66_1:
+            self.control.refusal = self.control.refusal or "a macro is called by every block (G66.1)"
+        self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
+
+    def arguments(self, plan: Plan) -> Iterator[tuple[str, float, bool]]:
+        """The arguments of a macro call in the order written; vacant ones are not passed."""
+        for word in plan.template.words:
+            if word.address not in "GMNPL":
+                value, runtime = self.argument(word)
+                if not math.isnan(value):
+                    yield word.address, value, runtime
+
+    def argument(self, word: Word) -> tuple[float, bool]:
+        """The value of a word of a macro call, and whether it is known only at run time."""
+        parameters = self.control.parameters
+        parameters.touched = False
+        function: Evaluate = self.control.rules.compiled(word.value, word.address)
+        value = function(self.control)
+        if isinstance(word.value, Literal) and word.value.pointless and word.address in LENGTHS:
+            value = self.control.without_point(word.address, value)
+        return value, parameters.touched
+
+    def call_modal(self) -> None:
+        """After a motion, call the macro that G66 named, unless it is running."""
+        if not self.moved or not self.modal_calls:
+            return
+        call = self.modal_calls[-1]
+        if len(self.flow.calls) <= call.depth:
+            self.flow.begin(call.label, call.times, call.arguments)

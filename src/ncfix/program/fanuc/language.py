@@ -1,0 +1,54 @@
+"""The Fanuc family as a `Language`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.fanuc.blocks import parse_block
+from ncfix.program.fanuc.control import MacroControl
+from ncfix.program.fanuc.interpreter import MacroInterpreter
+from ncfix.program.language import BulkLayout, Resolve
+from ncfix.program.moves import Kinematics, Trace
+from ncfix.program.rs274.language import RS274, finished
+from ncfix.program.setup import Setup
+from ncfix.program.shapes import Scan, scan
+from ncfix.program.tree import Literal, Program
+
+if TYPE_CHECKING:
+    from ncfix.program.language import Language
+
+
+def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """The shapes of blocks, in which numbers with and without a decimal point differ."""
+    return scan(source, blocks, pointless=True)
+
+
+def follow(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Resolve | None,
+    max_blocks: int,
+    kinematics: Kinematics | None,
+) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    control = MacroControl(setup, axes, rotary, program.dialect, kinematics)
+    MacroInterpreter(control, program, resolve, max_blocks).run()
+    return finished(control, program)
+
+
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What blocks need to be written many at a time; those with a number without a point are not."""
+    words = program.templates[int(program.template[block])].words
+    if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
+        return None
+    assert RS274.bulk is not None
+    return RS274.bulk(program, block)
+
+
+FANUC: Language = replace(RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk)

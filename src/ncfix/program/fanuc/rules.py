@@ -1,0 +1,86 @@
+"""Which codes controls of the Fanuc family know, and what they do where they differ from the common core.
+
+Sources: Fanuc 30i operator's manual (machining centre), "G code list"; Haas mill operator's manual, "G codes";
+Mitsubishi M700V programming manual. Codes are in tenths: G68.2 is 682.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ncfix.program.fanuc import data, polar, tilt
+from ncfix.program.fanuc.arithmetic import compiled
+from ncfix.program.fanuc.cycles import cycle
+from ncfix.program.rs274 import groups
+from ncfix.program.rs274.groups import ISO_G, Rules, grouped
+from ncfix.program.rs274.settings import unfollowed
+
+MACRO = "macro call"
+
+FOREIGN = frozenset(
+    {
+        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923, 121, 131),
+        *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, *groups.THREADS, 431, 432, 411, 421, 890),
+    }
+)
+"""Codes of LinuxCNC that mean nothing, or something else, on these controls."""
+
+FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} | {
+    650: MACRO,
+    660: MACRO,
+    661: MACRO,
+    670: MACRO,
+    491: groups.LENGTH,
+    531: groups.NON_MODAL,
+    270: groups.NON_MODAL,
+    682: groups.ROTATION,
+    683: groups.ROTATION,
+    684: groups.ROTATION,
+    760: groups.MOTION,
+    842: groups.MOTION,
+    843: groups.MOTION,
+    890: groups.MOTION,
+    630: groups.CONTROL,
+}
+
+ALL_CYCLES = frozenset((*groups.CYCLES, 760, 842, 843))
+"""G76 bores here; G84.2 and G84.3 tap."""
+
+FANUC_HARMLESS = groups.ISO_HARMLESS_G - {630}
+
+FANUC_M = grouped(
+    STOP=(0, 10, 20, 300),
+    TOOL=(60,),
+    SPINDLE=(30, 40, 50, 190),
+    COOLANT=(70, 80, 90),
+    CALL=(970, 980, 990, 1980),
+)
+
+FANUC = Rules(
+    strict=False,
+    g_groups=FANUC_G,
+    harmless_g=FANUC_HARMLESS,
+    m_groups=FANUC_M,
+    steps={
+        100: data.set_data,
+        150: polar.switch,
+        160: polar.switch,
+        270: data.nothing,
+        500: unfollowed,
+        531: tilt.align,
+        680: tilt.rotate,
+        682: tilt.tilt,
+        683: tilt.tilt,
+        684: tilt.tilt,
+        690: tilt.rotate,
+        **dict.fromkeys(ALL_CYCLES, cycle),
+    },
+    takes=frozenset({40, 100, 270, 531, 650, 660, 661, 670}),
+    compiled=compiled,
+)
+
+HAAS = replace(FANUC, g_groups=FANUC_G | {1540: groups.SYSTEM}, steps={**FANUC.steps, 1540: data.extended})
+"""Haas has its additional work offsets under G154 Pn; they are G54.1Pn in the setup."""
+
+RULES = {"fanuc": FANUC, "haas": HAAS}
+"""By `Dialect.semantics`."""
