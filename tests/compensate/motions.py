@@ -163,7 +163,9 @@ def dense_errors(machine: Machine, moves: Moves, plan: Plan, count: int = 200, w
         meant[k] = interpolated(moves.start[row], moves.end[row], xyz, programmed, before + span[k] * steps)
         if pieces.arc[k]:
             arc["centre"] = pieces.centre[k]
-            arc["sweep"] = sweep_of(here[xyz], pieces.end[k][xyz], pieces.centre[k], arc["normal"], arc["sweep"])
+            arc["sweep"] = sweep_of(
+                here[xyz], pieces.end[k][xyz], pieces.centre[k], arc["normal"], arc["sweep"] * span[k]
+            )
         done[k] = interpolated(here, pieces.end[k], xyz, arc if pieces.arc[k] else None, steps)
         here, before = pieces.end[k], float(pieces.fraction[k])
     each = np.repeat(pieces.move, count + 1)

@@ -62,10 +62,10 @@ def assembled(
         counts[rows] = parts.counts
     move = owners(counts)
     fraction, end, arc = np.ones(len(move)), real.end[move], real.arc[move]
+    centre = np.where(arc[:, None], real.centre[move], np.nan)
     if parts is not None:
         at = np.repeat(offsets(counts)[:-1][rows], parts.counts) + places(parts.counts)
-        fraction[at], end[at], arc[at] = parts.fraction, parts.end, False
-    centre = np.where(arc[:, None], real.centre[move], np.nan)
+        fraction[at], end[at], arc[at], centre[at] = parts.fraction, parts.end, parts.arc, parts.centre
     pieces = Pieces(move, fraction, end, arc, centre, kept[move])
     pieces = replace(pieces, share=_shares(pieces, real, counts))
     return Plan(pieces, real.start, deviation, oriented, findings)

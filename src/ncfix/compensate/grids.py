@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.ends import as_commands, path_of
-from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import batches, offsets, owners, places, sums
+from ncfix.compensate.round import RoundGrid
 from ncfix.compensate.sampling import MOST, bends, crossed, even, merged, reversals
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
@@ -30,21 +31,38 @@ BATCH = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """Motions made of straight pieces, flat, the pieces of a motion next to each other.
+    """Motions made of pieces, flat, the pieces of a motion next to each other.
 
     counts    (g,) pieces of each motion
     fraction  (p,) where each ends on its motion
     end       (p, n_axes) commands
+    arc       (p,) the piece is an arc
+    centre    (p, 3) its centre then, mm
     worst     (g,) largest deviation of the tip found, mm
     """
 
     counts: Index
     fraction: Array
     end: Array
+    arc: Mask
+    centre: Array
     worst: Array
 
 
-def split(intent: Intent, real: Segments, rows: Index, pieces: Array, strategy: Strategy, tolerance: float) -> Split:
+@dataclass(frozen=True, slots=True)
+class Cutter:
+    """What motions are cut for.
+
+    tolerance  how far the tip may be off between the ends of a piece, mm
+    round      pieces are arcs (all motions are, then), not straight
+    """
+
+    strategy: Strategy
+    tolerance: float
+    round: bool = False
+
+
+def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cutter) -> Split:
     """Split motions `rows` (g,) at the fewest places.
 
     real    where all motions really start and end
@@ -52,10 +70,11 @@ def split(intent: Intent, real: Segments, rows: Index, pieces: Array, strategy: 
     """
     if not rows.size:
         empty = np.empty(0)
-        return Split(rows, empty, np.empty((0, intent.moves.end.shape[1])), empty)
+        ends = np.empty((0, intent.moves.end.shape[1]))
+        return Split(rows, empty, ends, np.empty(0, dtype=bool), np.empty((0, 3)), empty)
     wished = np.maximum(PER_BEND * bends(intent, rows), PER_PIECE * pieces)
     nodes = np.clip(np.ceil(wished), 2 * PER_PIECE, MOST).astype(np.intp)
-    parts = [_split(intent, real, rows[part], nodes[part], strategy, tolerance) for part in batches(nodes, BATCH)]
+    parts = [_split(intent, real, rows[part], nodes[part], cutter) for part in batches(nodes, BATCH)]
     for _ in range(REFINEMENTS):
         result = joined(parts)
         short = np.flatnonzero((nodes < FEW * result.counts) & (nodes < MOST))
@@ -63,7 +82,7 @@ def split(intent: Intent, real: Segments, rows: Index, pieces: Array, strategy: 
             break
         nodes[short] = np.minimum(2 * PER_PIECE * result.counts[short], MOST)
         chosen = [short[part] for part in batches(nodes[short], BATCH)]
-        finer = [_split(intent, real, rows[each], nodes[each], strategy, tolerance) for each in chosen]
+        finer = [_split(intent, real, rows[each], nodes[each], cutter) for each in chosen]
         parts = [_replaced(result, short, joined(finer))]
     return joined(parts)
 
@@ -77,6 +96,8 @@ def joined(parts: list[Split]) -> Split:
             np.concatenate([part.counts for part in parts]),
             np.concatenate([part.fraction for part in parts]),
             np.concatenate([part.end for part in parts]),
+            np.concatenate([part.arc for part in parts]),
+            np.concatenate([part.centre for part in parts]),
             np.concatenate([part.worst for part in parts]),
         )
     )
@@ -86,18 +107,27 @@ def _replaced(result: Split, which: Index, finer: Split) -> Split:
     """`result` with the motions `which` taken from `finer`."""
     order = np.arange(len(result.counts))
     order[which] = len(result.counts) + np.arange(len(which))
-    both = joined([result, finer])
-    first = offsets(both.counts)[order]
-    counts = both.counts[order]
-    take = np.repeat(first, counts) + places(counts)
-    return Split(counts, both.fraction[take], both.end[take], both.worst[order])
+    return taken(joined([result, finer]), order)
 
 
-def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy, tolerance: float) -> Split:
-    grid = _grid(intent, real, rows, nodes, strategy)
-    ends, worst = fewest(grid, tolerance)
+def taken(parts: Split, order: Index) -> Split:
+    """The motions of `parts` in another order."""
+    counts = parts.counts[order]
+    take = np.repeat(offsets(parts.counts)[order], counts) + places(counts)
+    ends, centres = (parts.fraction[take], parts.end[take]), (parts.arc[take], parts.centre[take])
+    return Split(counts, *ends, *centres, parts.worst[order])
+
+
+def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, cutter: Cutter) -> Split:
+    grid = _grid(intent, real, rows, nodes, cutter.strategy)
+    cut = RoundGrid.of(grid, intent, rows) if cutter.round else grid
+    ends, worst = fewest(cut, cutter.tolerance)
     counts = sums(ends.astype(np.intp), grid.counts).astype(np.intp)
-    return Split(counts, grid.fraction[ends], grid.command[ends], worst)
+    last = np.flatnonzero(ends)
+    first = np.append(0, last[:-1])
+    opens = offsets(counts)[:-1]
+    first[opens] = offsets(grid.counts)[:-1]
+    return Split(counts, grid.fraction[last], grid.command[last], *cut.shape(first, last), worst)
 
 
 def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> Grid:

@@ -43,12 +43,14 @@ class Intent:
     """A program on a machine.
 
     state  what else the errors depend on; `inputs` are numbers or one number per motion. Tool length and direction of
-           motion are taken from the motions.
+           motion are taken from the motions; its direction is the way in which the axes came to the first of them.
+    before (n_axes,) how far off the axes stand at the start of the first motion; None: not at all
     """
 
     machine: Machine
     moves: Moves
     state: State
+    before: Array | None = None
 
     def __post_init__(self) -> None:
         if tuple(self.moves.axes) != tuple(self.machine.axis_names):
@@ -131,7 +133,8 @@ class Intent:
         ways = signs(self.moves.end - self.moves.start)
         bent = np.flatnonzero(self.curved)
         ways[bent] = self.heading(bent, np.ones(bent.size))
-        return carried(ways)
+        came = np.broadcast_to(np.asarray(self.state.direction, dtype=np.int8), ways.shape[1:])
+        return carried(np.vstack((came, ways)))[1:]
 
     def heading(self, rows: Index, fraction: Array) -> Signs:
         """Which way axes of curved motions go at fractions (k,), (k, n_axes); at a turning point as before it.

@@ -19,9 +19,10 @@ from ncfix.compensate.assembly import Plan, assembled, untouched
 from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.ends import corrected, with_closed_circles
 from ncfix.compensate.findings import Array, Finding, Index, Mask
-from ncfix.compensate.grids import split
+from ncfix.compensate.grids import Cutter, Split, joined, split, taken
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import deviations, uneasy_starts
+from ncfix.compensate.round import may_be_round
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
 from ncfix.compensate.strategies import Strategy
@@ -36,11 +37,13 @@ class Demands:
     budget        the tolerance, and what rounding takes of it
     closure       what the control accepts as an arc
     split_rapids  the tolerance holds along rapids too
+    arc_pieces    an arc may be made of several arcs
     """
 
     budget: Budget
     closure: Closure
     split_rapids: bool
+    arc_pieces: bool
 
 
 def plan(
@@ -54,6 +57,8 @@ def plan(
     state: State = State(),  # noqa: B008
     rounding_mm: float = 0.0,
     split_rapids: bool = False,
+    arc_pieces: bool = False,
+    before: Array | None = None,
 ) -> Plan:
     """Correct the motions of a program.
 
@@ -63,6 +68,8 @@ def plan(
     state         what else the errors depend on: `inputs`, numbers or one number per motion
     rounding_mm   how far the tip may be off because of the control's digits: the norm of half output steps
     split_rapids  hold the tolerance along rapids too, not only at their ends
+    arc_pieces    make arcs of several arcs where one is not enough; of straight pieces if not
+    before        (n_axes,) how far off the axes stand at the start of the first motion, mm and rad; not if not given
 
     Motions that cannot be corrected are kept and named in the findings. Raises `RefusedError` NCF401 if the machine
     has no X, Y and Z.
@@ -71,8 +78,8 @@ def plan(
     kept |= keep if keep is not None else False
     if machine.is_perfect or kept.all():
         return untouched(moves, kept)
-    demands = Demands(Budget(tolerance_mm, rounding_mm), closure, split_rapids)
-    return _plan(Intent(machine, moves, state), strategy, demands, kept)
+    demands = Demands(Budget(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
+    return _plan(Intent(machine, moves, state, before), strategy, demands, kept)
 
 
 def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:
@@ -86,7 +93,7 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     deviation = _judged(intent, real, kept, broken, strategy, demands)
     limit = demands.budget.path
     over = np.flatnonzero((deviation > limit) & ~bound)
-    parts = split(intent, real, over, _pieces(intent, real, over, deviation[over], limit), strategy, limit)
+    parts = _parts(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     return assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
@@ -96,7 +103,7 @@ def _real(intent: Intent, wanted: Array, kept: Mask, demands: Demands) -> tuple[
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
     wanted = with_closed_circles(intent, wanted, kept, demands.budget.path / 2)
-    where = standing(intent.machine, moves, wanted, kept)
+    where = standing(intent.machine, moves, wanted, kept, intent.before)
     real = replace(programmed, start=where.start, end=where.end)
     broken = np.zeros(len(moves), dtype=bool)
     rows = np.flatnonzero(programmed.arc & ~kept)
@@ -123,10 +130,41 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, strategy: 
     return deviation
 
 
+def _parts(
+    intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, demands: Demands
+) -> Split:
+    """Motions `rows` in pieces: of arcs in arcs, where the control and the tolerance allow, else in straight ones."""
+    limit = demands.budget.path
+    round_ = np.zeros(len(rows), dtype=bool)
+    if demands.arc_pieces:
+        round_ = may_be_round(intent, rows, demands.closure, demands.budget.rounding)
+    arcs, parts = np.flatnonzero(round_), None
+    if arcs.size:
+        parts = split(intent, real, rows[arcs], _bows(deviation[arcs], limit), Cutter(strategy, limit, round=True))
+        round_[arcs] = parts.worst <= limit
+    lines = np.flatnonzero(~round_)
+    straight = split(
+        intent, real, rows[lines], _pieces(intent, real, rows[lines], deviation[lines], limit), Cutter(strategy, limit)
+    )
+    if parts is None:
+        return straight
+    both = joined([parts, straight])
+    order = np.empty(len(rows), dtype=np.intp)
+    order[arcs] = np.arange(len(arcs))
+    order[lines] = len(arcs) + np.arange(len(lines))
+    return taken(both, order)
+
+
+def _bows(deviation: Array, tolerance: float) -> Array:
+    """About how many pieces motions will need that deviate so much: one per bow."""
+    bows: Array = np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance) + 1
+    return bows
+
+
 def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, tolerance: float) -> Array:
     """About how many straight pieces motions will need: one per bow of the deviation, and those of the arc itself."""
     moves = intent.moves
-    count = np.sqrt(np.where(np.isfinite(deviation), deviation, 0.0) / tolerance)
+    count = _bows(deviation, tolerance)
     arcs = np.flatnonzero(intent.segments.arc[rows])
     if arcs.size:
         on = rows[arcs]
@@ -134,7 +172,7 @@ def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, toler
         radius = np.linalg.norm(np.cross(moves.normal[on], spoke), axis=1)
         angle = 2 * np.arccos(np.clip(1 - tolerance / np.maximum(radius, tolerance), 0.0, 1.0))
         count[arcs] += np.abs(moves.sweep[on]) / angle
-    return count + 1
+    return count
 
 
 def _stuck(rows: Index) -> Finding:

@@ -15,13 +15,15 @@ from ncfix.compensate.account import Reason
 from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.digits import on_digits
+from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
-from ncfix.machine import Machine
+from ncfix.machine import Machine, State
 from ncfix.program.emit import PINNED, Emission, Reading, closure_of_refusals, emit
+from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.tree import Program
 
@@ -30,6 +32,22 @@ ARM_CHANGE_MM = 5.0
 """By so much the arm between a rotary axis and the tip may change along a piece without being felt."""
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """What a part of a program leaves to the next one, which begins with its last motion once more.
+
+    kept       that motion was left as it was
+    shift      (n_axes,) how far off the axes stood at its start, mm and rad
+    direction  (n_axes,) in which the axes came there
+    position   (n_axes,) the command at its end, as written
+    """
+
+    kept: bool
+    shift: Array
+    direction: Signs
+    position: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,18 +67,31 @@ class Settled:
 
 
 def settle(
-    program: Program, moves: Moves, machine: Machine, options: FixOptions, reading: Reading | None = None
+    program: Program,
+    moves: Moves,
+    machine: Machine,
+    options: FixOptions,
+    reading: Reading | None = None,
+    before: Before | None = None,
 ) -> Settled:
-    """Plan and write until both agree. `reading` is what the control made of an earlier attempt."""
+    """Plan and write until both agree.
+
+    reading  what the control made of an earlier attempt
+    before   what an earlier part of the program left, where this is a part: its last motion is the first one here
+    """
     kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL))
     reasons = _by_rule(moves)
+    state = State()
+    if before is not None:
+        kept[0] |= before.kept
+        state = State(direction=before.direction)
     while True:
         kept, pinned = closure_of_refusals(moves, kept)
         _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
-        planned = _planned(program, moves, machine, options, kept)
+        planned = _planned(program, moves, machine, options, kept, state, before)
         planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))
-        against = findings(machine, moves, planned.pieces, planned.start)
+        against = findings(machine, moves, planned.pieces, planned.start, state)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
             refused[finding.moves] = True
@@ -68,7 +99,8 @@ def settle(
             _explain_findings(reasons, (*against, *planned.findings), moves, refused)
             kept |= refused
             continue
-        emission = emit(program, moves, planned.pieces, increments(machine), reading)
+        done = None if before is None else before.position
+        emission = emit(program, moves, planned.pieces, increments(machine), reading, done)
         if not emission.conflicts:
             return Settled(moves, planned, emission, kept, reasons)
         if emission.conflicts.keys() <= reasons.keys():
@@ -93,7 +125,15 @@ def rounding(machine: Machine, turns: bool = False) -> float:
     return float(linear + (0.5 * machine.least_increment[1] * ARM_CHANGE_MM if turns else 0.0))
 
 
-def _planned(program: Program, moves: Moves, machine: Machine, options: FixOptions, kept: Mask) -> Plan:
+def _planned(
+    program: Program,
+    moves: Moves,
+    machine: Machine,
+    options: FixOptions,
+    kept: Mask,
+    state: State,
+    before: Before | None,
+) -> Plan:
     dialect, strategy = program.dialect, get_strategy(options.strategy)
     return plan(
         machine,
@@ -104,6 +144,9 @@ def _planned(program: Program, moves: Moves, machine: Machine, options: FixOptio
         kept,
         rounding_mm=rounding(machine, strategy.corrects_orientation),
         split_rapids=options.split_rapids,
+        state=state,
+        before=None if before is None else before.shift,
+        arc_pieces=language_of(dialect).arc_pieces,
     )
 
 

@@ -13,11 +13,26 @@ halving the gap.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import largest, offsets, owners, places
+
+
+class Cuttable(Protocol):
+    """Motions with nodes between which there may be pieces."""
+
+    @property
+    def counts(self) -> Index:
+        """(g,) nodes of each motion, its start and end included; at least 2."""
+
+    def deviations(self, first: Index, last: Index) -> Array:
+        """The largest deviation of pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
+
+    def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
+        """Which pieces are arcs (p,), and their centres (p, 3)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +61,12 @@ class Grid:
         off = np.einsum("kij,kj->ki", self.follow[node], command - self.command[node])
         return largest(np.sqrt(np.einsum("ki,ki->k", off, off)), inner)
 
+    def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
+        """No piece is an arc."""
+        return np.zeros(len(first), dtype=bool), np.full((len(first), 3), np.nan)
 
-def fewest(grid: Grid, tolerance: float) -> tuple[Mask, Array]:
+
+def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
     """Which nodes end a piece (k,), and the largest deviation of each motion's pieces (g,) mm.
 
     A piece from one node to the next is always allowed: it has no nodes between.

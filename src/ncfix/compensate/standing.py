@@ -25,14 +25,17 @@ class Standing:
     end: Array
 
 
-def standing(machine: Machine, moves: Moves, wanted: Array, kept: Mask) -> Standing:
-    """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes)."""
+def standing(machine: Machine, moves: Moves, wanted: Array, kept: Mask, before: Array | None = None) -> Standing:
+    """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes).
+
+    before  (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
+    """
     shift = np.where(kept[:, None], 0.0, _known(wanted - moves.end))
     decides = ~kept[:, None] | (moves.moved & ~moves.incremental[:, None])
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
     at_start, at_end = np.zeros_like(shift), np.zeros_like(shift)
-    carried = np.zeros(shift.shape[1:])
+    carried = np.zeros(shift.shape[1:]) if before is None else before
     for run in _runs(moves):
         if run.start:
             carried = _translated(machine, moves, run.start, carried)

@@ -51,7 +51,7 @@ class Written:
         start = np.empty_like(pieces.end)
         start[1:] = pieces.end[:-1]
         start[self.opens] = self.start[pieces.move[self.opens]]
-        normal, sweep = moves.normal[pieces.move], moves.sweep[pieces.move]
+        normal, sweep = moves.normal[pieces.move], moves.sweep[pieces.move] * self.span
         arc = pieces.arc & np.isfinite(pieces.centre).all(axis=1)
         columns = self.intent.columns
         found = sweep.copy()

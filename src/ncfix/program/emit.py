@@ -81,14 +81,21 @@ class Reading:
 
 
 def emit(
-    program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray, reading: Reading | None = None
+    program: Program,
+    moves: Moves,
+    pieces: Pieces,
+    least_increment: FloatArray,
+    reading: Reading | None = None,
+    done: FloatArray | None = None,
 ) -> Emission:
     """Write `pieces` into the program.
 
     least_increment  (n_axes,) mm and rad: what the control can resolve
     reading          what a control made of an earlier attempt, if it was not what was meant
+    done             (n_axes,) the command at the end of the first motion, if that is written already
     """
-    return _Emitter(program, moves, pieces, least_increment, reading or Reading(moves.frame, moves.frames)).run()
+    reading = reading or Reading(moves.frame, moves.frames)
+    return _Emitter(program, moves, pieces, least_increment, reading).run(done)
 
 
 class _Emitter:
@@ -123,9 +130,11 @@ class _Emitter:
         self.start = moves.start.copy()
         self.bulk = Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
 
-    def run(self) -> Emission:
-        """Walk all motions."""
-        row = 0
+    def run(self, done: FloatArray | None = None) -> Emission:
+        """Walk all motions; from the second on if the command at the end of the first is given."""
+        row = 0 if done is None else 1
+        if done is not None:
+            self.position = done.copy()
         while row < len(self.moves):
             done = self._stretch(row)
             if done:
@@ -229,11 +238,13 @@ class _Emitter:
         self.end[rows] = frame.command(np.array(rendered.ends))
         if rendered.centre is not None:
             self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
+        for piece, centre in rendered.centres.items():
+            self.centre[rows.start + piece] = frame.command_point(centre, self.moves.axes)
         self.position = self._stay_where_unmoved(
             self.end[rows.stop - 1], np.array(rendered.ends)[-1], target, self._before(row)
         )
         self.end[rows.stop - 1] = self.position
-        self._note_code(row, target.code)
+        self._note_code(row, target.last_code)
         earlier = self.written.setdefault(block, rendered)
         if earlier is not rendered and earlier.text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
@@ -256,6 +267,7 @@ class _Emitter:
         modal = int(moves.modal[row])
         straight = modal if modal in (0, 10) or is_cycle else 10
         fractions = pieces.fraction[rows]
+        arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
             letters=moves.axes,
             decimals=self.decimals[self.reading.frame[row]],
@@ -279,6 +291,9 @@ class _Emitter:
             feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
             turn_minutes=self._turn_minutes(row),
             turn_by_feed=self.program.dialect.feed_of == "linear",
+            arcs=arcs,
+            centres=None if arcs is None else frame.program_point(pieces.centre[rows], moves.axes),
+            arc_code=modal,
             increments=frame.frame.increments,
             rotary=tuple(moves.rotary.tolist()),
         )

@@ -81,6 +81,7 @@ class Language:
     follow    the program's motions
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     render    (program, block, layout, target) -> its edits, and the lines that come after it
+    arc_pieces  `render` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
     """
@@ -93,6 +94,7 @@ class Language:
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]
     lenient: bool = False
+    arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
 
 

@@ -20,6 +20,7 @@ from ncfix.program.turns import is_dragged, number, way
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
+LINE = 10
 INVERSE_TIME, PER_MINUTE = "93", "94"
 LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
@@ -36,7 +37,7 @@ class Target:
     nominal      (n_axes,) where the motion ended as programmed
     original     (n_axes,) value of each programmed word: target or increment
     ends         (k, n_axes) where its pieces shall end
-    arc          the motion stays an arc (then k = 1)
+    arc          the first piece is an arc
     centre       (3,) of that arc, and
     original_centre (3,) the centre as programmed, absolute
     origin       (3,) the start of the motion as programmed: what incremental centres were meant from
@@ -53,6 +54,8 @@ class Target:
     turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
     increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
     rotary       (n_axes,) which axes turn
+    arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
+    arc_code     motion code of these, tenths
     """
 
     letters: tuple[str, ...]
@@ -77,18 +80,32 @@ class Target:
     feed: float = float("nan")
     turn_minutes: float = float("nan")
     turn_by_feed: bool = False
+    arcs: NDArray[np.bool_] | None = None
+    centres: FloatArray | None = None
+    arc_code: int = 0
     increments: tuple[float, float] = (1.0, 1.0)
     rotary: tuple[bool, ...] = ()
+
+    @property
+    def last_code(self) -> int:
+        """The motion code that is in force after the pieces, in tenths."""
+        if self.arcs is None:
+            return self.code
+        return self.arc_code if self.arcs[-1] else LINE
 
 
 @dataclass(slots=True)
 class Rendered:
-    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to."""
+    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
+
+    centre, centres  of the first piece if it is an arc, and of further ones by their number
+    """
 
     edits: list[tuple[int, int, str]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
     ends: list[FloatArray] = field(default_factory=list)
     centre: FloatArray | None = None
+    centres: dict[int, FloatArray] = field(default_factory=dict)
 
     @property
     def text(self) -> tuple[object, ...]:
@@ -106,6 +123,7 @@ class BlockRenderer:
         self.target = target
         self.out = Rendered()
         self.added: list[str] = []
+        self.code = target.code
         self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
         self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
@@ -188,9 +206,11 @@ class BlockRenderer:
         """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""
         target = self.target
         centre = target.centre.copy()
-        word = self.layout.radius
+        word, whole = self.layout.radius, len(target.ends) == 1
+        if self.layout.turns is not None and not whole:
+            self._remove(self.layout.turns)
         if word is not None:
-            meant = self._centre_by_radius(word, start, end)
+            meant = self._centre_by_radius(word, start, end) if whole else None
             if meant is not None:
                 self.out.centre = meant
                 return
@@ -250,14 +270,18 @@ class BlockRenderer:
         target = self.target
         end = target.ends[piece]
         begin, position = position, position.copy()
-        words = []
+        arc = target.arcs is not None and bool(target.arcs[piece])
+        words = self._code_of_piece(target.arc_code if arc else LINE)
+        in_plane = [target.spatial[index] for index in target.plane[:2]] if arc else []
         for column, letter in self.columns:
-            if not abs(end[column] - position[column]) >= self.half[column]:
+            if not abs(end[column] - position[column]) >= self.half[column] and column not in in_plane:
                 continue
             base = position[column] if target.incremental else 0.0
             text = f"{end[column] - base:.{target.decimals[column]}f}"
             words.append(self._cased(letter) + text)
             position[column] = base + float(text)
+        if arc:
+            words += self._centre_of_piece(piece, begin)
         if self.dragged:
             words.append(self._cased("F") + self._turn_feed(piece, begin, position))
         elif target.inverse_time:
@@ -265,6 +289,26 @@ class BlockRenderer:
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + (self.layout.blank).join(words))
         return position
+
+    def _code_of_piece(self, wanted: int) -> list[str]:
+        """The motion code of a further piece, where pieces are arcs and lines and the one before was the other."""
+        if self.target.arcs is None or wanted == self.code:
+            return []
+        self.code = wanted
+        return [self._cased("G") + f"{wanted // 10}"]
+
+    def _centre_of_piece(self, piece: int, begin: FloatArray) -> list[str]:
+        """The centre words of a further piece that is an arc."""
+        target, words = self.target, []
+        assert target.centres is not None
+        centre = target.centres[piece].copy()
+        base = np.zeros(3) if target.centre_absolute else self._xyz(begin)
+        for index in target.plane[:2]:
+            text = f"{centre[index] - base[index]:.{target.decimals[target.spatial[index]]}f}"
+            words.append(self._cased(CENTRE_LETTERS[index]) + text)
+            centre[index] = base[index] + float(text)
+        self.out.centres[piece] = centre
+        return words
 
     def _feed_share(self, piece: int) -> float:
         assert self.layout.feed is not None

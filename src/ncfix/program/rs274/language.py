@@ -72,5 +72,6 @@ RS274 = Language(
     layout=writable,
     render=render,
     lenient=True,
+    arc_pieces=True,
     bulk=in_bulk,
 )
