@@ -1,8 +1,8 @@
 """Three-dimensional error compensation of Fanuc Series 30i: a grid of corrections over X, Y and Z.
 
 The interpolation (A-79351E, trilinear in the control's current position), the size (25 x 25 x 25) and the record of
-the FOCAS library are public; the control's own text file is not, so none is written. What cannot be known from public
-text, and would double the error if guessed wrongly, must be said: `--set sign=...`.
+the FOCAS library are public; the control's own text file is not: one is written only if a template is given, and its
+name says that it is assumed. What would double the error if guessed wrongly must be said: `--set sign=...`.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.volume import Volume, search
-from ncfix_fanuc.records import LARGEST, Volc, csv_text, json_text, read_volc
+from ncfix_fanuc.records import NAME, TABLE, TEXT, Style, Volc, csv_text, json_text, read_volc, template_text
 
 SIDE = 25
 AXES = ("X", "Y", "Z")
+TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
 
 
 class Fanuc(Control):
@@ -51,9 +52,9 @@ class Fanuc(Control):
         ),
         Assumption(
             "FANUC-2",
-            "Points are numbered from 1, X fastest, then Y, then Z.",
+            "Points are numbered from first_number on, the first axis of order fastest.",
             "none public",
-            "so",
+            "from 1, X fastest, then Y, then Z",
             "Load a value at point 2 only, and find with cnc_rdvolccomp where it acts.",
         ),
         Assumption(
@@ -70,10 +71,22 @@ class Fanuc(Control):
             "edge value",
             "Move beyond the grid and read cnc_rdvolccomp.",
         ),
+        Assumption(
+            "FANUC-5",
+            "The text file has a line like the template for every point, between two lines with %.",
+            "none public; N..A1P..A2P.. is how parameters of these controls are punched",
+            "no text file is written",
+            "Punch the grid that is in the control and compare the form; --set template=... follows it.",
+        ),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": Option(None, "correction: values are added to the command; error: they are taken off it"),
         "detection_unit_um": Option("0.1", "detection unit of the linear axes, um"),
+        "largest": Option("127", "largest value of a point"),
+        "order": Option("XYZ", "the axes from the one whose number runs fastest"),
+        "first_number": Option("1", "number of the first point"),
+        "template": Option("", f"a line of the text file, ASSUMED, e.g. {TEMPLATE}"),
+        "fit": Option("nodes", "nodes: exact at the points; area: least squares over what is around them"),
     }
     steps = (
         "Settle the assumptions below on the machine, sign first.",
@@ -86,22 +99,24 @@ class Fanuc(Control):
     switch_off = "Switch the function off by its parameter, or set the magnification to zero."
 
     def write(self, request: Request) -> Written:
-        """`volume.json` with the FOCAS records, and the same as `volume.csv`."""
+        """`volume.json` with the FOCAS records, the same as `volume.csv`, and as text if there is a template."""
         settings = self.settings(request.settings)
         sign = _sign(settings["sign"])
         unit = _unit(settings["detection_unit_um"])
+        style = _style(settings)
         if not set(AXES) <= set(request.machine.axis_names):
             text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
             raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
-        volume = Volume(request.machine, AXES, request.space, request.tool_length)
+        area = settings["fit"] == "area"
+        volume = Volume(request.machine, AXES, request.space, request.tool_length, area)
         mesh = search(volume, request.target, [SIDE] * 3, SIDE**3)
         order = [mesh.grid.outputs.index(axis) for axis in AXES]
         values = mesh.grid.values[..., order]
-        magnification = max(1, math.ceil(float(np.abs(values).max()) / (LARGEST * unit) - 1e-9))
+        magnification = max(1, math.ceil(float(np.abs(values).max()) / (style.largest * unit) - 1e-9))
         whole = np.rint(sign * values / (magnification * unit)).astype(np.int64)
         low = tuple(float(line[0]) for line in mesh.grid.nodes)
         step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
-        made = Volc(settings["sign"], low, step, unit, magnification, whole)
+        made = Volc(settings["sign"], low, step, unit, magnification, whole, style)
         counts = " x ".join(map(str, mesh.grid.counts))
         notes = [
             f"Grid {counts}: {mesh.grid.points} points; it misses {1e3 * mesh.left:.2f} um at most between them.",
@@ -111,7 +126,11 @@ class Fanuc(Control):
             notes.append(f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis.")
         if request.machine.rotary.any():
             notes.append("The grid is that of rotary axes at zero; at other angles more is left.")
-        return Written({"volume.json": json_text(made), "volume.csv": csv_text(made)}, tuple(notes))
+        files = {NAME: json_text(made), TABLE: csv_text(made)}
+        if style.template:
+            files[TEXT] = template_text(made)
+            notes.append(f"{TEXT} is a guess at the control's own file (FANUC-5): compare it with a punched one first.")
+        return Written(files, tuple(notes))
 
     def read(self, files: Files) -> Compensation:
         """As the control would interpolate them. Raises `ConfigError` NCF491."""
@@ -129,6 +148,25 @@ def _sign(text: str) -> int:
     if text not in ("correction", "error"):
         raise UsageError.of("NCF485", f"sign={text}", hint="correction or error; FANUC-1 says how to find out")
     return 1 if text == "correction" else -1
+
+
+def _style(settings: Mapping[str, str]) -> Style:
+    first, largest = (settings[key] for key in ("first_number", "largest"))
+    if sorted(settings["order"]) != list(AXES):
+        raise UsageError.of("NCF485", f"order={settings['order']}", hint="XYZ, ZYX, ...: each axis once")
+    if not (first.isascii() and first.isdigit() and largest.isascii() and largest.isdigit() and int(largest) > 0):
+        text = f"first_number={first}, largest={largest}"
+        raise UsageError.of("NCF485", text, hint="whole numbers")
+    if settings["fit"] not in ("nodes", "area"):
+        raise UsageError.of("NCF485", f"fit={settings['fit']}", hint="nodes or area")
+    template = settings["template"]
+    try:
+        template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)
+    except (KeyError, ValueError, IndexError) as error:
+        raise UsageError.of("NCF485", f"template={template}", hint=f"like {TEMPLATE}") from error
+    if template and not all(f"{{{name}" in template for name in ("dx", "dy", "dz")):
+        raise UsageError.of("NCF485", f"template={template}", hint="it needs {dx}, {dy} and {dz}")
+    return Style(int(first), settings["order"], int(largest), template)
 
 
 def _unit(text: str) -> float:

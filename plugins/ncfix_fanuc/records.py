@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,25 @@ from ncfix.tables.control import Files
 from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
 
-LARGEST = 127
 POINTS = 24
 """Of one record."""
-NAME, TABLE = "volume.json", "volume.csv"
+NAME, TABLE, TEXT = "volume.json", "volume.csv", "volume-ASSUMED.txt"
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """What no public text says of the numbering and the text file.
+
+    first     number of the first point
+    order     the axes from the one whose number runs fastest
+    largest   value of a point
+    template  a line of the text file; "" for none
+    """
+
+    first: int = 1
+    order: str = "XYZ"
+    largest: int = 127
+    template: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +44,7 @@ class Volc:
     unit           detection unit, mm
     magnification  values are in units times this
     values         (nx, ny, nz, 3)
+    style          numbering and text
     """
 
     sign: str
@@ -37,11 +53,26 @@ class Volc:
     unit: float
     magnification: int
     values: NDArray[np.int64]
+    style: Style = Style()
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """The axes of `values` from the slowest to the fastest number."""
+        return tuple("XYZ".index(axis) for axis in reversed(self.style.order))
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """By point number, X fastest, (n, 3)."""
-        return self.values.transpose(2, 1, 0, 3).reshape(-1, 3)
+        """By point number, (n, 3)."""
+        return self.values.transpose(*self.axes, 3).reshape(-1, 3)
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """The positions of the points by number, (n, 3) mm."""
+        lines = [
+            low + step * np.arange(n) for low, step, n in zip(self.low, self.step, self.values.shape, strict=False)
+        ]
+        grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+        return grid.transpose(*self.axes, 3).reshape(-1, 3)
 
     def grid(self) -> Grid:
         """As corrections."""
@@ -62,30 +93,44 @@ def json_text(volc: Volc) -> bytes:
         "counts": volc.values.shape[:3],
         "detection_unit_um": round(volc.unit * 1000, 6),
         "magnification": volc.magnification,
+        "first_number": volc.style.first,
+        "order": volc.style.order,
+        "largest": volc.style.largest,
+        "template": volc.style.template,
     }
     lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
-    records = ",\n".join(f"  {json.dumps(record)}" for record in _records(volc.rows))
+    records = ",\n".join(f"  {json.dumps(record)}" for record in _records(volc.rows, volc.style.first))
     return f'{{\n{"".join(lines)} "records": [\n{records}\n ]\n}}\n'.encode()
 
 
-def _records(rows: NDArray[np.int64]) -> list[dict[str, Any]]:
+def _records(rows: NDArray[np.int64], first: int) -> list[dict[str, Any]]:
     found = []
     for start in range(0, len(rows), POINTS):
         part = rows[start : start + POINTS]
-        ends = {"start_no": start + 1, "start_ax": 1, "end_no": start + len(part), "end_ax": 3}
+        ends = {"start_no": start + first, "start_ax": 1, "end_no": start + first + len(part) - 1, "end_ax": 3}
         found.append({**ends, "num": part.size, "type": 0, "data": part.reshape(-1).tolist()})
     return found
 
 
 def csv_text(volc: Volc) -> bytes:
     """One line a point: number, position, values."""
-    places = [low + step * np.arange(n) for low, step, n in zip(volc.low, volc.step, volc.values.shape, strict=False)]
-    z, y, x = (axis.reshape(-1) for axis in np.meshgrid(*places[::-1], indexing="ij"))
     lines = [
-        f"{number},{a:.6f},{b:.6f},{c:.6f},{dx},{dy},{dz}\n"
-        for number, (a, b, c, (dx, dy, dz)) in enumerate(zip(x, y, z, volc.rows, strict=True), 1)
+        f"{number},{x:.6f},{y:.6f},{z:.6f},{dx},{dy},{dz}\n" for number, ((x, y, z), (dx, dy, dz)) in _numbered(volc)
     ]
     return "".join(["point,X,Y,Z,X_value,Y_value,Z_value\n", *lines]).encode()
+
+
+def template_text(volc: Volc) -> bytes:
+    """The text file that the template makes: ASSUMED."""
+    lines = [
+        volc.style.template.format(no=number, dx=dx, dy=dy, dz=dz, x=x, y=y, z=z)
+        for number, ((x, y, z), (dx, dy, dz)) in _numbered(volc)
+    ]
+    return "".join(f"{line}\n" for line in ["%", *lines, "%"]).encode()
+
+
+def _numbered(volc: Volc) -> Iterator[tuple[int, tuple[list[float], list[int]]]]:
+    return enumerate(zip(volc.places.tolist(), volc.rows.tolist(), strict=True), volc.style.first)
 
 
 def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
@@ -98,14 +143,19 @@ def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
         return None, remarks
     if volc is not None and files.get(TABLE) != csv_text(volc):
         remarks.refuse(0, f"{TABLE} is missing or does not say the same")
+    if volc is not None and files.get(TEXT) != (template_text(volc) if volc.style.template else None):
+        remarks.refuse(0, f"{TEXT} is missing, or there without a template, or does not say the same")
     return volc, remarks
 
 
 def _volc(found: Mapping[str, Any], remarks: Remarks) -> Volc | None:
     counts = tuple(int(count) for count in found["counts"])
     rows: list[int] = []
+    style = Style(int(found["first_number"]), str(found["order"]), int(found["largest"]), str(found["template"]))
+    if sorted(style.order) != ["X", "Y", "Z"]:
+        remarks.refuse(0, f"the order of the axes is {style.order!r}", "XYZ, ZYX, ...")
     for record in found["records"]:
-        _check_record(record, len(rows) // 3 + 1, remarks)
+        _check_record(record, len(rows) // 3 + style.first, remarks)
         rows += [int(value) for value in record["data"]]
     if found["sign"] not in ("correction", "error"):
         remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
@@ -113,15 +163,18 @@ def _volc(found: Mapping[str, Any], remarks: Remarks) -> Volc | None:
         remarks.refuse(0, f"counts {counts}: 2 to 25 points along each of three axes")
     elif len(rows) != 3 * int(np.prod(counts)):
         remarks.refuse(0, f"{len(rows)} values in the records, {3 * int(np.prod(counts))} expected of {counts}")
-    if any(abs(value) > LARGEST for value in rows):
-        remarks.refuse(0, f"a value beyond -{LARGEST} to {LARGEST}")
+    if any(abs(value) > style.largest for value in rows):
+        remarks.refuse(0, f"a value beyond -{style.largest} to {style.largest}")
     low, step = (tuple(float(value) for value in found[key]) for key in ("first_mm", "interval_mm"))
     if len(low) != 3 or len(step) != 3 or not all(value > 0 for value in step):
         remarks.refuse(0, "three first positions and three intervals above zero are needed")
     if remarks.wrong:
         return None
-    values = np.array(rows, dtype=np.int64).reshape(*counts[::-1], 3).transpose(2, 1, 0, 3)
-    return Volc(found["sign"], low, step, float(found["detection_unit_um"]) / 1000, int(found["magnification"]), values)
+    slowest = ["XYZ".index(axis) for axis in reversed(style.order)]
+    stacked = np.array(rows, dtype=np.int64).reshape(*(counts[axis] for axis in slowest), 3)
+    values = stacked.transpose(*np.argsort(slowest), 3)
+    unit, magnification = float(found["detection_unit_um"]) / 1000, int(found["magnification"])
+    return Volc(found["sign"], low, step, unit, magnification, values, style)
 
 
 def _check_record(record: Mapping[str, Any], first: int, remarks: Remarks) -> None:

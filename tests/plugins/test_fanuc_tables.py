@@ -19,7 +19,7 @@ CONTROL = get_control("fanuc")
 
 def exported(sign: str = "correction", unit: str = "0.1", size: float = 0.01) -> Exported:
     machine = single_error("EXX").replace(effects=(Effect("EXX", (size,)),))
-    settings = {"sign": sign, "detection_unit_um": unit}
+    settings = CONTROL.settings({"sign": sign, "detection_unit_um": unit})
     return export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100)
 
 
@@ -39,6 +39,10 @@ def test_golden_records() -> None:
         "counts": [2, 2, 2],
         "detection_unit_um": 0.1,
         "magnification": 1,
+        "first_number": 1,
+        "order": "XYZ",
+        "largest": 127,
+        "template": "",
         "records": [record],
     }
     lines = exported().native["volume.csv"].splitlines()
@@ -71,7 +75,7 @@ def test_magnification_and_its_rounding() -> None:
 
 def test_records_hold_24_points() -> None:
     machine = single_error("EXX", 0.02)
-    settings = {"sign": "error", "detection_unit_um": "0.1"}
+    settings = CONTROL.settings({"sign": "error"})
     made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.0001, settings), 500)
     found = json.loads(made.native["volume.json"])
     assert len(found["records"]) == -(-int(np.prod(found["counts"])) // 24) > 1
@@ -106,3 +110,61 @@ def test_broken_files(case: str) -> None:
     assert any(expected in message.text for message in CONTROL.lint(files)), CONTROL.lint(files)
     with pytest.raises(ConfigError):
         CONTROL.read(files)
+
+
+def template(**settings: str) -> dict[str, bytes]:
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
+    chosen = CONTROL.settings({"sign": "correction", "template": "N{no}A1P{dx}A2P{dy}A3P{dz};", **settings})
+    return dict(export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, chosen), 100).native)
+
+
+def test_the_text_file_is_written_only_with_a_template_and_marked_assumed() -> None:
+    assert set(exported().native) == {"volume.json", "volume.csv"}
+    text = template()["volume-ASSUMED.txt"].splitlines()
+    assert text[:2] == [b"%", b"N1A1P-100A2P0A3P0;"]
+    assert text[-2:] == [b"N8A1P-100A2P0A3P0;", b"%"]
+
+
+def test_numbering_can_be_told() -> None:
+    found = template(order="ZYX", first_number="10001")
+    lines = found["volume.csv"].splitlines()
+    assert lines[1].startswith(b"10001,-200.000000,-150.000000,-300.000000,")
+    assert lines[2].startswith(b"10002,-200.000000,-150.000000,0.000000,")
+    assert not CONTROL.lint(found)
+
+
+def test_numbering_does_not_change_what_the_grid_does() -> None:
+    machine = single_error("EBX", 40e-6)
+    kinds = [{"order": order} for order in ("XYZ", "ZYX", "YZX")]
+    left = [
+        export(
+            CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, CONTROL.settings({"sign": "error", **kind})), 200
+        )
+        for kind in kinds
+    ]
+    assert all((each.left.after == left[0].left.after).all() for each in left)
+
+
+@pytest.mark.parametrize("wrong", ["{no} {dx}", "{no}{dq}", "{"])
+def test_wrong_templates_are_refused(wrong: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        template(template=wrong)
+    assert caught.value.code == "NCF485"
+
+
+def test_a_text_file_that_says_something_else_is_named() -> None:
+    found = template()
+    found["volume-ASSUMED.txt"] = found["volume-ASSUMED.txt"].replace(b"-100", b"-90", 1)
+    assert any("does not say the same" in message.text for message in CONTROL.lint(found))
+
+
+def test_least_squares_leave_less_at_the_worst() -> None:
+    machine = single_error("EXX", 0.05)
+    made = [
+        export(
+            CONTROL, Request(machine, ranges_of(machine), 0.0, 0.004, CONTROL.settings({"sign": "error", "fit": fit}))
+        )
+        for fit in ("nodes", "area")
+    ]
+    assert made[1].tables.points < made[0].tables.points
+    assert made[1].left.after.max() < 0.004 + 1e-4  # and the rounding

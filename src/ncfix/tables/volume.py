@@ -9,6 +9,7 @@ import numpy as np
 
 from ncfix.machine import Machine, State
 from ncfix.tables.exact import exact_correction, linear_axes
+from ncfix.tables.fit import between, fitted
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.poses import random_poses
 
@@ -40,12 +41,17 @@ class Mesh:
 
 @dataclass(slots=True)
 class Volume:
-    """The corrections of the linear axes over some axes; the other axes stay at zero, or as near as they can."""
+    """The corrections of the linear axes over some axes; the other axes stay at zero, or as near as they can.
+
+    area  values at nodes are those that come nearest to the corrections all around (least squares), not those of the
+          nodes themselves
+    """
 
     machine: Machine
     inputs: tuple[str, ...]
     space: Array
     tool_length: float
+    area: bool = False
     _bending: dict[tuple[int, int], float] = field(default_factory=dict)
 
     @property
@@ -63,9 +69,11 @@ class Volume:
     def grid(self, counts: Sequence[int]) -> Grid:
         """The table with that many nodes along each input, at positions that files can say."""
         nodes = tuple(self._nodes(column, count) for column, count in zip(self.columns, counts, strict=True))
-        places = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, len(nodes))
+        looked_at = tuple(between(line) for line in nodes) if self.area else nodes
+        places = np.stack(np.meshgrid(*looked_at, indexing="ij"), axis=-1)
+        values = self.exact(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], 3)
         names = tuple(self.machine.axis_names[index] for index in linear_axes(self.machine))
-        return Grid(self.inputs, nodes, names, self.exact(places).reshape(*counts, 3))
+        return Grid(self.inputs, nodes, names, fitted(values, looked_at, nodes) if self.area else values)
 
     def _nodes(self, column: int, count: int) -> Array:
         unit = self.machine.axes[column].unit
