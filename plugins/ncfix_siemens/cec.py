@@ -18,6 +18,10 @@ WHOLE = 1e-6
 """How far from a whole number (MAX - MIN) / STEP may be."""
 STEEP = 0.01
 """mm per mm: no machine errs that fast."""
+CLEARLY = 1.001
+"""How much larger than the largest positive value the largest negative one must be to be remarked on."""
+BOTH_WAYS = 0
+FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
 LARGE = 1.0
 """mm or degree: no machine is that wrong; most likely the unit is."""
 
@@ -153,7 +157,7 @@ def _last(found: _Found, low: float, high: float, step: float, remarks: Remarks)
 def _values(index: int, found: _Found, last: int, remarks: Remarks) -> dict[int, float]:
     beyond = [each for place, each in sorted(found.values.items()) if place > last]
     if beyond:
-        text = f"table {index + 1} ends with value {last}: MIN, MAX and STEP make {last + 1} points; this one is ignored"
+        text = f"table {index + 1} has values 0 to {last} by its MIN, MAX and STEP; this one is ignored"
         remarks.refuse(beyond[0].line, text, "one value too many, or MAX too small")
     gone = [place for place in range(last + 1) if place not in found.values]
     if gone:
@@ -175,7 +179,8 @@ def _look_at_products(tables: Iterable[Table], found: Mapping[int, _Found], rema
     pointed = {table.multiply for table in by_number.values() if table.multiply}
     for own, table in by_number.items():
         if table.multiply:
-            _look_at_pair(table, by_number.get(table.multiply), found[table.index].fields["MULT_BY_TABLE"].line, remarks)
+            line = found[table.index].fields["MULT_BY_TABLE"].line
+            _look_at_pair(table, by_number.get(table.multiply), line, remarks)
         if not (table.multiply or own in pointed):
             _look_at_sizes(table, found[table.index], remarks)
 
@@ -192,12 +197,8 @@ def _look_at_pair(table: Table, other: Table | None, line: int, remarks: Remarks
         remarks.refuse(line, f"table {table.multiply} multiplies others and acts one way only: what then is not public")
     if other.multiply:
         remarks.doubt(line, f"table {table.multiply} is itself multiplied by another: what then is not public")
-    if other is not table and abs(other.values.min()) > other.values.max():
+    if other is not table and -other.values.min() > CLEARLY * other.values.max():
         remarks.doubt(line, f"the largest value of the multiplier, table {table.multiply}, is negative", FLIPPED)
-
-
-BOTH_WAYS = 0
-FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
 
 
 def _look_at_sizes(table: Table, found: _Found, remarks: Remarks) -> None:

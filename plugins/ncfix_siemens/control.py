@@ -60,7 +60,8 @@ class Siemens(Control):
         cec = tables_of(others, reading)
         if len(cec) > settings.limits.tables:
             text = f"{len(cec)} tables are needed, and {settings.model} has {settings.limits.tables}"
-            raise RefusedError.of("NCF484", text, hint="--set tables=N if yours has more; product_terms=only needs least")
+            hint = "--set tables=N if yours has more; product_terms=only needs least"
+            raise RefusedError.of("NCF484", text, hint=hint)
         eec = [replace(table, index=0) for table in tables_of(own, Reading(settings.axes, -1, ""))]
         files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
         if cec or not eec:
@@ -114,7 +115,7 @@ def _own(term: Term) -> bool:
 def _reading(settings: Settings, terms: Sequence[Term]) -> Reading:
     if any(len(term.factors) > 1 for term in terms) and not settings.terms:
         text = "siemens needs the option 'product_terms' for these tables, since some are multiplied"
-        raise UsageError.of("NCF485", text, hint="--probe settles it; the 802D manual's example only makes sense as only")
+        raise UsageError.of("NCF485", text, hint="--probe settles it; the 802D manual leans to only")
     return Reading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
 
 
@@ -149,7 +150,7 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     if scheme.rest > request.target / 10:
         yield f"{1e3 * scheme.rest:.2f} um rms of the correction cannot be said in this form and are left."
     if scheme.dropped > request.target / 10:
-        yield f"{1e3 * scheme.dropped:.2f} um rms were left out because they take tables that there are not or that are not worth it."
+        yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
     yield from _turned(request, scheme)
     yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
     yield from _sums(request, settings, scheme)
@@ -166,7 +167,9 @@ def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
     done = scheme.tables.at(request.machine.axis_names, q)
     before, after = (orientation_error(request.machine, q, each, state) for each in (np.zeros_like(q), done))
     sizes = [1e6 * float(np.sqrt(np.mean(angle**2))) for angle in (before, after)]
-    yield f"Orientation of the tool, spin included: {sizes[0]:.1f} urad rms without the tables, {sizes[1]:.1f} with them."
+    if not done[:, request.machine.rotary].any():
+        yield "The rotary axes keep their values: that leaves less at the tip, or it was asked for."
+    yield f"Orientation of the tool, spin included: {sizes[0]:.1f} urad rms without tables, {sizes[1]:.1f} with them."
 
 
 def _sums(request: Request, settings: Settings, scheme: Scheme) -> Iterator[str]:
@@ -179,5 +182,3 @@ def _sums(request: Request, settings: Settings, scheme: Scheme) -> Iterator[str]
             parts.append(f"{settings.axes[axis.name]} {value / axis.unit:.4f} {'degree' if axis.rotary else 'mm'}")
     if parts:
         yield f"MD32720 $MA_CEC_MAX_SUM, 1.5 times the largest correction: {', '.join(parts)}."
-
-

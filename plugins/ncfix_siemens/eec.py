@@ -37,7 +37,8 @@ def read_eec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
         if name != VALUE and field not in FIELDS:
             remarks.refuse(each.line, f"${each.name} is not a variable of these tables")
         elif len(each.indices) != wanted or not all(index.strip().isdecimal() for index in each.indices[:-1]):
-            remarks.refuse(each.line, f"${each.name} takes {'encoder, number and axis' if wanted == 3 else 'encoder, axis'}")
+            inside = "encoder, number and axis" if wanted == 3 else "encoder and axis"
+            remarks.refuse(each.line, f"${each.name} takes {inside} in its brackets")
         else:
             key = int(each.indices[0]), each.indices[-1].strip().upper()
             if name == VALUE:
@@ -76,8 +77,8 @@ def _table(
         remarks.refuse(values[place].line, f"{axis} ends with value {last}; this one is ignored", "one value too many")
     missing = [place for place in range(last + 1) if place not in values]
     if missing:
-        text = f"{len(missing)} of {last + 1} values of {axis} are missing, first $AA_ENC_COMP[{encoder},{missing[0]},{axis}]"
-        remarks.refuse(line, text)
+        first = f"$AA_ENC_COMP[{encoder},{missing[0]},{axis}]"
+        remarks.refuse(line, f"{len(missing)} of {last + 1} values of {axis} are missing, first {first}")
     if len(remarks.wrong) > before:
         return None
     modulo = "IS_MODULO" in fields and float(fields["IS_MODULO"].value) == 1

@@ -21,7 +21,7 @@ ORDER = "XYZABCUVW"
 AXIS = re.compile(r"\w{1,16}", re.ASCII)
 
 OPTIONS: Mapping[str, Option] = {
-    "value_sign": Option(None, "error: values are taken off the command; correction: they are added. --probe settles it"),
+    "value_sign": Option(None, "error: values are taken off commands; correction: they are added. --probe settles it"),
     "product_terms": Option("", "what a product adds: only, plus_multiplier, plus_base, plus_both. --probe settles it"),
     "scheme": Option("auto", "auto, or the thesis's poly25, trigo23, fik40, fik20"),
     "model": Option("840D", "840D (40 tables of 1000 points), 828D (8 of 200), 802D (2 of 350)"),
@@ -109,5 +109,3 @@ def _whole(given: Mapping[str, str], key: str, low: int, high: int) -> int:
     if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
         raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
     return int(text)
-
-

@@ -48,13 +48,13 @@ class Table:
     @property
     def positions(self) -> Array:
         """All positions, (k + 1,)."""
-        found: Array = self.low + self.step * np.arange(len(self.values))
+        found: Array = self.low + self.step * np.arange(len(self.values), dtype=np.float64)
         return found
 
     def grid(self, input_name: str, output_name: str, factor: float, input_unit: float) -> Grid:
         """The table with its values times a factor, over positions in mm or rad."""
-        nodes = self.positions * input_unit
-        values = (self.values * factor)[:, None]
+        nodes: Array = self.positions * input_unit
+        values: Array = (self.values * factor)[:, None]
         return Grid((input_name,), (nodes,), (output_name,), values, (self.modulo,))
 
 

@@ -102,13 +102,13 @@ class Stage:
                 yield Term((self._nodes(output, axis, curve, stride),), (self.lines[axis].name, sense))
 
     def _star(self, output: int, way: int | None, star: Star, limit: float, points: int) -> Iterator[Term]:
-        """The centre has no unit and is 1 at most; each leaf points at it."""
-        largest = float(star.centre[np.argmax(np.abs(star.centre))]) or 1.0
-        leaves = {axis: values * largest for axis, values in star.leaves.items()}
-        weight = sum(float(np.abs(values).max()) for values in leaves.values())
-        centre = self._grid(output, star.axis, star.centre / largest, limit / max(weight, 1e-30), points)
-        for axis, values in leaves.items():
-            leaf = self._grid(output, axis, values, limit, points)
+        """The centre has no unit, is 1 at most, and its largest value is positive; each leaf points at it."""
+        weight = sum(float(np.abs(values).max()) for values in star.leaves.values())
+        centre = self._grid(output, star.axis, star.centre, limit / max(weight, 1e-30), points)
+        largest = float(centre.values.flat[np.argmax(np.abs(centre.values))]) or 1.0
+        centre = replace(centre, values=centre.values / largest)
+        for axis, values in star.leaves.items():
+            leaf = self._grid(output, axis, values * largest, limit, points)
             if way is None:
                 yield Term((leaf, centre))
                 continue
