@@ -60,8 +60,10 @@ def register_dialects(register: Register[Dialect]) -> None:
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the control `fanuc`: the three-dimensional grid."""
+    """Bring the controls `fanuc` and `fanuc-rotary`, three-dimensional grids, and `fanuc-pitch`, stored pitch errors."""
     register(control, name="fanuc")
+    register(rotary, name="fanuc-rotary")
+    register(pitch, name="fanuc-pitch")
 
 
 def control() -> Control:
@@ -69,3 +71,17 @@ def control() -> Control:
     from ncfix_fanuc.control import Fanuc
 
     return Fanuc()
+
+
+def rotary() -> Control:
+    """The grid with angles."""
+    from ncfix_fanuc.rotary import FanucRotary
+
+    return FanucRotary()
+
+
+def pitch() -> Control:
+    """Stored pitch errors."""
+    from ncfix_fanuc.pitch import FanucPitch
+
+    return FanucPitch()

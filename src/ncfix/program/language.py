@@ -13,6 +13,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
+    from ncfix.program.flatten import Unroll
     import numpy as np
     from numpy.typing import NDArray
 
@@ -84,6 +85,7 @@ class Language:
     arc_pieces  `render` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
+    unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -96,6 +98,7 @@ class Language:
     lenient: bool = False
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
+    unroll: Unroll | None = None
 
 
 @lru_cache(maxsize=32)

@@ -158,6 +158,23 @@ TRACE_CODES: dict[str, Code] = {
         "The control gets to a line that is not written in its language.",
         "Correct the line.",
     ),
+    "NCF237": Code(
+        "Cannot be written out flat",
+        "--flatten writes down every block as it is executed. What depends on a probe, an input or a position at run "
+        "time is not known before.",
+        "Correct the program where it is made, or take the decision out of it.",
+    ),
+    "NCF238": Code(
+        "Flat program too long",
+        "Written out flat, with its loops and subprograms, the program would have more lines than are allowed.",
+        "Correct it where it is made, or split it.",
+    ),
+    "NCF239": Code(
+        "No flat form",
+        "The program cannot be written out flat: its dialect has no such form, or the flat program would not make the "
+        "same motions.",
+        "Leave --flatten out; blocks that are executed from several states are then refused.",
+    ),
     "NCF240": Code(
         "Number without a decimal point",
         "To controls of the Fanuc family X50 is 50 mm or 0.050 mm, as a parameter of theirs says; the program does "

@@ -22,7 +22,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
     program = control.program_position()
     initial = program[across] if modal.cycle.initial is None else modal.cycle.initial
     take_levels(control, block, initial)
-    modal.cycle.initial, modal.motion = initial, code
+    modal.cycle.initial, modal.cycle.level, modal.motion = initial, modal.cycle.r, code
     if modal.cycle.r < modal.cycle.depth:
         levels = f"{modal.cycle.r:g} and {modal.cycle.depth:g} mm"
         raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({levels})")

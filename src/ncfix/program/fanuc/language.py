@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 from ncfix.program.fanuc.blocks import parse_block
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.interpreter import MacroInterpreter
+from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Resolve
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.rs274.language import RS274, finished
+from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.setup import Setup
 from ncfix.program.shapes import Scan, scan
 from ncfix.program.tree import Literal, Program
@@ -42,6 +45,22 @@ def follow(
     return finished(control, program)
 
 
+def unroll(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Resolve | None,
+    max_blocks: int,
+    kinematics: Kinematics | None,
+    steps: Mapping[str, float],
+    limit: int,
+) -> Sequence[FlatLine]:
+    """The blocks of a program of this family as they are executed."""
+    control = MacroControl(setup, axes, rotary, program.dialect, kinematics)
+    return unrolled(MacroInterpreter(control, program, resolve, max_blocks), steps, limit)
+
+
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What blocks need to be written many at a time; those with a number without a point are not."""
     words = program.templates[int(program.template[block])].words
@@ -51,4 +70,4 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     return RS274.bulk(program, block)
 
 
-FANUC: Language = replace(RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk)
+FANUC: Language = replace(RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk, unroll=unroll)

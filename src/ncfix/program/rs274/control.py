@@ -82,6 +82,7 @@ class Control:
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force
     increments what a number without a decimal point counts, linear and rotary words
+    ends       where the motions of a block end, if somebody wants to know
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
     saved      the modal states that M70 saved, one place for each call level
@@ -118,6 +119,7 @@ class Control:
         self.extended_name = ""
         self.tilted = False
         self.tip_control = False
+        self.ends: list[Vector] | None = None
         self.external = ""
         self.tcp = setup.tcp
         self.shaky: Unknown = {}
@@ -247,6 +249,8 @@ class Control:
         if unknown:
             end = blanked(end, unknown)
         self.builder.add(self.row_block, axes, style, self.modal.feed, start, end)
+        if self.ends is not None:
+            self.ends.append(target[:])
         self.position = target
         self.unknown = unknown
 

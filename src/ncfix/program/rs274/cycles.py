@@ -31,7 +31,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
     program = control.program_position()
     initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
     r, depth = levels(control, initial)
-    modal.cycle.initial, modal.motion = initial, code
+    modal.cycle.initial, modal.cycle.level, modal.motion = initial, r, code
     clear = r if modal.retract_to_r else max(initial, r)
     for _ in range(repeats(control, block)):
         place_hole(control, block, program)

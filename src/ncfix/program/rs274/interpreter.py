@@ -21,6 +21,7 @@ from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import Codes, Plan, grouped_codes
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
+from ncfix.program.rs274.unroll import Recorder
 from ncfix.program.rs274.wordcheck import check_words
 from ncfix.program.tree import Constant, Program, Span, Word
 
@@ -54,6 +55,7 @@ class Interpreter:
         self.main = Unit(program, control.rules, self.axes)
         self.flow: Course = self.prepared()
         self.span: Span | None = None
+        self.recorder: Recorder | None = None
         control.locate = self.place
         systems.load_setup(control)
 
@@ -105,6 +107,8 @@ class Interpreter:
             if plan.lane is not None:
                 done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main)
                 if done:
+                    if self.recorder:
+                        self.recorder.stretch(flow.unit, flow.block, done)
                     flow.block += done
                     self.spend(done)
                     continue
@@ -147,9 +151,13 @@ class Interpreter:
         if plan.skip and self.is_skipped():
             return False
         if plan.tape:
+            if self.recorder:
+                self.recorder.whole(unit, index)
             return self.at_tape(index)
         if plan.flow is not None:
             self.span = plan.flow.span
+            if self.recorder:
+                self.recorder.head(unit, index, plan.flow.keyword)
             self.flow.follow(plan.flow)
             if self.flow.unit is not self.main and unit is self.main:
                 control.row_block = index
@@ -193,6 +201,8 @@ class Interpreter:
             step(control, block, code)
         if motion is not None:
             self.move(block, codes, motion)
+        if self.recorder:
+            self.recorder.words(self.flow.unit, index, plan, codes, block)
         return self.after(codes, block)
 
     def evaluate(self, plan: Plan, index: int) -> Block:

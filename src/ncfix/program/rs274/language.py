@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 from ncfix.diagnostics import UsageError
 from ncfix.program import stamp
+from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Language, Resolve
-from ncfix.program.layout import Layout, has_free_text, layout_of
+from ncfix.program.layout import AXIS_LETTERS, Layout, has_free_text, layout_of
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.reach import tape_end
 from ncfix.program.render import BlockRenderer, Rendered, Target
 from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.interpreter import Interpreter
+from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.setup import Setup
 from ncfix.program.shapes import scan, split_blocks
-from ncfix.program.tree import Literal, Program
+from ncfix.program.tree import Literal, Program, Word
 
 
 def follow(
@@ -29,6 +33,11 @@ def follow(
     """The motions of a program of this family; raises what `trace` does."""
     control = Control(setup, axes, rotary, program.dialect, kinematics)
     Interpreter(control, program, resolve, max_blocks).run()
+    return finished(control, program)
+
+
+def finished(control: Control, program: Program) -> Trace:
+    """What was found when a program has been followed; raises UsageError with all that was not given."""
     lacking = (*control.foreign.values(), *control.knowledge.missing.values())
     if lacking:
         raise UsageError.collected(lacking)
@@ -51,16 +60,37 @@ def render(program: Program, block: int, layout: Layout, target: Target) -> Rend
     return BlockRenderer(program, block, layout, target).render()
 
 
+def words_of(program: Program, block: int) -> tuple[Word, ...]:
+    """The words of a block."""
+    return program.templates[int(program.template[block])].words
+
+
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
-    layout = writable(program, block)
-    if layout is None or not layout.axes:
+    layout = writable(program, block) if any(w.address in AXIS_LETTERS for w in words_of(program, block)) else None
+    if layout is None:
         return None
     slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
     if len(slots) < len(layout.axes):
         return None
     at = program.position(block, layout.code_at)
     return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())
+
+
+def unroll(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Resolve | None,
+    max_blocks: int,
+    kinematics: Kinematics | None,
+    steps: Mapping[str, float],
+    limit: int,
+) -> Sequence[FlatLine]:
+    """The blocks of a program of this family as they are executed."""
+    control = Control(setup, axes, rotary, program.dialect, kinematics)
+    return unrolled(Interpreter(control, program, resolve, max_blocks), steps, limit)
 
 
 RS274 = Language(
@@ -72,6 +102,7 @@ RS274 = Language(
     layout=writable,
     render=render,
     lenient=True,
+    unroll=unroll,
     arc_pieces=True,
     bulk=in_bulk,
 )

@@ -1,0 +1,285 @@
+"""Blocks of the RS274 family written down as they are executed, for a flat program.
+
+A block of plain words goes out as it stands, without its number. Expressions give way to their values, rounded to the
+least increment (in increments the rest is carried to the next block), assignments, flow control and calls fall away,
+and the holes of a cycle with increments or repeats get a block each, in absolute coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ncfix.program.flatten import FlatLine
+from ncfix.program.number_style import decimals_for
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.flow import RUNTIME_BRANCH
+from ncfix.program.rs274.plans import Codes, Plan
+from ncfix.program.rs274.unit import Unit
+from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Word
+
+if TYPE_CHECKING:
+    from ncfix.program.rs274.interpreter import Interpreter
+
+RUNTIME = "NCF237"
+TOO_LONG = "NCF238"
+
+DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
+"""Codes, in tenths, that a flat program has no use for."""
+
+CALL_WORDS = frozenset("PLQ")
+KEPT = frozenset({"program name", "control character", "command"})
+"""Opaque text that a flat program keeps."""
+
+OTHER_DECIMALS = 4
+LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
+
+
+@dataclass(slots=True)
+class Change:
+    """Text of a block to be replaced: from `start` up to `stop`, places in the source."""
+
+    start: int
+    stop: int
+    text: str = ""
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Writes blocks down.
+
+    steps  axis letter -> least increment of its axis, mm or degree
+    limit  lines that may be written
+    carry  axis letter -> what rounding has left over, program units
+    headed  a program number has been written
+    """
+
+    control: Control
+    steps: Mapping[str, float]
+    limit: int
+    lines: list[FlatLine] = field(default_factory=list)
+    carry: dict[str, float] = field(default_factory=dict)
+    headed: bool = False
+    line: int = 1
+
+    # -- what the interpreter tells -----------------------------------------------------------------------------------
+
+    def write(self, text: str) -> None:
+        """One line."""
+        if len(self.lines) >= self.limit:
+            hint = "a program so long is better corrected where it is made"
+            raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines", hint)
+        self.lines.append(FlatLine(text, self.line))
+
+    def whole(self, unit: Unit, block: int) -> None:
+        """A block as it stands."""
+        self.line = unit.program.line(block) if not unit.name else self.line
+        self.write(unit.program.text_of(block))
+
+    def head(self, unit: Unit, block: int, keyword: str) -> None:
+        """The number of the main program; those of others, and all other flow control, fall away."""
+        if keyword == "program" and not self.headed and not unit.name:
+            self.headed = True
+            self.whole(unit, block)
+
+    def stretch(self, unit: Unit, start: int, count: int) -> None:
+        """Blocks of plain words."""
+        for block in range(start, start + count):
+            self.line = unit.program.line(block) if not unit.name else self.line
+            self.put(unit, block, [self.removal(unit, block, word) for word in numbers_of(unit, block)])
+
+    def words(self, unit: Unit, index: int, plan: Plan, codes: Codes, block: Block) -> None:
+        """A block of words that has been executed."""
+        self.line = unit.program.line(index) if not unit.name else self.line
+        self.check(plan, block)
+        holes, self.control.ends = self.control.ends or [], []
+        changes = [self.of_item(unit, index, item, codes, block) for item in unit.program.items_of(index)]
+        made = [change for change in changes if change is not None]
+        made += self.absent(unit, index, plan, block)
+        motion = self.control.modal.motion if codes.motion is None else codes.motion
+        if holes and self.is_cycle(motion) and (len(holes) > 1 or self.control.modal.incremental):
+            self.cycle(unit, index, plan, block, made, holes)
+        else:
+            self.put(unit, index, made)
+
+    def check(self, plan: Plan, block: Block) -> None:
+        """Raise `Fault` where the values of a block depend on the machine at run time."""
+        if block.runtime or self.control.refusal == RUNTIME_BRANCH:
+            what = f"the word {min(block.runtime)}" if block.runtime else "which blocks are executed"
+            raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
+
+    # -- items --------------------------------------------------------------------------------------------------------
+
+    def of_item(self, unit: Unit, index: int, item: Item, codes: Codes, block: Block) -> Change | None:
+        """What becomes of an item: None if it stays as it is."""
+        match item:
+            case Word():
+                return self.of_word(unit, index, item, codes, block)
+            case Assignment() | Flow():
+                return self.removal(unit, index, item)
+            case Opaque(kind, _) if kind not in KEPT:
+                return self.removal(unit, index, item)
+        return None
+
+    def of_word(self, unit: Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
+        """What becomes of a word."""
+        letter = word.address
+        called = not DROPPED_CODES["M"].isdisjoint(codes.m.values())
+        if letter == "N" or (called and letter in CALL_WORDS):
+            return self.removal(unit, index, word)
+        if letter in "GM":
+            return self.of_code(unit, index, word)
+        if letter not in block.values:
+            return self.removal(unit, index, word)
+        written = isinstance(word.value, Literal) and not self.is_changed(unit, index, word, block)
+        if written:
+            return None
+        return Change(*unit.program.span(index, word.value_span), self.number(letter, block.values[letter]))
+
+    def is_changed(self, unit: Unit, index: int, word: Word, block: Block) -> bool:
+        """Whether a word with a plain number means another value than what is written (polar coordinates)."""
+        if not isinstance(word.value, Literal) or word.value.pointless:
+            return word.address in "XYZ" and "polar" in self.control.suspended
+        return bool(unit.program.values_of(index)[word.value.slot] != block.values[word.address])
+
+    def of_code(self, unit: Unit, index: int, word: Word) -> Change | None:
+        """What becomes of a G or M word."""
+        if isinstance(word.value, Constant):
+            dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
+            return self.removal(unit, index, word) if dropped else None
+        value = self.control.rules.compiled(word.value, word.address)(self.control)
+        return Change(*unit.program.span(index, word.value_span), f"{value:g}")
+
+    def removal(self, unit: Unit, index: int, item: Item) -> Change:
+        """Take an item out, with the blank before it."""
+        start, stop = unit.program.span(index, item.span)
+        first = int(unit.program.blocks[index, 0])
+        if start > first and unit.program.source[start - 1 : start] in (b" ", b"\t"):
+            start -= 1
+        return Change(start, stop)
+
+    def absent(self, unit: Unit, index: int, plan: Plan, block: Block) -> list[Change]:
+        """Words that a block means and does not have: the other coordinate of a polar one."""
+        letters = [letter for letter in block.values if letter not in plan.letters and letter in INDEX]
+        stop = end_of_words(unit, index)
+        return [Change(stop, stop, " " + letter + self.number(letter, block.values[letter])) for letter in letters]
+
+    # -- numbers ------------------------------------------------------------------------------------------------------
+
+    def number(self, letter: str, value: float) -> str:
+        """A value as text; a coordinate is rounded to the least increment, and the rest is carried."""
+        if letter not in self.steps:
+            decimals = self.decimals("X") if letter in LENGTHS else OTHER_DECIMALS
+            return trimmed(value, decimals)
+        carried = value + (self.carry.get(letter, 0.0) if self.control.modal.incremental else 0.0)
+        text = trimmed(carried, self.decimals(letter))
+        self.carry[letter] = carried - float(text)
+        return text
+
+    def decimals(self, letter: str) -> int:
+        """Digits after the point that the least increment needs."""
+        unit = 1.0 if letter in INDEX and self.control.rotary[INDEX[letter]] else self.control.modal.unit
+        return decimals_for(self.steps.get(letter, min(self.steps.values())) / unit)
+
+    # -- cycles -------------------------------------------------------------------------------------------------------
+
+    def is_cycle(self, motion: int) -> bool:
+        """Whether a motion code is a canned cycle."""
+        return motion in range(730, 900) and motion != 800
+
+    def cycle(
+        self, unit: Unit, index: int, plan: Plan, block: Block, changes: list[Change], holes: list[Vector]
+    ) -> None:
+        """The holes of a block, one block each, in absolute coordinates."""
+        drop = [word for word in plan.template.words if is_place(word, self.control)]
+        spans = {unit.program.span(index, word.span) for word in drop}
+        kept = [change for change in changes if (change.start, change.stop) not in spans and not inside(change, spans)]
+        kept += [self.removal(unit, index, word) for word in drop]
+        stop = end_of_words(unit, index)
+        incremental = self.control.modal.incremental
+        plane, level = self.control.modal.plane, self.control.modal.cycle.level / self.control.modal.unit
+        over = "".join(LETTERS[i] for i in (plane.first, plane.second) if LETTERS[i] in self.steps)
+        named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
+        letters = over + named.replace(LETTERS[plane.across], "") + LETTERS[plane.across]
+        first = (" G90" if incremental else "") + self.place(holes[0], letters) + " R" + self.number_at("R", level)
+        self.put(unit, index, [*kept, Change(stop, stop, first)])
+        for hole in holes[1:]:
+            self.write(self.place(hole, over).strip())
+        if incremental:
+            self.write("G91")
+
+    def place(self, hole: Vector, letters: str) -> str:
+        """The words of a hole for some letters."""
+        control = self.control
+        position, control.position = control.position, hole
+        program = control.program_position()
+        control.position = position
+        values = {letter: program[INDEX[letter]] / control.scale[INDEX[letter]] for letter in letters}
+        return "".join(f" {letter}{self.number_at(letter, value)}" for letter, value in values.items())
+
+    def number_at(self, letter: str, value: float) -> str:
+        """An absolute value as text."""
+        self.carry[letter] = 0.0
+        return trimmed(value, self.decimals(letter if letter in self.steps else "Z"))
+
+    # -- lines --------------------------------------------------------------------------------------------------------
+
+    def put(self, unit: Unit, index: int, changes: list[Change]) -> None:
+        """Write a block with changes made; not if nothing is left of it."""
+        start, stop = map(int, unit.program.blocks[index])
+        text, at = "", start
+        for change in sorted(changes, key=lambda each: (each.start, each.stop)):
+            if change.start < at and change.stop <= at:
+                continue
+            text += unit.program.source[at : max(at, change.start)].decode("latin-1") + change.text
+            at = change.stop
+        text += unit.program.source[at:stop].decode("latin-1")
+        if text.strip() or (not changes and start == stop):
+            self.write(text.strip() if changes else text)
+
+
+def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
+    """Run an interpreter and write down what it executes."""
+    recorder = Recorder(interpreter.control, steps, limit)
+    interpreter.recorder, interpreter.control.ends = recorder, []
+    interpreter.run()
+    begins, ends = (recorder.lines[at].text.lstrip()[:1] == "%" if recorder.lines else False for at in (0, -1))
+    if begins and (not ends or len(recorder.lines) == 1):
+        recorder.write("%")
+    return recorder.lines
+
+
+def trimmed(value: float, decimals: int) -> str:
+    """A number with at most so many decimals, and always with a point."""
+    text = f"{value:.{decimals}f}"
+    if "." in text:
+        text = text.rstrip("0")
+    text = text if "." in text else text + "."
+    return "0." if text in ("-0.", "-.") else text
+
+
+def numbers_of(unit: Unit, block: int) -> list[Word]:
+    """The N word of a block, if it has one."""
+    return [word for word in unit.program.templates[unit.template[block]].words if word.address == "N"]
+
+
+def end_of_words(unit: Unit, index: int) -> int:
+    """Where further words of a block go: after its last word, before a comment."""
+    items = unit.program.items_of(index)
+    words = [unit.program.span(index, item.span)[1] for item in items if not isinstance(item, Comment)]
+    return max(words, default=int(unit.program.blocks[index, 0]))
+
+
+def is_place(word: Word, control: Control) -> bool:
+    """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
+    if word.address in "GM":
+        return isinstance(word.value, Constant) and word.address == "G" and word.value.value in (90.0, 91.0)
+    return word.address in INDEX or word.address in ("R", "L") or (word.address == "K" and not control.rules.strict)
+
+
+def inside(change: Change, spans: set[tuple[int, int]]) -> bool:
+    """Whether a change lies in a stretch that is taken out."""
+    return any(start <= change.start and change.stop <= stop for start, stop in spans)
