@@ -7,16 +7,26 @@ import pytest
 from ncfix.machine import load
 
 
+@pytest.fixture(scope="module")
+def written() -> dict[str, bytes]:
+    """What the first test that asks for it has planned and simulated: choosing poses takes seconds."""
+    return {}
+
+
 @pytest.fixture
-def measured(ncfix, root, tmp_path):
+def measured(ncfix, root, tmp_path, written):
     """A plan and the measurement simulated for it."""
     machine = root / "examples" / "machines" / "three_axis.toml"
-    poses, data = tmp_path / "plan.csv", tmp_path / "data.csv"
-    options = ("--kind", "tcp", "--count", "60", "--tool-length", "100", "--effects", "E?0?,EXX,EYY,EZZ")
-    done = ncfix("plan", "-m", machine, *options, "-o", poses, "--gcode", tmp_path / "plan.nc")
-    assert done.code == 0, done.err
-    done = ncfix("simulate", "-m", machine, "--plan", poses, "--noise-um", "1", "--seed", "3", "-o", data)
-    assert done.code == 0, done.err
+    poses, data, program = tmp_path / "plan.csv", tmp_path / "data.csv", tmp_path / "plan.nc"
+    if not written:
+        options = ("--kind", "tcp", "--count", "60", "--tool-length", "100", "--effects", "E?0?,EXX,EYY,EZZ")
+        done = ncfix("plan", "-m", machine, *options, "-o", poses, "--gcode", program)
+        assert done.code == 0, done.err
+        done = ncfix("simulate", "-m", machine, "--plan", poses, "--noise-um", "1", "--seed", "3", "-o", data)
+        assert done.code == 0, done.err
+        written.update({path.name: path.read_bytes() for path in (poses, data, program)})
+    for path in (poses, data, program):
+        path.write_bytes(written[path.name])
     return machine, poses, data
 
 
@@ -72,3 +82,16 @@ def test_wrong_use(ncfix, measured, tmp_path):
     assert "NCF635" in done.err
     done = ncfix("calibrate", data, "-m", machine, "-o", tmp_path / "m.toml", "--effects", "esmaeili-12")
     assert done.code == 2
+
+
+def test_a_plan_says_what_it_cannot_do(ncfix, root, tmp_path):
+    machine = root / "examples" / "machines" / "three_axis.toml"
+    plan = ("plan", "-m", machine, "--count", "12", "-o", tmp_path / "p.csv")
+    done = ncfix(*plan, "--effects", "spindle-growth-late")
+    assert (done.code, "NCF636" in done.err, "follows temp_spindle after a time" in done.err) == (2, True, True)
+    assert ncfix(*plan, "--reach", "u=0,1").code == 2
+    assert ncfix(*plan, "--input", "load_kg=5,1").code == 2
+    limits = ("--reach", "z=-100,0", "--input", "load_kg=0,200", "--tool-length", "80", "--tool-length", "160")
+    done = ncfix(*plan, "--effects", "load-X,EXX", *limits)
+    assert done.code == 0, done.err
+    assert ",load_kg" in (tmp_path / "p.csv").read_text()

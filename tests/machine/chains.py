@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from machine import oracle
 from ncfix.machine import Axis, Effect, Machine, Tool, se3
 from ncfix.machine.axis import Triad
 from ncfix.machine.smooth import Polynomial
@@ -59,6 +60,44 @@ def random_errors(rng: Rng, machine: Machine, size: float = 1.0) -> Machine:
                 basis = Polynomial((0, 1, 2))
                 effects.append(Effect(f"E{component}{joint}", curve, basis, scale=100.0, reference=reference))
     return machine.replace(effects=tuple(effects))
+
+
+def near_axes(rng: Rng, machine: Machine) -> Machine:
+    """Most axes along base axes, some tilted in a base plane, at most one skew: the directions that machines have."""
+    axes: list[Axis] = []
+    skew = rng.integers(2 * len(machine.axes))
+    for index, axis in enumerate(machine.axes):
+        kind = 2 if index == skew else rng.choice(2, p=[0.6, 0.4])
+        plane = rng.permutation(3)
+        direction = np.zeros(3)
+        angle = rng.choice([np.pi / 4, 50 * np.pi / 180, 1.234])
+        if kind == 0:
+            direction[plane[0]] = rng.choice([-1.0, 1.0])
+        else:
+            direction[plane[:2]] = np.cos(angle), rng.choice([-1.0, 1.0]) * np.sin(angle)
+        chosen = axis.direction if kind == 2 else tuple(direction.tolist())
+        place = tuple((np.array(axis.point) * rng.integers(0, 2, 3)).tolist())
+        axes.append(Axis(axis.name, axis.rotary, axis.workpiece_side, chosen, place))
+    return machine.replace(axes=tuple(axes))
+
+
+def a_few_errors(rng: Rng, machine: Machine, count: int = 6) -> Machine:
+    """Some of all kinds of errors: motions, locations, carried, with reference points of their own."""
+    full = random_errors(rng, machine).effects
+    chosen = rng.choice(len(full), count, replace=False)
+    return machine.replace(effects=tuple(full[int(i)] for i in sorted(chosen)))
+
+
+def arguments(machine: Machine, q: np.ndarray) -> dict[str, np.ndarray]:
+    """Axis positions and the values of the error functions at poses (n, n_axes), by name, for derived formulas."""
+    values = {axis.name: q[:, i] for i, axis in enumerate(machine.axes)}
+    for effect in machine.effects:
+        place = np.zeros(len(q))
+        if isinstance(effect.basis, Polynomial):
+            index = machine.axis_names.index(effect.joint)
+            place = np.rad2deg(q[:, index]) if machine.axes[index].rotary else q[:, index]
+        values[effect.name] = np.array([oracle.value(effect, position) for position in place])
+    return values
 
 
 def random_positions(rng: Rng, machine: Machine, count: int) -> np.ndarray:

@@ -9,8 +9,8 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.machine import dumps, loads
+from ncfix.machine.library import library
 from ncfix.measure.calibrate import calibrate
-from ncfix.measure.library import library
 from ncfix.measure.selection import select
 from ncfix.measure.synthetic import Faults, simulate
 

@@ -1,126 +1,109 @@
-"""What docs/accuracy.md says, worked out: `make accuracy` writes it.
+"""What docs/accuracy.md says, worked out: `make accuracy` writes the page.
 
-    python tests/validation/accuracy.py [--draws N] [-o FILE]
+    python tests/validation/accuracy.py [STUDY...] [--draws N] [--chains N] [-o FILE]
 
-Round trip: for each shipped machine and each kind of measurement the coefficients that this kind can tell are drawn at
-random, measured with 1 um of noise, and estimated by the full exact calibration that starts from zero.
+The text is that of accuracy_seeds.md, beside this file; a study's table replaces its mark `<!-- name -->` there.
+Studies that are not asked for keep what the page has for them, and so does the hidden-effect benchmark's section, which
+`make hidden` writes.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from measure.poses import NAMES, machine, perfect, plan  # noqa: E402
-from ncfix.diagnostics import NcfixError  # noqa: E402
-from ncfix.machine import Machine  # noqa: E402
-from ncfix.measure.calibrate import calibrate  # noqa: E402
-from ncfix.measure.selection import Selection  # noqa: E402
-from ncfix.measure.synthetic import Faults, simulate  # noqa: E402
+from tests.hidden import tally  # noqa: E402
 
-KINDS = {
-    "tcp": "R-test, `tcp`",
-    "tcp6": "pose, `tcp6`",
-    "probe": "probed balls, `probe`",
-    "bar": "ball-bar, `length`",
-    "gauge": "length gauge, `length`",
-    "tool": "tracker on the spindle, `points`",
-    "table": "tracker on the table, `points`",
-    "axis": "direct, `axis`",
-}
-ROWS = 250
-LARGE = 0.05
-"""mm: coefficients above this are those of powers that cancel."""
 TEMPLATE = Path(__file__).with_name("accuracy_seeds.md")
+PAGE = ROOT / "docs" / "accuracy.md"
 
 
-def selection(known: Machine, kind: str) -> Selection:
-    """The effects all of whose coefficients this kind of measurement can tell."""
-    data = simulate(plan(known, kind, ROWS), known, Faults(noise_um=0.01))
-    first = calibrate([data], perfect(known), loss="none")
-    told, free, at = np.isfinite(first.sigma), [], 0
-    for effect in known.effects:
-        free.append(bool(told[at : at + effect.basis.size].all()))
-        at += effect.basis.size
-    return Selection(known.effects, tuple(free))
+def round_trips(options: argparse.Namespace) -> str:
+    """200 draws of every machine and instrument: ten minutes."""
+    from validation import round_trips as study
+
+    return f"{options.draws} draws each:\n\n{study.table(options.draws)}"
 
 
-def drawn(chosen: Selection, known: Machine, random: np.random.Generator) -> Machine:
-    """The machine with other curves: each effect times a normal number, and every coefficient changed by 20 %.
+def random_chains(options: argparse.Namespace) -> str:
+    """1,000 chains: half an hour, most of it `derive`."""
+    from validation import random_chains as study
 
-    Powers of high degree that cancel each other are only multiplied: changed one by one they would be metres.
-    """
-    values = []
-    for effect in chosen.estimated:
-        factor = random.standard_normal()
-        large = max((abs(value) for value in effect.coefficients), default=0.0) > LARGE
-        each = 1 + (0.0 if large else 0.2) * random.standard_normal(effect.basis.size)
-        values += (factor * each * np.asarray(effect.coefficients)).tolist()
-    return chosen.machine(known, values)
+    return study.table(range(options.chains))
 
 
-def round_trip(name: str, kind: str, draws: int) -> tuple[int, int, float, float, float, float] | None:
-    """Coefficients, draws, share within 3 sigma, rms of the standardised errors, mean and spread of chi-square."""
-    known = machine(name)
-    try:
-        chosen = selection(known, kind)
-    except (NcfixError, ValueError):
-        return None
-    random, errors, squares = np.random.default_rng(1), [], []
-    for draw in range(draws):
-        real = drawn(chosen, known, random)
-        start = chosen.machine(real, np.zeros(len(chosen.start)).tolist())
-        data = simulate(plan(known, kind, ROWS), real, Faults(noise_um=1.0), seed=draw)
-        found = calibrate([data], start, Selection(start.effects, chosen.free), loss="none")
-        truth = np.concatenate([e.coefficients for e, free in zip(real.effects, chosen.free, strict=True) if free])
-        covariance = replace(found, scale=1.0).sigma
-        errors.append((found.estimate.coefficients - truth) / covariance)
-        squares.append(found.chi_square)
-    every = np.concatenate(errors)
-    every = every[np.isfinite(every)]
-    if not every.size:
-        return None
-    within = float((np.abs(every) < 3).mean())
-    rms = float(np.sqrt((every**2).mean()))
-    return len(chosen.start), draws, within, rms, float(np.mean(squares)), float(np.std(squares))
+def plans(options: argparse.Namespace) -> str:
+    """Planned against random poses: five minutes."""
+    from validation import plans as study
+
+    return study.table()
 
 
-def table(draws: int) -> str:
-    """The round trips as a table."""
-    lines = [
-        "| machine | measurement | coefficients | within 3 sigma | rms error / sigma | reduced chi-square |",
-        "|---|---|---|---|---|---|",
-    ]
-    for name in NAMES:
-        for kind, title in KINDS.items():
-            found = round_trip(name, kind, draws)
-            if found is None:
-                lines.append(f"| {name} | {title} | - | sees none of this machine's errors | | |")
-                continue
-            size, _, within, rms, square, spread = found
-            lines.append(
-                f"| {name} | {title} | {size} | {100 * within:.2f} % | {rms:.3f} | {square:.3f} +- {spread:.3f} |"
-            )
-            print(lines[-1], file=sys.stderr, flush=True)
-    return "\n".join(lines)
+def controls(options: argparse.Namespace) -> str:
+    """Esmaeili's headline reductions, in simulation: two minutes."""
+    from validation import esmaeili as study
+
+    return study.table()
+
+
+STUDIES: dict[str, Callable[[argparse.Namespace], str]] = {
+    "round-trips": round_trips,
+    "chains": random_chains,
+    "plans": plans,
+    "esmaeili": controls,
+}
+
+
+def marked(name: str, table: str) -> str:
+    """A study's part of the page, between marks that are not seen when it is shown."""
+    return f"<!-- {name}: begin -->\n{table}\n<!-- {name}: end -->"
+
+
+def kept(page: str, name: str) -> str:
+    """What the page has for a study that is not worked out anew."""
+    found = re.search(rf"<!-- {name}: begin -->\n(.*?)\n<!-- {name}: end -->", page, re.DOTALL)
+    return found[1] if found else f"Not worked out yet: `make accuracy STUDIES={name}`."
+
+
+def benchmark(page: str) -> str:
+    """The section of the hidden-effect benchmark as the page has it."""
+    if tally.BEGIN not in page or tally.END not in page:
+        return ""
+    return page[page.index(tally.BEGIN) : page.index(tally.END) + len(tally.END)]
+
+
+def assembled(page: str, tables: dict[str, str]) -> str:
+    """The new page from the old one and the tables that were worked out."""
+    text = TEMPLATE.read_text()
+    for name in STUDIES:
+        text = text.replace(f"<!-- {name} -->", marked(name, tables.get(name) or kept(page, name)))
+    section = benchmark(page)
+    return tally.replaced(text, section) if section else text
 
 
 def main() -> None:
     """Write the page."""
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("studies", nargs="*", metavar="STUDY", help=f"of {', '.join(STUDIES)}; all if none is given")
     parser.add_argument("--draws", type=int, default=200)
-    parser.add_argument("-o", "--output", default=str(ROOT / "docs" / "accuracy.md"))
+    parser.add_argument("--chains", type=int, default=1000)
+    parser.add_argument("-o", "--output", type=Path, default=PAGE)
     options = parser.parse_args()
-    text = TEMPLATE.read_text()
-    page = text.replace("<!-- round trip -->", table(options.draws)).replace("<!-- draws -->", str(options.draws))
-    Path(options.output).write_text(page)
+    unknown = [name for name in options.studies if name not in STUDIES]
+    if unknown:
+        parser.error(f"no study {unknown[0]}: {', '.join(STUDIES)}")
+    for name in options.studies or STUDIES:
+        table = STUDIES[name](options)
+        # read again for each: another study, or the benchmark, may have written meanwhile
+        page = options.output.read_text() if options.output.exists() else ""
+        options.output.write_text(assembled(page, {name: table}))
+        print(table)
 
 
 if __name__ == "__main__":

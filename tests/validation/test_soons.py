@@ -13,9 +13,9 @@ import pytest
 
 from ncfix.machine import Effect, load
 from ncfix.machine.smooth import Polynomial
+from ncfix.measure.exchange import Pool, choose
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe
-from ncfix.measure.plan import Pool, choose
 
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml"))
 LINE = Polynomial(degree=(1,))

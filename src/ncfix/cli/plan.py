@@ -26,6 +26,8 @@ KINDS = ("tcp", "tcp6", "probe", "length")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
 @click.option("--tool-length", "lengths", multiple=True, type=float, metavar="MM", help="Tools there are (repeatable).")
 @click.option("--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands (kind probe).")
+@click.option("--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z.")
+@click.option("--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg.")
 @click.option("--gcode", metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
 @table_option
@@ -41,6 +43,8 @@ def plan(
     ranges: tuple[str, ...],
     lengths: tuple[float, ...],
     balls: tuple[str, ...],
+    reaches: tuple[str, ...],
+    inputs: tuple[str, ...],
     gcode: str | None,
     seed: int,
     output: str,
@@ -53,13 +57,13 @@ def plan(
     from ncfix.measure.reader import reads
     from ncfix.measure.writer import dumps
 
-    inputs = () if existing is None else (existing,)
-    target = targets([machine_path], output, False, force, inputs)[0]
-    program = targets([machine_path], gcode, False, force, inputs)[0] if gcode else None
+    sources = () if existing is None else (existing,)
+    target = targets([machine_path], output, False, force, sources)[0]
+    program = targets([machine_path], gcode, False, force, sources)[0] if gcode else None
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []
-    room = _room(ranges, lengths, balls, machine.axis_names)
+    room = _room(ranges, lengths, balls, reaches, inputs, machine.axis_names)
     with console.busy("choosing poses"):
         found = planned(machine, kind, count, room, effects, names, before, seed)
     empty = found.plan.form.measured if kind != "probe" else ()
@@ -77,20 +81,40 @@ def plan(
         console.say(f"tip error known to {found.worst_um:.2f} um at worst per um of noise, {found.mean_um:.2f} um rms")
 
 
-def _room(ranges: tuple[str, ...], lengths: tuple[float, ...], balls: tuple[str, ...], axes: tuple[str, ...]) -> Room:
+def _room(
+    ranges: tuple[str, ...],
+    lengths: tuple[float, ...],
+    balls: tuple[str, ...],
+    reaches: tuple[str, ...],
+    inputs: tuple[str, ...],
+    axes: tuple[str, ...],
+) -> Room:
     from ncfix.measure.candidates import Room
 
-    limits = {}
-    for text in ranges:
-        name, values = _named(text, 2, "--range")
+    limits = _limits(ranges, "--range")
+    for name in limits:
         if name not in axes:
             raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(axes)}", param_hint="--range")
-        limits[name] = (values[0], values[1])
+    reach = _limits(reaches, "--reach")
+    for name in reach:
+        if name not in ("x", "y", "z"):
+            raise click.BadParameter(f"{name} is none of x, y and z of the workpiece", param_hint="--reach")
     places = {}
     for text in balls:
         name, values = _named(text, 3, "--ball")
         places[name] = (values[0], values[1], values[2])
-    return Room(limits, lengths or (100.0,), places)
+    return Room(limits, lengths or (100.0,), places, reach, _limits(inputs, "--input"))
+
+
+def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:
+    """NAME=LOW,HIGH."""
+    found = {}
+    for text in texts:
+        name, (low, high) = _named(text, 2, option)
+        if low >= high:
+            raise click.BadParameter(f"{text!r} is an empty range", param_hint=option)
+        found[name] = (low, high)
+    return found
 
 
 def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from ncfix.diagnostics import UsageError
@@ -18,8 +19,12 @@ from ncfix.machine.axis import Axis
 from ncfix.measure.measurement import Array, Measurement
 
 DECIMALS = 3
-CORNERS = 0.25
-"""Share of candidates of which each axis stands at one of its ends or in the middle."""
+CORNERS = 0.4
+"""Share of candidates of which each axis stands near one of its ends or the middle."""
+NEAR = 0.03
+"""How near, as a share of the travel: not at the same place each time, or the places would have a common step."""
+TRIES = 20
+"""How often more poses are drawn where few of them are within reach."""
 UNLIMITED_MM = 100.0
 """Half the travel that is taken for a linear axis without a range."""
 
@@ -31,11 +36,15 @@ class Room:
     ranges        axis -> (low, high) mm or degree; those of the machine where not given
     tool_lengths  mm, the tools that there are
     balls         ball -> place in the workpiece frame, mm (kind probe)
+    reach         x, y or z -> (low, high) mm between which the tip stays, workpiece frame
+    inputs        state column, such as load_kg -> (low, high) between which it can be set
     """
 
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     tool_lengths: Sequence[float] = (100.0,)
     balls: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    reach: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    inputs: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def of(self, axis: Axis) -> tuple[float, float]:
         """The range of an axis, mm or degree."""
@@ -49,33 +58,70 @@ class Room:
 
 def candidates(machine: Machine, kind: str, count: int, room: Room, seed: int = 0) -> Measurement:
     """A plan of so many poses of this kind; fewer where probing cannot reach. Raises `UsageError` NCF636."""
+    if kind not in ("tcp", "tcp6", "probe", "length"):
+        raise UsageError.of("NCF636", f"there are no plans of kind {kind!r}", hint="tcp, tcp6, probe or length")
     random = np.random.default_rng(seed)
-    unit = _spread(len(machine.axes), count, random)
+    columns = _within_reach(machine, kind, count, room, random)
+    if kind in ("tcp", "tcp6"):
+        return Measurement(kind, (), columns, {"set": ("1",) * count})
+    if kind == "probe":
+        return at_balls(machine, columns, room, random)
+    return _lengths(columns)
+
+
+def _within_reach(machine: Machine, kind: str, count: int, room: Room, random: np.random.Generator) -> dict[str, Array]:
+    """Columns of poses whose tip stays where it may; of probed balls the balls say where the tip is."""
+    found = _drawn(machine, count, room, random)
+    if not room.reach or kind == "probe":
+        return found
+    parts, kept = [], 0
+    for _ in range(TRIES):
+        inside = _reached(machine, found, room)
+        parts.append({name: values[inside] for name, values in found.items()})
+        kept += int(inside.sum())
+        if kept >= count:
+            return {name: np.concatenate([part[name] for part in parts])[:count] for name in found}
+        found = _drawn(machine, count, room, random)
+    limits = ", ".join(f"{low:g} < {name} < {high:g}" for name, (low, high) in room.reach.items())
+    text = f"{kept} of {TRIES * count} poses tried have their tip within {limits}"
+    raise UsageError.of("NCF636", text, hint="wider --reach, or --range of axes that lead there")
+
+
+def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator) -> dict[str, Array]:
+    """Positions all over the ranges, sides, tools and what else can be set."""
     columns = {}
-    for axis, share in zip(machine.axes, unit.T, strict=True):
+    for axis, share in zip(machine.axes, _spread(len(machine.axes), count, random).T, strict=True):
         low, high = room.of(axis)
         columns[axis.name] = np.round(low + (high - low) * share, DECIMALS)
     columns |= {f"dir_{axis.name}": random.choice([-1.0, 1.0], count) for axis in machine.axes}
     columns["tool_length"] = random.choice(np.asarray(room.tool_lengths, dtype=np.float64), count)
-    if kind in ("tcp", "tcp6"):
-        return Measurement(kind, (), columns, {"set": ("1",) * count})
-    if kind == "probe":
-        return _reachable(machine, columns, room, random)
-    if kind == "length":
-        return _lengths(machine, columns, unit, room)
-    raise UsageError.of("NCF636", f"there are no plans of kind {kind!r}", hint="tcp, tcp6, probe or length")
+    for name, (low, high) in room.inputs.items():
+        columns[name] = np.round(low + (high - low) * _spread(1, count, random)[:, 0], DECIMALS)
+    return columns
+
+
+def _reached(machine: Machine, columns: Mapping[str, Array], room: Room) -> NDArray[np.bool_]:
+    """Where the tip is within reach."""
+    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    tip = machine.tip(q, columns["tool_length"])
+    inside = np.ones(len(tip), dtype=bool)
+    for name, (low, high) in room.reach.items():
+        place = tip[:, "xyz".index(name)]
+        inside &= (place >= low) & (place <= high)
+    return inside
 
 
 def _spread(axes: int, count: int, random: np.random.Generator) -> Array:
     """Shares of the ranges, (count, axes)."""
     unit: Array = qmc.Halton(axes, rng=random).random(count)
     ends = random.random(count) < CORNERS
-    unit[ends] = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes))
+    near = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes)) + NEAR * random.uniform(-1, 1, (ends.sum(), axes))
+    unit[ends] = 1 - np.abs(1 - np.abs(near))
     return unit
 
 
-def _reachable(machine: Machine, columns: dict[str, Array], room: Room, random: np.random.Generator) -> Measurement:
-    """Poses with the stylus in one of the balls, those that the travels allow."""
+def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np.random.Generator) -> Measurement:
+    """Poses with the stylus in one of the balls at random, those that the travels allow."""
     names = list(machine.axis_names)
     linear = [names.index(axis) for axis in "XYZ"]
     balls = room.balls or _default_balls(machine, room)
@@ -103,9 +149,9 @@ def _default_balls(machine: Machine, room: Room) -> dict[str, tuple[float, float
     return {str(k + 1): (x + a, y + b, z + c) for k, (a, b, c) in enumerate(arms)}
 
 
-def _lengths(machine: Machine, columns: dict[str, Array], unit: Array, room: Room) -> Measurement:
+def _lengths(columns: Mapping[str, Array]) -> Measurement:
     """Distances between two places, the second taken from another row."""
     found = {name: values for name, values in columns.items() if name not in "XYZ"}
     found |= {f"a{axis.lower()}": columns[axis] for axis in "XYZ"}
     found |= {f"b{axis.lower()}": np.roll(columns[axis], 1) for axis in "XYZ"}
-    return Measurement("length", (), found, {"set": ("1",) * len(unit)})
+    return Measurement("length", (), found, {"set": ("1",) * len(columns["X"])})

@@ -8,29 +8,24 @@ tell is left out beforehand. To separate two effects, the variances of their coe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.diagnostics import UsageError
-from ncfix.machine import Effect, Machine, State
+from ncfix.machine import Effect, Machine
+from ncfix.machine.library import library
 from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.exchange import Pool, choose, variances
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 from ncfix.measure.selection import Selection, select
 from ncfix.measure.solve import NUISANCE_RANK, solve
 
-CANDIDATES = 600
-PLACES = 150
+CANDIDATES = 800
+PLACES = 1000
 """Poses at which the predictions are judged."""
-RIDGE = 1e-9
-"""Information that counts as none, of that of a candidate."""
-PASSES = 8
-STARTS, SMALL = 20, 20_000
-"""Random starts besides the first choice, where candidates times predictions are few."""
-EXCHANGED = 1e-3
-"""A relative gain below this is none."""
 
 
 @dataclass(frozen=True)
@@ -47,18 +42,6 @@ class Planned:
     mean_um: float
     seen: tuple[str, ...]
     unseen: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Pool:
-    """Candidates as rows of a design.
-
-    blocks   (n, r, p) the rows of each candidate over all that is determined, set-up included, for a noise of one
-    targets  (t, p) the combinations whose variance matters
-    """
-
-    blocks: Array
-    targets: Array
 
 
 def plan(
@@ -83,13 +66,14 @@ def plan(
         raise UsageError.of("NCF636", "a plan has at least one pose", hint="--count N")
     wanted = ",".join(separate) if separate and not machine.effects and effects is None else effects
     selection = select(machine, wanted)
+    _can_be_set(machine, selection, room, existing)
     offered = candidates(machine, kind, max(CANDIDATES, 3 * count), room, seed)
     if count >= len(offered):
         text = f"{count} poses of {len(offered)} that can be reached"
         raise UsageError.of("NCF636", text, hint="a smaller --count, or wider ranges")
     fixed = 0 if existing is None else len(existing)
     every = offered if existing is None else joined(existing, offered)
-    pool, kept = _pool(observe(every, machine), machine, selection, room, separate, seed)
+    pool, kept = pool_of(observe(every, machine), machine, selection, room, separate, seed)
     chosen = choose(pool, count, fixed)
     order = np.random.default_rng(seed).permutation(chosen)
     variance = variances(pool, [*range(fixed), *chosen])
@@ -101,6 +85,25 @@ def plan(
         tuple(labels[k] for k in kept),
         tuple(label for k, label in enumerate(labels) if k not in set(kept.tolist())),
     )
+
+
+def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Measurement | None) -> None:
+    """Refuse effects of which a plan cannot know the state: those with a memory, and inputs that nobody sets."""
+    late = [effect for effect in selection.estimated if effect.time_constant_s]
+    if late:
+        text = f"{late[0].name} follows {late[0].input} after a time: where to stand at which hour is not planned"
+        hint = "leave it out of --effects; read the sensor over a warm-up and a cool-down instead"
+        raise UsageError.of("NCF636", text, hint=hint)
+    known = {*machine.axis_names, *room.inputs, "tool_length"}
+    needed = [name for effect in selection.estimated for name in (effect.signal, effect.times) if name]
+    unset = [name for name in dict.fromkeys(needed) if name not in known]
+    if unset:
+        text = f"what is sought depends on {', '.join(unset)}, and a plan cannot know what that will be"
+        raise UsageError.of("NCF636", text, hint=f"--input {unset[0]}=LOW,HIGH if it can be set, or leave it out")
+    missing = [] if existing is None else [name for name in room.inputs if name not in existing.columns]
+    if missing:
+        text = f"the poses measured already do not say {missing[0]}"
+        raise UsageError.of("NCF636", text, hint=f"give them a column {missing[0]}")
 
 
 def joined(first: Measurement, last: Measurement) -> Measurement:
@@ -123,10 +126,13 @@ def _values(measurement: Measurement) -> tuple[str, ...]:
     return () if measurement.kind == "probe" else measurement.measured
 
 
-def _pool(
+def pool_of(
     seen: Observation, machine: Machine, selection: Selection, room: Room, separate: Sequence[str], seed: int
 ) -> tuple[Pool, Index]:
-    """The candidates' rows over what can be determined at all, and which coefficients these are."""
+    """The candidates' rows over what can be determined at all, and which coefficients these are.
+
+    In units of the noise: 1 um of a length, 10 urad of an angle.
+    """
     rows = len(seen.measurement) * len(seen.components)
     noise = np.where(np.tile(seen.angular, len(seen.measurement)), 1e-5, 1e-3)[:, None]
     design = seen.design(selection.estimated)[:rows] / noise
@@ -157,7 +163,7 @@ def _targets(
 ) -> Array:
     """What is to be known well: the tip error over the volume, um, or the coefficients of some effects."""
     if separate:
-        columns = [k for k, effect in enumerate(_owners(selection)) if effect.name in separate]
+        columns = [k for name in separate for k in _columns(machine, selection, name)]
         chosen = np.flatnonzero(np.isin(kept, columns))
         lost = ", ".join(selection.labels[k] for k in columns if k not in kept)
         if lost or not columns:
@@ -165,81 +171,23 @@ def _targets(
             raise UsageError.of("NCF636", text, hint="another kind of measurement, or more tool lengths")
         return np.eye(len(kept))[chosen]
     places = candidates(machine, "tcp", PLACES, room, seed + 1)
-    inputs = {name: np.zeros(PLACES) for name in machine.inputs}
-    state = State(places.column("tool_length"), places.state(machine).direction, inputs)
-    tip = machine.design(places.positions(machine), state, selection.estimated)[:, :3]
+    tip = machine.design(places.positions(machine), places.state(machine), selection.estimated)[:, :3]
     scaled: Array = 1e3 * tip[:, :, kept].reshape(-1, len(kept))
     return scaled
 
 
-def _owners(selection: Selection) -> list[Effect]:
-    """The effect of each coefficient."""
-    return [effect for effect in selection.estimated for _ in range(effect.basis.size)]
+def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
+    """The coefficients of an effect by its name: of a physical effect exactly those that it is made of."""
+    physical = library(machine).get(name)
+    forms = {_form(effect) for effect in physical.effects} if physical else set()
+    owners = [effect for effect in selection.estimated for _ in range(effect.basis.size)]
+    found = [k for k, effect in enumerate(owners) if effect.name == name or _form(effect) in forms]
+    if not found:
+        text = f"{name} is none of the effects that are estimated"
+        raise UsageError.of("NCF636", text, hint="name it in --effects too")
+    return found
 
 
-def choose(pool: Pool, count: int, fixed: int = 0) -> Index:
-    """Indices of the candidates to be measured; the first `fixed` blocks are measured anyway."""
-    inverse = np.linalg.inv(information(pool, range(fixed)))
-    free = np.ones(len(pool.blocks), dtype=bool)
-    free[:fixed] = False
-    chosen: list[int] = []
-    for _ in range(count):
-        spread = pool.blocks @ inverse
-        small = np.einsum("nip,njp->nij", spread, pool.blocks) + np.eye(pool.blocks.shape[1])
-        gain = np.where(free, np.linalg.slogdet(small)[1], -np.inf)
-        best = int(gain.argmax())
-        chosen.append(best)
-        free[best] = False
-        inverse = inverse - spread[best].T @ np.linalg.solve(small[best], spread[best])
-    random = np.random.default_rng(0)
-    others = np.arange(fixed, len(pool.blocks))
-    size = len(pool.targets) * len(pool.blocks)
-    starts = [chosen] + [random.permutation(others)[:count].tolist() for _ in range(STARTS if size < SMALL else 0)]
-    found = [_exchanged(pool, start, fixed) for start in starts]
-    chosen, _ = min(found, key=lambda each: each[1])
-    return np.array(chosen, dtype=np.int64)
-
-
-def _exchanged(pool: Pool, chosen: list[int], fixed: int) -> tuple[list[int], float]:
-    """Replace one pose after another by the candidate that lowers the worst variance most; that variance."""
-    worst = float(variances(pool, [*range(fixed), *chosen]).max())
-    for _ in range(PASSES):
-        before = worst
-        for place in range(len(chosen)):
-            others = [*range(fixed), *chosen[:place], *chosen[place + 1 :]]
-            best, value = _best_addition(pool, others)
-            if value < worst * (1 - EXCHANGED):
-                chosen[place], worst = best, value
-        if worst > before * (1 - EXCHANGED):
-            break
-    return chosen, worst
-
-
-def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
-    """The candidate that, added to the others, leaves the smallest worst variance, and that variance."""
-    inverse = np.linalg.inv(information(pool, others))
-    projected = pool.targets @ inverse
-    present = np.einsum("tp,tp->t", projected, pool.targets)
-    small = np.einsum("nip,pq,njq->nij", pool.blocks, inverse, pool.blocks, optimize=True)
-    small += np.eye(pool.blocks.shape[1])
-    cross = np.einsum("tp,nip->nti", projected, pool.blocks, optimize=True)
-    gain = np.einsum("nti,nij,ntj->nt", cross, np.linalg.inv(small), cross, optimize=True)
-    worst = (present - gain).max(axis=1)
-    worst[others] = np.inf
-    best = int(worst.argmin())
-    return best, float(worst[best])
-
-
-def information(pool: Pool, rows: Sequence[int]) -> Array:
-    """The information of some blocks, with next to nothing added so that it has an inverse."""
-    p = pool.blocks.shape[2]
-    stacked = pool.blocks[list(rows)].reshape(-1, p)
-    total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * max(float((pool.blocks**2).mean()), 1e-300)
-    return total
-
-
-def variances(pool: Pool, rows: Sequence[int]) -> Array:
-    """The variance of each target if these blocks are measured, (t,)."""
-    inverse = np.linalg.inv(information(pool, rows))
-    variance: Array = np.einsum("tp,pq,tq->t", pool.targets, inverse, pool.targets, optimize=True)
-    return variance
+def _form(effect: Effect) -> Effect:
+    """An effect without its numbers."""
+    return replace(effect, coefficients=(), covariance=None)

@@ -18,8 +18,8 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.basis import Basis
 from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
 from ncfix.machine.fields import did_you_mean
+from ncfix.machine.library import library
 from ncfix.machine.smooth import Constant, Fourier, Polynomial
-from ncfix.measure.library import library
 
 ALL = "all"
 
@@ -76,7 +76,7 @@ def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
 
 def select(machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None) -> Selection:
     """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
-    names of physical effects (`ncfix.measure.library`) may stand in the list.
+    names of physical effects (`ncfix.machine.library`) may stand in the list.
 
     Nothing given means those of the machine; a machine without effects gets all of them. `reference` is the point to
     which new effects refer. Raises `UsageError` NCF635.

@@ -18,6 +18,8 @@ VISIBLE = 1e-6
 """A column of which less than this is left after the set-up was eliminated is not seen."""
 RANK = 1e-6
 """Scaled columns nearer than this to a combination of others are that combination."""
+STURDY = 0.05
+"""Of columns that are combinations of one another the first are kept, if this much of them is new."""
 SIGNIFICANT = 0.02
 """Share from which on a column is named as part of such a combination."""
 
@@ -123,17 +125,34 @@ def _independent(scaled: Array, seen: Index, size: Array) -> tuple[Index, Array,
     """A largest set of independent columns, their QR factors, and what the others are made of."""
     if not scaled.shape[1]:
         return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), ()
-    _, triangle, order = qr(scaled, mode="economic", pivoting=True)
-    diagonal = np.abs(np.diag(triangle))
-    rank = int((diagonal > RANK * diagonal[0]).sum())
-    chosen = np.sort(order[:rank])
+    chosen = _chosen(scaled)
+    held = np.setdiff1d(np.arange(scaled.shape[1]), chosen)
     orthogonal, upper = np.linalg.qr(scaled[:, chosen])
     kept = seen[chosen]
     combinations = []
-    for column in np.sort(order[rank:]):
+    for column in held:
         shares = solve_triangular(upper, orthogonal.T @ scaled[:, column])
         others = np.flatnonzero(np.abs(shares) > SIGNIFICANT * np.abs(shares).max())
         factors = shares[others] * size[seen[column]] / size[kept[others]]
         names = tuple(int(k) for k in kept[others])
         combinations.append(Combination(int(seen[column]), names, tuple(float(f) for f in factors)))
     return kept, orthogonal, upper, tuple(combinations)
+
+
+def _chosen(scaled: Array) -> Index:
+    """Which columns are kept: the first that are well apart, so that noise does not decide, then what is left by QR."""
+    first: list[int] = []
+    basis: Array = np.zeros((len(scaled), 0))
+    for k in range(scaled.shape[1]):
+        new = without(basis, scaled[:, k])
+        size = float(np.linalg.norm(new))
+        if size > STURDY:
+            first.append(k)
+            basis = np.column_stack([basis, new / size])
+    others = np.setdiff1d(np.arange(scaled.shape[1]), first)
+    if not len(others):
+        return np.array(first, dtype=np.int64)
+    left = without(basis, scaled[:, others])
+    _, triangle, order = qr(left, mode="economic", pivoting=True)
+    more = others[order[: int((np.abs(np.diag(triangle)) > RANK).sum())]]
+    return np.sort(np.concatenate([first, more]).astype(np.int64))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -10,57 +9,18 @@ import pytest
 from pytransform3d.rotations import compact_axis_angle_from_matrix
 
 from machine import chains, oracle
+from machine.chains import a_few_errors, arguments, near_axes
 from ncfix.machine import Axis, Machine, State
-from ncfix.machine.smooth import Polynomial
 from ncfix.machine.symbolic import derive
 from ncfix.machine.symbolic.python import compiled
 
 RELATIVE = 1e-12
 """Both sides are a few dozen products in double precision."""
 LENGTH = 120.0
-CHAINS = int(os.environ.get("NCFIX_CHAINS", "16"))
-"""How many random chains are compared; many, if asked for, and then of up to 7 joints, which may take a minute each."""
-LONGEST = 7 if "NCFIX_CHAINS" in os.environ else 5
+CHAINS, LONGEST = 12, 5
+"""How many random chains, of how many joints at most; tests/validation/random_chains.py compares a thousand."""
 REACH = 1000.0
 """mm: the size of a chain with points, strokes and a tool of a few hundred mm each."""
-
-
-def near_axes(rng: chains.Rng, machine: Machine) -> Machine:
-    """Most axes along base axes, some tilted in a base plane, at most one skew: the directions that machines have."""
-    axes: list[Axis] = []
-    skew = rng.integers(2 * len(machine.axes))
-    for index, axis in enumerate(machine.axes):
-        kind = 2 if index == skew else rng.choice(2, p=[0.6, 0.4])
-        plane = rng.permutation(3)
-        direction = np.zeros(3)
-        angle = rng.choice([np.pi / 4, 50 * np.pi / 180, 1.234])
-        if kind == 0:
-            direction[plane[0]] = rng.choice([-1.0, 1.0])
-        else:
-            direction[plane[:2]] = np.cos(angle), rng.choice([-1.0, 1.0]) * np.sin(angle)
-        chosen = axis.direction if kind == 2 else tuple(direction.tolist())
-        point = tuple((np.array(axis.point) * rng.integers(0, 2, 3)).tolist())
-        axes.append(Axis(axis.name, axis.rotary, axis.workpiece_side, chosen, point))
-    return machine.replace(axes=tuple(axes))
-
-
-def a_few_errors(rng: chains.Rng, machine: Machine, count: int = 6) -> Machine:
-    """Some of all kinds of errors: motions, locations, carried, with reference points of their own."""
-    full = chains.random_errors(rng, machine).effects
-    chosen = rng.choice(len(full), count, replace=False)
-    return machine.replace(effects=tuple(full[int(i)] for i in sorted(chosen)))
-
-
-def arguments(machine: Machine, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Axis positions and the values of the error functions at poses (n, n_axes), by name."""
-    values = {axis.name: q[:, i] for i, axis in enumerate(machine.axes)}
-    for effect in machine.effects:
-        place = np.zeros(len(q))
-        if isinstance(effect.basis, Polynomial):
-            index = machine.axis_names.index(effect.joint)
-            place = np.rad2deg(q[:, index]) if machine.axes[index].rotary else q[:, index]
-        values[effect.name] = np.array([oracle.value(effect, position) for position in place])
-    return values
 
 
 def large(machine: Machine, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

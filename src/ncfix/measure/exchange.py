@@ -1,0 +1,120 @@
+"""Which of many rows of a design to take: an exchange of one candidate after another (after Fedorov).
+
+From a first choice that maximises the determinant of the information (D-optimal) candidates are exchanged as long as
+the worst variance of what is to be predicted falls (G-optimal).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.measure.measurement import Array, Index
+
+ACTIVE = 250
+"""Predictions, the worst ones, that an exchange looks at; the rest is looked at again after each pass."""
+RIDGE = 1e-9
+"""Information that counts as none, of that of a candidate."""
+PASSES = 8
+STARTS, SMALL = 20, 20_000
+"""Random starts besides the first choice, where candidates times predictions are few."""
+EXCHANGED = 1e-3
+"""A relative gain below this is none."""
+WORTHWHILE = 5e-3
+"""A pass that gains less is the last one."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Candidates as rows of a design.
+
+    blocks   (n, r, p) the rows of each candidate over all that is determined, set-up included, for a noise of one
+    targets  (t, p) the combinations whose variance matters
+    """
+
+    blocks: Array
+    targets: Array
+
+
+def choose(pool: Pool, count: int, fixed: int = 0) -> Index:
+    """Indices of the candidates to be measured; the first `fixed` blocks are measured anyway."""
+    inverse = np.linalg.inv(information(pool, range(fixed)))
+    free = np.ones(len(pool.blocks), dtype=bool)
+    free[:fixed] = False
+    chosen: list[int] = []
+    for _ in range(count):
+        spread = pool.blocks @ inverse
+        small = np.einsum("nip,njp->nij", spread, pool.blocks) + np.eye(pool.blocks.shape[1])
+        gain = np.where(free, np.linalg.slogdet(small)[1], -np.inf)
+        best = int(gain.argmax())
+        chosen.append(best)
+        free[best] = False
+        inverse = inverse - spread[best].T @ np.linalg.solve(small[best], spread[best])
+    random = np.random.default_rng(0)
+    others = np.arange(fixed, len(pool.blocks))
+    size = len(pool.targets) * len(pool.blocks)
+    starts = [chosen] + [random.permutation(others)[:count].tolist() for _ in range(STARTS if size < SMALL else 0)]
+    found = [_exchanged(pool, start, fixed) for start in starts]
+    chosen, _ = min(found, key=lambda each: each[1])
+    return np.array(chosen, dtype=np.int64)
+
+
+def _exchanged(pool: Pool, start: list[int], fixed: int) -> tuple[list[int], float]:
+    """Replace one pose after another by the candidate that lowers the worst variance most; that variance."""
+    variance = variances(pool, [*range(fixed), *start])
+    best, worst = list(start), float(variance.max())
+    looked_at = np.zeros(len(variance), dtype=bool)
+    for _ in range(PASSES):
+        looked_at[np.argsort(variance)[-ACTIVE:]] = True
+        chosen = _passed(Pool(pool.blocks, pool.targets[looked_at]), best, fixed)
+        variance = variances(pool, [*range(fixed), *chosen])
+        before = worst
+        if variance.max() < worst:
+            best, worst = chosen, float(variance.max())
+        if worst > before * (1 - WORTHWHILE) and looked_at[variance.argmax()]:
+            break
+    return best, worst
+
+
+def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
+    """One pass over all poses."""
+    chosen = list(start)
+    worst = float(variances(pool, [*range(fixed), *chosen]).max())
+    for place in range(len(chosen)):
+        others = [*range(fixed), *chosen[:place], *chosen[place + 1 :]]
+        better, value = _best_addition(pool, others)
+        if value < worst * (1 - EXCHANGED):
+            chosen[place], worst = better, value
+    return chosen
+
+
+def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
+    """The candidate that, added to the others, leaves the smallest worst variance, and that variance."""
+    inverse = np.linalg.inv(information(pool, others))
+    projected = pool.targets @ inverse
+    present = np.einsum("tp,tp->t", projected, pool.targets)
+    small = np.einsum("nip,pq,njq->nij", pool.blocks, inverse, pool.blocks, optimize=True)
+    small += np.eye(pool.blocks.shape[1])
+    cross = np.einsum("tp,nip->nti", projected, pool.blocks, optimize=True)
+    gain = np.einsum("nti,nij,ntj->nt", cross, np.linalg.inv(small), cross, optimize=True)
+    worst = (present - gain).max(axis=1)
+    worst[others] = np.inf
+    best = int(worst.argmin())
+    return best, float(worst[best])
+
+
+def information(pool: Pool, rows: Sequence[int]) -> Array:
+    """The information of some blocks, with next to nothing added so that it has an inverse."""
+    p = pool.blocks.shape[2]
+    stacked = pool.blocks[list(rows)].reshape(-1, p)
+    total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * max(float((pool.blocks**2).mean()), 1e-300)
+    return total
+
+
+def variances(pool: Pool, rows: Sequence[int]) -> Array:
+    """The variance of each target if these blocks are measured, (t,)."""
+    inverse = np.linalg.inv(information(pool, rows))
+    variance: Array = np.einsum("tp,pq,tq->t", pool.targets, inverse, pool.targets, optimize=True)
+    return variance

@@ -1,0 +1,53 @@
+"""The studies of docs/accuracy.md in small: the page has them in full, `make accuracy` works them out."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+
+from validation import accuracy, plans, random_chains, round_trips
+
+CHAINS = int(os.environ.get("NCFIX_CHAINS", "12"))
+DRAWS = int(os.environ.get("NCFIX_DRAWS", "4"))
+EXACT = 1e-12
+"""Relative: a few dozen products in double precision."""
+
+
+def test_round_trips_of_all_instruments(figures):
+    """Of normal errors 99.73 % are within 3 sigma; of 2,000 to 6,000 estimates at least 99 % are."""
+    found = [round_trips.round_trip("wCBXFZYSt", kind, DRAWS) for kind in round_trips.KINDS]
+    errors = np.concatenate([each.errors for each in found])
+    squares = np.array([each.squares.mean() for each in found])
+    figures(f"round trips: {len(errors)} estimates, {100 * (np.abs(errors) < 3).mean():.2f} % within 3 sigma")
+    assert (np.abs(errors) < 3).mean() > 0.99
+    assert 0.9 < squares.mean() < 1.1
+
+
+@pytest.mark.parametrize("seed", range(CHAINS))
+def test_random_chains(seed):
+    found = random_chains.compare(seed)
+    assert max(found.composed, found.turned, found.nominal, found.first, found.rotated) < EXACT
+    assert np.isnan(found.ratio) or abs(found.ratio - 4) < 0.05
+
+
+@pytest.mark.parametrize("case", [plans.CASES[0], plans.CASES[5]], ids=lambda case: f"{case.machine} {case.kind}")
+def test_forty_planned_poses_beat_forty_random_ones(case, figures):
+    """Worst prediction variance at least 3 times lower, median over 20 draws."""
+    found = plans.compared(case)
+    figures(f"plan of 40 poses, {case.machine}: variance {found.ratio:.1f} times lower than at random")
+    assert found.ratio > 3
+    # within a quarter of the best that there can be
+    assert found.planned < 1.25 * found.bound
+
+
+def test_a_page_keeps_what_is_not_worked_out_anew():
+    tables = dict.fromkeys(accuracy.STUDIES, "a table")
+    page = accuracy.assembled("", tables)
+    section = f"{accuracy.tally.BEGIN}\nof the benchmark\n{accuracy.tally.END}"
+    again = accuracy.assembled(f"{page}\n{section}\n", {"plans": "another table"})
+    assert again.count("a table") == len(accuracy.STUDIES) - 1
+    assert again.count("another table") == 1
+    assert section in again
+    assert accuracy.assembled(again, {}) == again
