@@ -14,6 +14,7 @@ class FixOptions:
     allow_refused  write the program even if motions had to be left uncorrected
     force          correct a program that carries a stamp
     split_rapids   hold the tolerance along rapids too, not only at their ends
+    flatten        write the program out flat where blocks are executed from several states (`compensate.flat`)
     verify         simulate the written program along the whole path (before and after figures)
     """
 
@@ -22,6 +23,7 @@ class FixOptions:
     allow_refused: bool = False
     force: bool = False
     split_rapids: bool = False
+    flatten: bool = False
     verify: bool = True
 
     @property

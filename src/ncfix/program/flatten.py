@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from ncfix.diagnostics import RefusedError
+from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.program.language import Resolve, language_of
 from ncfix.program.moves import Kind, Kinematics, Moves
 from ncfix.program.reader import read
@@ -23,12 +23,12 @@ from ncfix.program.tree import Program
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup
 
-NOT_FLAT = "NCF239"
+RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
 LINES = 500_000
 """A flat program has no more lines."""
 
 ROUNDINGS = 2.0
-"""Numbers of the flat program are rounded to the least increment; where several add up, an end may be off by so many."""
+"""By so many least increments an end may be off: numbers are rounded to them, and several may add up."""
 
 
 class FlatLine(NamedTuple):
@@ -86,12 +86,17 @@ def flatten(
 ) -> Flat:
     """Write a program out flat; arguments as of `trace` and `Unroll`.
 
-    Raises RefusedError NCF239 if the language cannot, or if the flat program would not make the same motions.
+    Raises RefusedError NCF237 and NCF238 where `Unroll` does, NCF239 if the language cannot, or if the flat program would not make the same motions.
     """
     unroll = language_of(program.dialect).unroll
     if unroll is None:
         raise RefusedError.of(NOT_FLAT, f"programs in {program.dialect.title} cannot be written out flat")
-    found = unroll(program, setup, axes, rotary, resolve, MAX_BLOCKS, kinematics, steps, limit)
+    try:
+        found = unroll(program, setup, axes, rotary, resolve, MAX_BLOCKS, kinematics, steps, limit)
+    except SourceError as error:
+        if error.messages[0].code in (RUNTIME, TOO_LONG):
+            raise RefusedError.collected(error.messages) from None
+        raise
     end = line_end(program.source)
     text = "".join(line.text + end for line in found).encode("latin-1")
     flat = read(text, program.path, program.dialect)

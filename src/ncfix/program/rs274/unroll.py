@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from ncfix.program.flatten import FlatLine
+from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector
@@ -23,9 +23,6 @@ from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Litera
 
 if TYPE_CHECKING:
     from ncfix.program.rs274.interpreter import Interpreter
-
-RUNTIME = "NCF237"
-TOO_LONG = "NCF238"
 
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
 """Codes, in tenths, that a flat program has no use for."""
