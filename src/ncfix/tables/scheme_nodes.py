@@ -14,8 +14,8 @@ from ncfix.tables.grid import Array
 
 SCALE = 10**4
 """Positions and steps have four decimals, mm or degree."""
-STEPS = (120, 240, 720, 1440)
-"""How many fine steps: numbers with many divisors, also of a turn in four decimals."""
+STEPS = ((120, 160, 200), (240, 320, 400), (720, 800, 640), (1440, 1600, 1280))
+"""How many fine steps, from coarse to fine: numbers with many divisors. The first that divides the range is taken."""
 PER_FEATURE = 3
 
 
@@ -39,7 +39,10 @@ class Line:
     def over(cls, name: str, low: float, high: float, unit: float, feature: float, modulo: bool) -> Line:
         """With steps small enough for errors that may bend within the length `feature` (file unit)."""
         wanted = PER_FEATURE * (high - low) / feature
-        return cls(name, low, high, unit, next((steps for steps in STEPS if steps >= wanted), STEPS[-1]), modulo)
+        choices = next((some for some in STEPS if some[0] >= wanted), STEPS[-1])
+        whole = round((high - low) * SCALE)
+        steps = next((some for some in choices if whole % some == 0), choices[0])
+        return cls(name, low, high, unit, steps, modulo)
 
     @property
     def fine(self) -> Array:

@@ -1,0 +1,413 @@
+"""Siemens CEC and EEC: to the byte, as the manual says that the control takes them, and what the linter says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ncfix_siemens.cec import Style, cec_text, read_cec
+from ncfix_siemens.combine import TERMS, Reading, compensation
+from ncfix_siemens.eec import read_eec
+from ncfix_siemens.probe import READINGS
+from ncfix_siemens.syntax import Assignment, assignments, parsed, written
+from ncfix_siemens.table import Table
+
+from ncfix.diagnostics import ConfigError, RefusedError, UsageError
+from ncfix.machine import Effect, Machine
+from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.tables.control import Request, get_control
+from ncfix.tables.export import Exported, export
+from ncfix.tables.lines import Remarks
+from ncfix.tables.poses import ranges_of
+from ncfix.testing import check_control, single_error
+
+CONTROL = get_control("siemens")
+HEAD = b"""%_N_NC_CEC_INI
+CHANDATA(1)
+; ncfix: value_sign=error product_terms=only X=AX1 Y=AX2 Z=AX3 most_tables=40 most_points=1000
+"""
+ONE = b"""$AN_CEC[0,0]=0.001
+$AN_CEC[0,1]=0.003
+$AN_CEC[0,2]=0.002
+$AN_CEC_INPUT_AXIS[0]=(AX2)
+$AN_CEC_OUTPUT_AXIS[0]=(AX1)
+$AN_CEC_STEP[0]=50.0
+$AN_CEC_MIN[0]=-100.0
+$AN_CEC_MAX[0]=0.0
+$AN_CEC_DIRECTION[0]=0
+$AN_CEC_MULT_BY_TABLE[0]=0
+$AN_CEC_IS_MODULO[0]=0
+"""
+MORE = b"""$AN_CEC[1,0]=0.1
+$AN_CEC[1,1]=0.2
+$AN_CEC_INPUT_AXIS[1]=(AX3)
+$AN_CEC_OUTPUT_AXIS[1]=(AX1)
+$AN_CEC_STEP[1]=100
+$AN_CEC_MIN[1]=0
+$AN_CEC_MAX[1]=100
+$AN_CEC_DIRECTION[1]=0
+$AN_CEC_MULT_BY_TABLE[1]=0
+$AN_CEC_IS_MODULO[1]=0
+"""
+GOOD = HEAD + ONE + b"M17\n"
+PAIR = HEAD + ONE.replace(b"TABLE[0]=0", b"TABLE[0]=2") + MORE + b"M17\n"
+EEC = b"""%_N_AX1_EEC_INI
+CHANDATA(1)
+; ncfix: X=AX1
+$AA_ENC_COMP[0,0,AX1]=0.003
+$AA_ENC_COMP[0,1,AX1]=0.01
+$AA_ENC_COMP[0,2,AX1]=0.012
+$AA_ENC_COMP_STEP[0,AX1]=100.0
+$AA_ENC_COMP_MIN[0,AX1]=-200.0
+$AA_ENC_COMP_MAX[0,AX1]=0.0
+$AA_ENC_COMP_IS_MODULO[0,AX1]=0
+M17
+"""
+SETTINGS = {"value_sign": "error", "product_terms": "only"}
+
+
+def made(machine: Machine, length: float = 0.0, target: float = 1e-4, **settings: str) -> Exported:
+    request = Request(machine, ranges_of(machine), length, target, CONTROL.settings({**SETTINGS, **settings}))
+    return export(CONTROL, request, 500)
+
+
+def at(files: dict[str, bytes], ways: tuple[int, int, int] = (0, 0, 0), **place: float) -> np.ndarray:
+    """The correction of X, Y, Z at a place, mm."""
+    q = np.array([[place.get(axis, 0.0) for axis in "XYZ"]])
+    return CONTROL.read(files).at(("X", "Y", "Z"), q, np.array([ways], dtype=float))[0]
+
+
+# -- writing -----------------------------------------------------------------------------------------------------------
+
+
+def test_golden_bytes_of_a_table_that_is_added() -> None:
+    """X stands 0.010 mm too far everywhere: as an error that is what the two values say."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
+    assert made(machine).native == {
+        "NC_CEC.INI": b"%_N_NC_CEC_INI\nCHANDATA(1)\n"
+        b"; ncfix: value_sign=error product_terms=only X=AX1 Y=AX2 Z=AX3 most_tables=40 most_points=1000\n"
+        b"; assumptions SIEMENS-1 to SIEMENS-7: see hand-over.md\n"
+        b"; table 1: X over X\n$AN_CEC[0,0]=0.01\n$AN_CEC[0,1]=0.01\n"
+        b"$AN_CEC_INPUT_AXIS[0]=(AX1)\n$AN_CEC_OUTPUT_AXIS[0]=(AX1)\n"
+        b"$AN_CEC_STEP[0]=500.0\n$AN_CEC_MIN[0]=-200.0\n$AN_CEC_MAX[0]=300.0\n"
+        b"$AN_CEC_DIRECTION[0]=0\n$AN_CEC_MULT_BY_TABLE[0]=0\n$AN_CEC_IS_MODULO[0]=0\nM17\n"
+    }
+
+
+def test_golden_bytes_of_a_pair() -> None:
+    base = Table(0, "AX1", "AX2", -10.0, 20.0, np.array([-0.5, 0.5]), direction=-1, multiply=2)
+    multiplier = Table(1, "AX4", "AX2", 0.0, 120.0, np.array([0.0, 0.8660254, -0.8660254, 0.0]), modulo=True)
+    style = Style(brackets=False, metric=True, path="/_N_CUS_DIR")
+    assert cec_text([base, multiplier], ["made by hand"], {1: "sine"}, style) == (
+        b"%_N_NC_CEC_INI\n;$PATH=/_N_CUS_DIR\nMETRIC\nCHANDATA(1)\n; made by hand\n"
+        b"$AN_CEC[0,0]=-0.5\n$AN_CEC[0,1]=0.5\n$AN_CEC_INPUT_AXIS[0]=AX1\n$AN_CEC_OUTPUT_AXIS[0]=AX2\n"
+        b"$AN_CEC_STEP[0]=20.0\n$AN_CEC_MIN[0]=-10.0\n$AN_CEC_MAX[0]=10.0\n"
+        b"$AN_CEC_DIRECTION[0]=-1\n$AN_CEC_MULT_BY_TABLE[0]=2\n$AN_CEC_IS_MODULO[0]=0\n"
+        b"; sine\n$AN_CEC[1,0]=0.0\n$AN_CEC[1,1]=0.8660254\n$AN_CEC[1,2]=-0.8660254\n$AN_CEC[1,3]=0.0\n"
+        b"$AN_CEC_INPUT_AXIS[1]=AX4\n$AN_CEC_OUTPUT_AXIS[1]=AX2\n"
+        b"$AN_CEC_STEP[1]=120.0\n$AN_CEC_MIN[1]=0.0\n$AN_CEC_MAX[1]=360.0\n"
+        b"$AN_CEC_DIRECTION[1]=0\n$AN_CEC_MULT_BY_TABLE[1]=0\n$AN_CEC_IS_MODULO[1]=1\nM17\n"
+    )
+
+
+def test_golden_bytes_of_an_encoder_table() -> None:
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
+    files = made(machine, positioning="eec", axes="X:X1,Y:Y1,Z:Z1").native
+    assert files == {
+        "X1_EEC.INI": b"%_N_X1_EEC_INI\nCHANDATA(1)\n"
+        b"; ncfix: value_sign=error product_terms=only X=X1 Y=Y1 Z=Z1 most_tables=40 most_points=1000\n"
+        b"; assumptions SIEMENS-1 to SIEMENS-7: see hand-over.md\n"
+        b"$AA_ENC_COMP[0,0,X1]=0.01\n$AA_ENC_COMP[0,1,X1]=0.01\n$AA_ENC_COMP_STEP[0,X1]=500.0\n"
+        b"$AA_ENC_COMP_MIN[0,X1]=-200.0\n$AA_ENC_COMP_MAX[0,X1]=300.0\n$AA_ENC_COMP_IS_MODULO[0,X1]=0\nM17\n"
+    }
+
+
+@pytest.mark.parametrize(("sign", "terms"), [("error", "only"), ("correction", "plus_both")])
+def test_the_contract(sign: str, terms: str) -> None:
+    check_control(CONTROL, {"value_sign": sign, "product_terms": terms})
+
+
+def test_the_contract_with_encoder_tables_and_few_tables() -> None:
+    check_control(CONTROL, {**SETTINGS, "positioning": "eec", "model": "828D"})
+
+
+@pytest.mark.parametrize("effect", [f"E{component}{axis}" for axis in "XYZ" for component in "XYZABC"])
+def test_every_single_error_goes_away(effect: str) -> None:
+    """Sums and products of pairs say any error of a three-axis machine: what is left is digits and nodes."""
+    size = 20e-6 if effect[1] in "ABC" else 0.01
+    for topology in ("w F X Y Z t", "w Y X F Z t"):
+        left = made(single_error(effect, size, topology), 100.0).left
+        assert left.after.max() < 2e-4
+        assert left.after.max() < 0.05 * max(left.before.max(), 0.005)
+
+
+def test_only_one_factor_of_a_pair_turns_with_the_sign() -> None:
+    machine = single_error("ECX", 20e-6)
+    one, other = (made(machine, value_sign=sign) for sign in ("error", "correction"))
+    first, second = (read_cec(parsed(each.native["NC_CEC.INI"].decode()), Remarks("")) for each in (one, other))
+    assert sum(bool(table.multiply) for table in first) == 1
+    for a, b in zip(first, second, strict=True):
+        turned = a.index + 1 not in {table.multiply for table in first}
+        assert (a.values == (-b.values if turned else b.values)).all()
+    assert (one.left.after == other.left.after).all()
+
+
+def test_factors_are_about_equally_large_and_do_little_harm_alone() -> None:
+    tables = read_cec(parsed(made(single_error("ECX", 200e-6)).native["NC_CEC.INI"].decode()), Remarks(""))
+    sizes = [float(np.abs(table.values).max()) for table in tables]
+    assert max(sizes) < 0.5
+    assert max(sizes) / min(sizes) < 1.1
+
+
+def test_what_changes_with_the_way_becomes_tables_for_each_way() -> None:
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (0.004,), Backlash((0,))),))
+    found = made(machine)
+    tables = read_cec(parsed(found.native["NC_CEC.INI"].decode()), Remarks(""))
+    assert [(table.direction, table.input) for table in tables] == [(1, "AX1"), (-1, "AX1")]
+    assert found.left.before.max() == pytest.approx(0.002)
+    assert found.left.after.max() < 1e-7  # digits of the file
+
+
+def test_angles_that_change_with_the_way_are_products_for_each_way() -> None:
+    machine = single_error("ECX").replace(effects=(Effect("ECX", (40e-6,), Backlash((0,))),))
+    found = made(machine)
+    tables = read_cec(parsed(found.native["NC_CEC.INI"].decode()), Remarks(""))
+    assert sorted(table.direction for table in tables if table.multiply) == [-1, 1]
+    assert found.left.after.max() < 1e-5
+    assert found.left.before.max() > 0.004
+
+
+# -- reading -----------------------------------------------------------------------------------------------------------
+
+
+def test_linear_between_and_held_beyond() -> None:
+    files = {"NC_CEC.INI": GOOD}
+    assert at(files, Y=-100)[0] == pytest.approx(-0.001)
+    assert at(files, Y=-75)[0] == pytest.approx(-0.002)
+    assert at(files, Y=-999)[0] == pytest.approx(-0.001)
+    assert at(files, Y=999)[0] == pytest.approx(-0.002)
+
+
+def test_the_sign_is_that_of_the_comment() -> None:
+    files = {"NC_CEC.INI": GOOD.replace(b"value_sign=error", b"value_sign=correction")}
+    assert at(files, Y=-100)[0] == pytest.approx(0.001)
+
+
+def test_a_direction_acts_that_way_of_the_input_axis_only() -> None:
+    files = {"NC_CEC.INI": GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=-1")}
+    assert at(files, (1, -1, 1), Y=0)[0] == pytest.approx(-0.002)
+    assert at(files, (-1, 1, -1), Y=0)[0] == 0
+
+
+def test_modulo_repeats() -> None:
+    turning = GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=1").replace(b"[0,2]=0.002", b"[0,2]=0.001")
+    assert at({"NC_CEC.INI": turning}, Y=25)[0] == pytest.approx(-0.002)
+
+
+@pytest.mark.parametrize(
+    ("terms", "expected"),
+    [
+        ("only", 0.003 * 0.15),
+        ("plus_multiplier", 0.003 * 0.15 + 0.15),
+        ("plus_base", 0.003 * 0.15 + 0.003),
+        ("plus_both", 0.003 * 0.15 + 0.003 + 0.15),
+    ],
+)
+def test_what_a_product_adds(terms: str, expected: float) -> None:
+    files = {"NC_CEC.INI": PAIR.replace(b"terms=only", b"terms=" + terms.encode())}
+    assert at(files, Y=-50, Z=50)[0] == pytest.approx(-expected)
+
+
+def test_encoder_values_are_errors_whatever_the_sign_of_the_others() -> None:
+    files = {"AX1_EEC.INI": EEC, "NC_CEC.INI": GOOD.replace(b"value_sign=error", b"value_sign=correction")}
+    assert at(files, X=-150, Y=-100)[0] == pytest.approx(-0.0065 + 0.001)
+
+
+# -- the samples that are public ---------------------------------------------------------------------------------------
+
+SAMPLES = ("cec_802Dsl_manual_example", "cec_fig73_seed001", "cec_mult_probe_RECONSTRUCTED", "eec_manual_example")
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_samples_are_read_and_written_again_identically(shared: Callable[[str], Path], name: str) -> None:
+    text = (shared("tables") / "siemens" / f"{name}.ini").read_bytes().decode("latin-1")
+    lines = parsed(text)
+    assert written(lines) == text
+    remarks = Remarks("sample")
+    found = list(assignments(lines, remarks))
+    assert len(found) == text.count("]=") == sum(isinstance(line, Assignment) for line in lines)
+    assert not remarks.messages
+
+
+def test_what_the_samples_lack_is_named(shared: Callable[[str], Path]) -> None:
+    """Two leave values out, one has a value too many and (MAX - MIN) / STEP not whole in the manual itself."""
+    folder = shared("tables") / "siemens"
+    seed, manual = (
+        {message.text for message in CONTROL.lint({"a.ini": (folder / f"{name}.ini").read_bytes()})}
+        for name in ("cec_fig73_seed001", "cec_802Dsl_manual_example")
+    )
+    assert "table 3 has values 0 to 13 by its MIN, MAX and STEP; this one is ignored" in seed
+    assert any("not a whole number: the control would move the end" in text for text in manual)
+    eec = CONTROL.lint({"b.ini": (folder / "eec_manual_example.ini").read_bytes()})
+    assert any("797 of 801 values of X1 are missing, first $AA_ENC_COMP[0,3,X1]" in each.text for each in eec)
+
+
+@pytest.mark.parametrize("terms", TERMS)
+def test_the_probe_of_products_reads_as_its_comment_says(shared: Callable[[str], Path], terms: str) -> None:
+    """0.02 product only, 0.22 and the multiplier, 0.12 and the base, 0.32 both."""
+    text = (shared("tables") / "siemens" / "cec_mult_probe_RECONSTRUCTED.ini").read_text()
+    remarks = Remarks("")
+    tables = read_cec(parsed(text), remarks)
+    assert not remarks.messages
+    reading = Reading({"X": "AX1", "Z": "AX3"}, 1, terms)
+    found = compensation(tables, reading).at(("X", "Z"), np.array([[-50.0, -20.0]]))
+    assert found[0].tolist() == pytest.approx([READINGS[terms], 0.0])
+
+
+# -- the linter --------------------------------------------------------------------------------------------------------
+
+WRONG = {
+    "one value too many": (GOOD.replace(b"$AN_CEC_INPUT", b"$AN_CEC[0,3]=0.0\n$AN_CEC_INPUT"), "values 0 to 2 by its"),
+    "a value gone": (GOOD.replace(b"$AN_CEC[0,1]=0.003\n", b""), "1 of 3 values of table 1 are missing"),
+    "a step that does not fit": (GOOD.replace(b"STEP[0]=50.0", b"STEP[0]=30.0"), "not a whole number"),
+    "no step": (GOOD.replace(b"STEP[0]=50.0", b"STEP[0]=0"), "a step of 0"),
+    "ends exchanged": (GOOD.replace(b"MAX[0]=0.0", b"MAX[0]=-200.0"), "from -100 to -200"),
+    "no input axis": (GOOD.replace(b"$AN_CEC_INPUT_AXIS[0]=(AX2)\n", b""), "has no $AN_CEC_INPUT_AXIS[0]"),
+    "an axis of another machine": (GOOD.replace(b"(AX2)", b"(AX7)"), "which axis of the machine AX7 is"),
+    "no name of an axis": (GOOD.replace(b"(AX2)", b"(A+)"), "not the name of an axis"),
+    "a decimal comma": (GOOD.replace(b"0.003", b"0,003"), "a decimal comma"),
+    "a word": (GOOD.replace(b"0.003", b"three"), "not a number"),
+    "a direction of 2": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=2"), "direction 2"),
+    "half a direction": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=0.5"), "not a whole number"),
+    "modulo 5": (GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=5"), "modulo 5"),
+    "times a table that is not there": (PAIR.replace(b"TABLE[0]=2", b"TABLE[0]=3"), "table 3, which is not there"),
+    "factors of two axes": (PAIR.replace(b"OUTPUT_AXIS[1]=(AX1)", b"OUTPUT_AXIS[1]=(AX2)"), "is for AX1, the table"),
+    "a multiplier with a direction": (PAIR.replace(b"TION[1]=0", b"TION[1]=1"), "multiplies others and acts one way"),
+    "an unknown variable": (GOOD.replace(b"AN_CEC_STEP", b"AN_CEC_STOP"), "not a variable of these tables"),
+    "an index too many": (GOOD.replace(b"STEP[0]", b"STEP[0,1]"), "takes 1 whole number in its brackets"),
+    "no index": (GOOD.replace(b"[0,1]", b"[0]"), "takes 2 whole numbers in its brackets"),
+    "a line that is none": (GOOD.replace(b"CHANDATA(1)", b"CHANNEL 1"), "is not understood"),
+    "no assignment": (GOOD.replace(b"$AN_CEC[0,1]=0.003", b"$AN_CEC[0,1] 0.003"), "is not an assignment"),
+    "inches": (GOOD.replace(b"CHANDATA", b"INCH\nCHANDATA"), "INCH"),
+    "cut off": (GOOD.removesuffix(b"M17\n"), "does not end with M17"),
+    "more after the end": (GOOD + ONE, "stands after the end"),
+    "not ASCII": (GOOD.replace(b"; ncfix", "; µm\n; ncfix".encode()), "not ASCII"),
+    "no sign": (GOOD.replace(b"value_sign=error ", b""), "errors or corrections (value_sign)"),
+    "what products add unsaid": (PAIR.replace(b"product_terms=only ", b""), "what a product adds (product_terms)"),
+    "too many tables": (PAIR.replace(b"most_tables=40", b"most_tables=1"), "2 tables, and the control has 1"),
+    "too many points": (GOOD.replace(b"most_points=1000", b"most_points=2"), "3 points, and the control has 2"),
+    "EEC: one value too many": (EEC.replace(b"MAX[0,AX1]=0.0", b"MAX[0,AX1]=-100.0"), "ends with value 1"),
+    "EEC: a value gone": (EEC.replace(b"$AA_ENC_COMP[0,0,AX1]=0.003\n", b""), "1 of 3 values of AX1 are missing"),
+    "EEC: no step": (EEC.replace(b"$AA_ENC_COMP_STEP[0,AX1]=100.0\n", b""), "has no $AA_ENC_COMP_STEP"),
+    "EEC: a step that does not fit": (EEC.replace(b"=100.0", b"=130.0"), "not a whole number above zero"),
+    "EEC: a decimal comma": (EEC.replace(b"0.012", b"0,012"), "a decimal comma"),
+    "EEC: no axis": (EEC.replace(b"[0,1,AX1]", b"[0,1]"), "encoder, number and axis"),
+}
+DOUBTFUL = {
+    "no header": (GOOD.replace(b"%_N_NC_CEC_INI\n", b""), "does not name the file"),
+    "assigned twice": (GOOD.replace(b"$AN_CEC_INPUT", b"$AN_CEC[0,1]=0.0\n$AN_CEC_INPUT"), "keeps the last"),
+    "ends that differ": (GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=1"), "ends on another value than it begins"),
+    "micrometres": (GOOD.replace(b"0.003", b"3.0"), "which no machine needs"),
+    "a slip of the digits": (GOOD.replace(b"0.003", b"0.9"), "changes by"),
+    "both factors turned": (PAIR.replace(b"=0.2", b"=-0.2"), "the largest value of the multiplier"),
+    "a chain of products": (PAIR.replace(b"TABLE[1]=0", b"TABLE[1]=1"), "is itself multiplied by another"),
+    "one way only": (GOOD.replace(b"DIRECTION[0]=0", b"DIRECTION[0]=1"), "moves one way only"),
+    "two ends of lines": (GOOD.replace(b"STEP[0]=50.0\n", b"STEP[0]=50.0\r\n"), "end in two ways"),
+    "EEC: ends that differ": (EEC.replace(b"MODULO[0,AX1]=0", b"MODULO[0,AX1]=1"), "another value than it begins"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_files_are_named_and_not_run(case: str) -> None:
+    content, expected = WRONG[case]
+    found = CONTROL.lint({"NC_CEC.INI": content})
+    assert any(expected in message.text and message.code == "NCF491" for message in found), found
+    with pytest.raises(ConfigError):
+        CONTROL.read({"NC_CEC.INI": content})
+
+
+@pytest.mark.parametrize("case", DOUBTFUL)
+def test_doubtful_files_are_named_and_run(case: str) -> None:
+    content, expected = DOUBTFUL[case]
+    found = CONTROL.lint({"NC_CEC.INI": content})
+    assert any(expected in message.text and message.code == "NCF492" for message in found), found
+    CONTROL.read({"NC_CEC.INI": content})
+
+
+def test_an_axis_corrected_in_two_places() -> None:
+    own = GOOD.replace(b"INPUT_AXIS[0]=(AX2)", b"INPUT_AXIS[0]=(AX1)")
+    found = CONTROL.lint({"AX1_EEC.INI": EEC, "NC_CEC.INI": own})
+    assert [message.code for message in found] == ["NCF492"]
+    assert "is corrected twice" in found[0].text
+
+
+@pytest.mark.parametrize(
+    "content", [GOOD, PAIR, EEC, GOOD.replace(b"\n", b"\r\n")], ids=["sum", "pair", "EEC", "CR LF"]
+)
+def test_good_files_are_not_remarked_on(content: bytes) -> None:
+    assert not CONTROL.lint({"a.INI": content})
+
+
+def test_a_file_that_lists_each_table_only_once() -> None:
+    """`axes` may be bare or in brackets; METRIC and comments do no harm; the order of lines is free."""
+    lines = [line for line in ONE.splitlines(keepends=True)[::-1]]
+    mixed = HEAD + b"METRIC\n; anything\n\n" + b"".join(lines).replace(b"(AX2)", b"AX2 ; base") + b"M17 ; end\n"
+    assert not CONTROL.lint({"a.INI": mixed})
+    assert at({"a.INI": mixed}, Y=-75)[0] == pytest.approx(-0.002)
+
+
+def test_an_encoder_file_alone_is_read() -> None:
+    remarks = Remarks("")
+    (table,) = read_eec(parsed(EEC.decode()), remarks)
+    assert (table.output, table.low, table.step, table.high) == ("AX1", -200.0, 100.0, 0.0)
+    assert not remarks.messages
+
+
+# -- settings ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_sign_must_be_given() -> None:
+    with pytest.raises(UsageError, match="value_sign"):
+        CONTROL.settings({})
+
+
+def test_products_need_to_know_what_they_add() -> None:
+    with pytest.raises(UsageError, match="product_terms"):
+        made(single_error("ECX", 20e-6), product_terms="")
+    assert made(single_error("EXX"), product_terms="").left.after.max() < 1e-4
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"value_sign": "minus"},
+        {"product_terms": "maybe"},
+        {"scheme": "magic"},
+        {"model": "810D"},
+        {"tables": "0"},
+        {"points": "x"},
+        {"rotary": "yes"},
+        {"positioning": "lec"},
+        {"axes": "X:AX1"},
+        {"axes": "X:AX1,Y:AX1,Z:AX3"},
+        {"axes": "X:A X,Y:AX2,Z:AX3"},
+        {"brackets": "true"},
+    ],
+)
+def test_wrong_settings(settings: dict[str, str]) -> None:
+    with pytest.raises(UsageError) as caught:
+        made(single_error("EXX"), **settings)
+    assert caught.value.code == "NCF485"
+
+
+def test_a_scheme_that_takes_more_tables_than_there_are() -> None:
+    with pytest.raises(RefusedError, match="9 tables, and the control has 8") as caught:
+        made(single_error("EXX"), scheme="poly25", model="828D")
+    assert caught.value.code == "NCF484"
+
+
+def test_polynomials_for_any_machine() -> None:
+    machine = single_error("EXX").replace(effects=(Effect("EYX", (1e-4,), Polynomial((1,))),))
+    assert made(machine, scheme="poly25").left.after.max() < 1e-4
