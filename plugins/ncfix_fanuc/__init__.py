@@ -60,27 +60,27 @@ def register_dialects(register: Register[Dialect]) -> None:
 
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
-    """Bring the controls `fanuc` and `fanuc-rotary`, three-dimensional grids, and `fanuc-pitch`, stored pitch errors."""
-    register(control, name="fanuc")
-    register(rotary, name="fanuc-rotary")
-    register(pitch, name="fanuc-pitch")
+    """Bring the controls `fanuc` and `fanuc-rotary`, grids in space, and `fanuc-pitch`, stored pitch errors."""
+    register(grid, name="fanuc")
+    register(grid_with_angles, name="fanuc-rotary")
+    register(pitch_errors, name="fanuc-pitch")
 
 
-def control() -> Control:
-    """The control, imported when tables are asked for."""
+def grid() -> Control:
+    """The grid, imported when tables are asked for."""
     from ncfix_fanuc.control import Fanuc
 
     return Fanuc()
 
 
-def rotary() -> Control:
+def grid_with_angles() -> Control:
     """The grid with angles."""
     from ncfix_fanuc.rotary import FanucRotary
 
     return FanucRotary()
 
 
-def pitch() -> Control:
+def pitch_errors() -> Control:
     """Stored pitch errors."""
     from ncfix_fanuc.pitch import FanucPitch
 

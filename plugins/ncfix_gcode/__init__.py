@@ -31,10 +31,10 @@ def register_dialects(register: Register[Dialect]) -> None:
 @hookimpl
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the control `gcode`: programs that are rewritten."""
-    register(control, name="gcode")
+    register(programs, name="gcode")
 
 
-def control() -> Control:
+def programs() -> Control:
     """The control, imported when tables are asked for."""
     from ncfix_gcode.control import Gcode
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def register_controls(register: Register[Callable[[], Control]]) -> None:
     """Bring the controls `heidenhain`, axis tables, and `heidenhain-kinematics`, KinematicsComp."""
     register(axis_tables, name="heidenhain")
-    register(kinematics, name="heidenhain-kinematics")
+    register(whole_chain, name="heidenhain-kinematics")
 
 
 def axis_tables() -> Control:
@@ -26,7 +26,7 @@ def axis_tables() -> Control:
     return Heidenhain()
 
 
-def kinematics() -> Control:
+def whole_chain() -> Control:
     """The control with KinematicsComp."""
     from ncfix_heidenhain.kinematics import KinematicsComp
 

@@ -1,0 +1,305 @@
+"""Stored pitch error compensation of Fanuc controls: increments of one axis over itself.
+
+The values are small whole numbers, each what is added on the way from one point to the next. They are rounded so that
+their sum is never off by more than half a step: the rounding error is carried along, not thrown away at every point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.positioning import positioning
+from ncfix_fanuc.pitch_text import (
+    LARGEST,
+    MOST,
+    NUMBERS,
+    Pitch,
+    parameter_text,
+    pitch_text,
+    read_increments,
+    read_records,
+)
+
+DEGREE = np.pi / 180
+PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
+ORDER = "XYZABCUVW"
+FIRST_NUMBER = 1
+
+
+class FanucPitch(Control):
+    """The control `fanuc-pitch`."""
+
+    name = "fanuc-pitch"
+    title = "Fanuc stored pitch error compensation"
+    reaches = "L-POS"
+    properties = Properties(
+        value_sign="as --set sign says",
+        input_signal="setpoint",
+        position_frame="reference position: machine zero",
+        unit="detection unit times magnification, increments",
+        quantum=(1e-4, 1e-4 * DEGREE),
+        extrapolation="the sum up to the first or last point is held",
+        bidirectional=False,
+        max_points=MOST,
+        max_tables=9,
+        combine="one for each axis",
+    )
+    assumptions = (
+        Assumption(
+            "PITCH-1",
+            "The sign of the values is what --set sign says.",
+            "none of the public pages says it",
+            "none: it must be given",
+            "Load +7 at one point: does the axis go farther (correction) or less far (error) beyond it?",
+        ),
+        Assumption(
+            "PITCH-2",
+            "The sum of the increments changes along a straight line from point to point.",
+            "none public; without the interpolation function the control may add each increment at once",
+            "so",
+            "Move past a point in steps of the detection unit and watch the position error of the servo.",
+        ),
+        Assumption(
+            "PITCH-3",
+            "Parameters 3620 to 3625 and the punched form N..A1P..A2P.. are those of this control.",
+            "B-63330EN (15i), B-63980EN",
+            "so",
+            "Punch the parameters of the control and compare the form.",
+        ),
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        "sign": Option(None, "correction: values are added to the command; error: they are taken off it"),
+        "detection_unit_um": Option("0.1", "detection unit of linear axes, um"),
+        "detection_unit_deg": Option("0.0001", "detection unit of rotary axes, degree"),
+    }
+    steps = (
+        "Settle PITCH-1 on the machine.",
+        "Save parameters and pitch data; set parameter 3605#0 to 0 (one table for both ways).",
+        "Set the parameters of parameters.txt, switch power off and on (alarm PW1102 tells of wrong point numbers).",
+        "Type in the increments of the pitch_*.csv files at the numbers given.",
+        "Home all axes and measure one again: the error must have become smaller, not twice as large.",
+    )
+    switch_off = "Set the magnification (3623) to 0."
+
+    def write(self, request: Request) -> Written:
+        """The increments of every axis that has something to correct, and the parameters."""
+        settings = self.settings(request.settings)
+        sense = {"correction": 1, "error": -1}.get(settings["sign"], 0)
+        if not sense:
+            raise UsageError.of("NCF485", f"sign={settings['sign']}", hint="correction or error")
+        units = (_unit(settings["detection_unit_um"]) / 1000, _unit(settings["detection_unit_deg"]) * DEGREE)
+        axes = _axes(request)
+        tables, notes = _curves(request), []
+        found: list[Pitch] = []
+        for axis in axes:
+            made = _pitch(
+                request, axis, tables.get(axis, ()), sense, units, found[-1].last + 1 if found else FIRST_NUMBER
+            )
+            if made is not None:
+                found.append(made)
+                notes.append(_said(made, units))
+        files = {f"pitch_{each.axis}.csv": pitch_text(each) for each in found}
+        files[PARAMETERS] = parameter_text(_parameters(found, axes))
+        words = (settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes))
+        files[SETTINGS] = (" ".join(words) + "\n").encode()
+        notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
+        return Written(files, tuple(notes))
+
+    def read(self, files: Files) -> Compensation:
+        """As the control sums them up. Raises `ConfigError` NCF491."""
+        terms, remarks = self._read(files)
+        for each in remarks:
+            each.check()
+        return Compensation(terms)
+
+    def lint(self, files: Files) -> tuple[Message, ...]:
+        """Values beyond the range, point numbers that do not fit, turns that do not close."""
+        return tuple(message for each in self._read(files)[1] for message in each.messages)
+
+    def _read(self, files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
+        head = Remarks.of(SETTINGS, files.get(SETTINGS, b""))
+        words = files.get(SETTINGS, b"").decode("latin-1").split()
+        if len(words) != 4 or words[0] not in ("correction", "error"):
+            head.refuse(0, "should hold the sign, two detection units and the axes", "PITCH-1")
+            return (), [head]
+        sense = 1 if words[0] == "correction" else -1
+        parameters = Remarks.of(PARAMETERS, files.get(PARAMETERS, b""))
+        values = {record.number: dict(record.values) for record in read_records(parameters)}
+        remarks, terms = [head, parameters], []
+        for name in sorted(files):
+            if name.startswith("pitch_") and name.endswith(".csv"):
+                axis = name[len("pitch_") : -len(".csv")]
+                found = Remarks.of(name, files[name])
+                remarks.append(found)
+                pitch = _read_pitch(found, axis, words[3], values)
+                if pitch is not None and not found.wrong:
+                    unit = float(words[2]) * DEGREE if axis in "ABC" else float(words[1]) / 1000
+                    terms.append(Term((_grid(pitch, sense * unit),)))
+        return tuple(terms), remarks
+
+
+def _unit(text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not 1e-6 <= found <= 10:
+        raise UsageError.of("NCF485", f"a detection unit of {text}", hint="from 0.000001 to 10")
+    return found
+
+
+def _axes(request: Request) -> tuple[str, ...]:
+    names = request.machine.axis_names
+    if not set(names) <= set(ORDER):
+        raise RefusedError.of("NCF484", f"axes beyond {' '.join(ORDER)}: {' '.join(names)}")
+    return tuple(letter for letter in ORDER if letter in names)
+
+
+def _curves(request: Request) -> dict[str, tuple[Grid, ...]]:
+    """The forward and the reverse correction of each axis over itself."""
+    tables = positioning(request.machine, request.space, request.tool_length, MOST - 1, request.target)
+    found: dict[str, tuple[Grid, ...]] = {}
+    for term in tables.terms:
+        found[term.outputs[0]] = (*found.get(term.outputs[0], ()), term.factors[0])
+    return found
+
+
+def _pitch(
+    request: Request, axis: str, tables: tuple[Grid, ...], sense: int, units: tuple[float, float], number: int
+) -> Pitch | None:
+    """The increments of an axis; twice as many points as the curve needs, and twice again, while that rounds less."""
+    if not tables:
+        return None
+    cells = len(tables[0].nodes[0]) - 1
+    best = _with_cells(request, axis, tables, sense, units, number, cells)
+    while best is not None and best.magnification > 1 and 2 * cells < MOST - 1:
+        cells *= 2
+        best = _with_cells(request, axis, tables, sense, units, number, cells)
+    return best
+
+
+def _with_cells(
+    request: Request,
+    axis: str,
+    tables: tuple[Grid, ...],
+    sense: int,
+    units: tuple[float, float],
+    number: int,
+    cells: int,
+) -> Pitch | None:
+    """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said."""
+    column = request.machine.axis_names.index(axis)
+    described = request.machine.axes[column]
+    low, high = (request.space[column] / described.unit).tolist()
+    turn = 360.0 if described.endless else 0.0
+    interval = 360.0 / cells if turn else math.ceil((high - low) / cells * 1000) / 1000
+    first, last = (0, cells) if turn else _ends(low, high, interval)
+    if last - first + 1 > MOST:
+        raise RefusedError.of(
+            "NCF484", f"{axis} needs {last - first + 1} points, and the control has {MOST} for an axis"
+        )
+    places = np.arange(first, last + 1) * interval * described.unit
+    inside = _turned(places, request.space[column]) if turn else np.clip(places, *request.space[column])
+    mean = np.mean([table.at(inside[:, None])[:, 0] for table in tables], axis=0)
+    curve: Array = mean - float(np.mean([table.at(np.zeros((1, 1)))[0, 0] for table in tables]))
+    if turn:
+        curve[-1] = curve[0]
+    increments, magnification = diffused(sense * curve / units[int(described.rotary)])
+    if not increments.any() or np.mean((mean - curve) ** 2) > np.mean(mean**2):
+        return None
+    return Pitch(axis, number, increments, number - first, magnification, interval, turn)
+
+
+def _ends(low: float, high: float, interval: float) -> tuple[int, int]:
+    """The first and last whole number of intervals from zero that hold a range."""
+    first = math.floor(low / interval + 1e-9)
+    return first, max(math.ceil(high / interval - 1e-9), first + 1)
+
+
+def _turned(places: Array, space: Array) -> Array:
+    found: Array = space[0] + np.mod(places - space[0], 2 * np.pi)
+    return found
+
+
+def diffused(curve: Array) -> tuple[NDArray[np.int64], int]:
+    """Increments from -7 to 7 whose sums follow a curve (detection units) within half a step, and the magnification.
+
+    The first increment leads to the first point and is none: sums count from the reference position, where the curve
+    is zero.
+    """
+    magnification = 1
+    while True:
+        steps = np.rint(curve / magnification)
+        increments = np.diff(steps, prepend=steps[0]).astype(np.int64)
+        if np.abs(increments).max() <= LARGEST:
+            return increments, magnification
+        magnification += 1
+        if magnification > 100:
+            raise RefusedError.of("NCF484", "a pitch error needs a magnification above 100", hint="is the error in mm?")
+
+
+def _said(pitch: Pitch, units: tuple[float, float]) -> str:
+    rotary = pitch.axis in "ABC"
+    half = 0.5 * pitch.magnification * (units[1] / DEGREE if rotary else 1000 * units[0])
+    unit = "degree" if rotary else "um"
+    return (
+        f"{pitch.axis}: points {pitch.first} to {pitch.last}, magnification {pitch.magnification}: a sum is rounded by "
+        f"up to {half:.4g} {unit}, however many increments it has."
+    )
+
+
+def _parameters(found: list[Pitch], axes: tuple[str, ...]) -> dict[int, list[float]]:
+    by_axis = {each.axis: each for each in found}
+    rows: dict[int, list[float]] = {number: [] for number in NUMBERS.values()}
+    for axis in axes:
+        each = by_axis.get(axis)
+        values = (
+            (each.reference, each.first, each.last, each.magnification, each.interval, each.turn) if each else [0] * 6
+        )
+        for number, value in zip(NUMBERS.values(), values, strict=True):
+            rows[number].append(float(value))
+    return rows
+
+
+def _read_pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[int, str]]) -> Pitch | None:
+    first, increments = read_increments(remarks)
+    index = axes.find(axis) + 1
+    if len(axis) != 1 or not index:
+        remarks.refuse(0, f"{axis} is none of the axes {axes}")
+        return None
+    try:
+        found = {name: float(values[number][index]) for name, number in NUMBERS.items()}
+    except KeyError:
+        remarks.refuse(0, f"{PARAMETERS} has not all parameters of axis {index}")
+        return None
+    last = first + len(increments) - 1
+    if (found["low"], found["high"]) != (first, last):
+        remarks.refuse(0, f"points {first} to {last}, and the parameters say {found['low']:g} to {found['high']:g}")
+    if found["interval"] <= 0:
+        remarks.refuse(0, "an interval of zero")
+    if found["turn"] and increments.sum() != 0:
+        remarks.refuse(0, f"the increments of a turn add up to {increments.sum()}, not to zero")
+    if not first <= found["reference"] <= last:
+        remarks.doubt(0, "the reference position is outside the points")
+    magnification = int(found["magnification"])
+    return Pitch(axis, first, increments, int(found["reference"]), magnification, found["interval"], found["turn"])
+
+
+def _grid(pitch: Pitch, unit: float) -> Grid:
+    sums = np.cumsum(pitch.increments)
+    at_zero = int(np.clip(pitch.reference - pitch.first, 0, len(sums) - 1))
+    scale = DEGREE if pitch.axis in "ABC" else 1.0
+    counts = np.arange(pitch.first - pitch.reference, pitch.last - pitch.reference + 1, dtype=np.float64)
+    nodes: Array = pitch.interval * scale * counts
+    values = (sums - sums[at_zero]) * pitch.magnification * unit
+    return Grid((pitch.axis,), (nodes,), (pitch.axis,), values[:, None].astype(np.float64), (bool(pitch.turn),))

@@ -1,0 +1,148 @@
+"""Stored pitch errors: rounding carried along, turns that close, the samples, and broken files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ncfix.diagnostics import ConfigError, RefusedError
+from ncfix.machine import Effect, load, loads
+from ncfix.machine.smooth import Polynomial
+from ncfix.tables.control import Request, get_control
+from ncfix.tables.export import export
+from ncfix.tables.lines import Remarks
+from ncfix.tables.poses import ranges_of
+from ncfix.testing import AXES, check_control, single_error
+from ncfix_fanuc.pitch import diffused
+from ncfix_fanuc.pitch_text import Pitch, pitch_text, read_increments, read_records, records_text
+
+CONTROL = get_control("fanuc-pitch")
+SETTINGS = CONTROL.settings({"sign": "correction"})
+
+
+def long_screw() -> dict[str, bytes]:
+    """A screw that is 0.1 um per mm too long."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (1e-4,), Polynomial((1,))),))
+    settings = {**SETTINGS, "detection_unit_um": "1"}
+    return dict(export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100).native)
+
+
+def test_the_contract() -> None:
+    check_control(CONTROL, {"sign": "error"})
+
+
+@given(st.lists(st.floats(-300, 300), min_size=2, max_size=40))
+def test_sums_are_never_off_by_more_than_half_a_step(values: list[float]) -> None:
+    curve = np.array(values)
+    increments, magnification = diffused(curve)
+    assert np.abs(increments).max() <= 7
+    sums = np.cumsum(increments) + np.rint(curve[0] / magnification)
+    assert np.abs(sums * magnification - curve).max() <= magnification / 2 + 1e-9
+
+
+def test_golden_bytes() -> None:
+    """20 um at -200 to -30 um at 300, in units of 1 um: intervals of 62.5 mm, 6.25 units each.
+
+    They count from zero, so the first and the last reach beyond the travel, and have 1.25 and 5 units.
+    """
+    found = long_screw()
+    assert set(found) == {"pitch_X.csv", "parameters.txt", "settings.txt"}
+    lines = found["pitch_X.csv"].splitlines()
+    assert lines[:3] == [
+        b"# No.1..10, incremental values (-7..+7), x magnification, detection units",
+        b"no,value",
+        b"1,0",
+    ]
+    values = [int(line.split(b",")[1]) for line in lines[3:]]
+    assert sum(values) == -50
+    assert set(values) == {-7, -6, -5, -1}
+    assert found["parameters.txt"].splitlines() == [
+        b"%",
+        b"N03620A1P5A2P0A3P0;",
+        b"N03621A1P1A2P0A3P0;",
+        b"N03622A1P10A2P0A3P0;",
+        b"N03623A1P1A2P0A3P0;",
+        b"N03624A1P62.5000A2P0A3P0;",
+        b"N03625A1P0A2P0A3P0;",
+        b"%",
+    ]
+
+
+def test_a_rotary_axis_closes_over_a_turn(root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "dmu50.toml")
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 200)
+    first, increments = read_increments(Remarks.of("pitch_C.csv", made.native["pitch_C.csv"]))
+    assert increments.sum() == 0
+    assert first > 1
+    broken = {**made.native, "pitch_C.csv": made.native["pitch_C.csv"].replace(b",0\n", b",1\n", 1)}
+    assert any("add up to 1, not to zero" in message.text for message in CONTROL.lint(broken))
+
+
+def test_the_sample_is_read_and_its_numbers_written_again(shared: Callable[[str], Path]) -> None:
+    """B-63980EN, p. 100: points 33 to 49."""
+    content = (shared("tables") / "fanuc" / "pitch_example_B63980EN_p100.csv").read_bytes()
+    remarks = Remarks.of("sample", content)
+    first, increments = read_increments(remarks)
+    assert not remarks.messages
+    assert (first, len(increments), increments.sum()) == (33, 17, 2)
+    assert pitch_text(Pitch("X", first, increments, 33, 1, 1.0)) == content
+
+
+def test_the_parameter_sample_is_written_again_identically(shared: Callable[[str], Path]) -> None:
+    content = (shared("tables") / "fanuc" / "param_record_15i.txt").read_bytes()
+    remarks = Remarks.of("sample", content)
+    records = read_records(remarks)
+    assert not remarks.messages
+    assert records[0].number == 0
+    assert records[2].kind == "S"
+    assert records_text(records) == content
+
+
+def test_a_magnification_beyond_the_control_is_refused() -> None:
+    with pytest.raises(RefusedError) as caught:
+        diffused(np.array([0.0, 900.0]))
+    assert caught.value.code == "NCF484"
+
+
+def test_what_only_an_offset_would_help_is_left() -> None:
+    text = AXES.format(name="n", topology="w F X Y Z t", sense=1, effect="EXX", size=0, half=0)
+    machine = loads(text).replace(effects=(Effect("EXX", (0.01,)),))
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 50)
+    assert "pitch_X.csv" not in made.native
+    assert (made.left.after == made.left.before).all()
+
+
+FILES = long_screw()
+BROKEN = {
+    "too large": (("pitch_X.csv", b",-7\n", b",-8\n"), "beyond -7 to 7"),
+    "a point gone": (("pitch_X.csv", b"3,", b"4,"), "point 4 after point 2"),
+    "a word": (("pitch_X.csv", b"1,0", b"1,O"), "not a point number"),
+    "no head": (("pitch_X.csv", b"no,value\n", b""), "should begin with no,value"),
+    "other numbers": (("parameters.txt", b"N03622A1P10", b"N03622A1P11"), "the parameters say 1 to 11"),
+    "no interval": (("parameters.txt", b"N03624A1P62.5000", b"N03624A1P0"), "an interval of zero"),
+    "a parameter gone": (("parameters.txt", b"N03623A1P1A2P0A3P0;\n", b""), "not all parameters of axis 1"),
+    "no tape marks": (("parameters.txt", b"%\n", b""), "begin and end with a line %"),
+    "no record": (("parameters.txt", b"N03625A1P0", b"N03625A1=0"), "is no record"),
+    "two kinds": (("parameters.txt", b"N03625A1P0", b"N03625S1P0"), "several kinds"),
+    "no sign": (("settings.txt", b"correction", b"plus"), "the sign"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_broken_files(case: str) -> None:
+    (name, old, new), expected = BROKEN[case]
+    assert old in FILES[name]
+    broken = {**FILES, name: FILES[name].replace(old, new, 1)}
+    found = CONTROL.lint(broken)
+    assert any(expected in message.text for message in found), found
+    with pytest.raises(ConfigError):
+        CONTROL.read(broken)
+
+
+def test_good_files_are_not_remarked_on() -> None:
+    assert not CONTROL.lint(FILES)
