@@ -8,7 +8,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def exists_already(path: str) -> UsageError:
     return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
 
 
-def write_whole(path: str, data: bytes, replace: bool = False) -> None:
+def write_whole(path: str, data: bytes | Iterable[bytes], replace: bool = False) -> None:
     """Write a new file, or with `replace` in place of an existing one, whose mode is kept; NCF004, NCF007 if not."""
     with _coded(path):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
@@ -48,7 +48,7 @@ def write_whole(path: str, data: bytes, replace: bool = False) -> None:
         _sync_folder(path)
 
 
-def replace_keeping(path: str, backup: str, data: bytes) -> None:
+def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> None:
     """Give `path` new content and keep the old file as `backup`; at every moment both names hold whole files."""
     with _coded(path):
         with _written_beside(path, data, like=path) as temporary:
@@ -73,7 +73,7 @@ def _coded(path: str) -> Iterator[None]:
 
 
 @contextmanager
-def _written_beside(path: str, data: bytes, like: str | None) -> Iterator[str]:
+def _written_beside(path: str, data: bytes | Iterable[bytes], like: str | None) -> Iterator[str]:
     """A file with this content, on the disk, in the same folder; gone afterwards if it still has its own name."""
     temporary = os.path.join(os.path.dirname(path), f".ncfix-{os.urandom(8).hex()}.tmp")
     handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
@@ -88,16 +88,17 @@ def _written_beside(path: str, data: bytes, like: str | None) -> Iterator[str]:
             os.unlink(temporary)
 
 
-def _fill(handle: int, data: bytes, like: str | None) -> None:
+def _fill(handle: int, data: bytes | Iterable[bytes], like: str | None) -> None:
     if like is not None:
         before = os.stat(like)
         if (before.st_uid, before.st_gid) != (os.fstat(handle).st_uid, os.fstat(handle).st_gid):
             with suppress(PermissionError):
                 os.chown(handle, before.st_uid, before.st_gid)
         os.chmod(handle, stat.S_IMODE(before.st_mode))
-    rest = memoryview(data)
-    while rest:
-        rest = rest[os.write(handle, rest) :]
+    for part in (data,) if isinstance(data, bytes) else data:
+        rest = memoryview(part)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
     os.fsync(handle)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,21 +11,24 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import (
+    dialect_of,
     dialect_option,
     json_option,
     load_machine,
     machine_option,
-    read_program,
     subprograms,
     tolerance_option,
 )
+from ncfix.cli.parts import LONG, Fixed, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import STREAM, Target, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, Place, UsageError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.fix import Fixed, FixOptions
+    from ncfix.compensate.options import FixOptions
+    from ncfix.compensate.stream import Stream
     from ncfix.machine import Machine
+    from ncfix.program.dialect import Dialect
     from ncfix.program.setup import Setup
 
 
@@ -92,23 +96,59 @@ class Job:
         """Fix one program and say what came of it; an error ends this program only."""
         try:
             with console.busy(f"fixing {shown(target.source)}"):
-                fixed = self.fixed(target.source)
-            return _written(fixed, target, self.options.allow_refused)
+                with self.fixed(target) as fixed:
+                    return _written(fixed, target, self.options.allow_refused)
         except NcfixError as error:
             console.tell(*error.messages)
             entry = {"path": shown(target.source), "output": None}
             return Outcome(error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]})
 
-    def fixed(self, source: str) -> Fixed:
-        """The corrected program."""
-        from ncfix.compensate.fix import fix_program
+    @contextmanager
+    def fixed(self, target: Target) -> Iterator[Fixed]:
+        """The corrected program; a long one is corrected while it is read, if it can be."""
+        with source_of(target.source) as source:
+            head = source.looked_into()
+            if len(head) < LONG:
+                yield self._whole(source, head)
+                return
+            dialect = dialect_of(head, shown(target.source), self.dialect, self.machine)
+            with self._outlet(source, target, dialect) as (stream, outlet):
+                yield self._in_parts(source, stream, outlet)
 
-        program = read_program(source, self.dialect, self.machine)
-        return fix_program(program, self.machine, self.setup, self.options, resolve=subprograms(source))
+    def _whole(self, source: Source, text: bytes) -> Fixed:
+        from ncfix.compensate.fix import fix_program
+        from ncfix.program.reader import read
+
+        path = shown(source.path)
+        program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
+        fixed = fix_program(program, self.machine, self.setup, self.options, resolve=subprograms(source.path))
+        return Fixed(fixed.text, fixed.changed, fixed.report)
+
+    @contextmanager
+    def _outlet(self, source: Source, target: Target, dialect: Dialect) -> Iterator[tuple[Stream, Outlet]]:
+        from ncfix.compensate.stream import Stream
+
+        path, found = shown(source.path), subprograms(source.path)
+        with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
+            stream = Stream(
+                self.machine, self.setup, self.options, found, path, dialect, source.read, outlet.put, part_bytes()
+            )
+            yield stream, outlet
+
+    def _in_parts(self, source: Source, stream: Stream, outlet: Outlet) -> Fixed:
+        from ncfix.program.parts import NotInPartsError
+
+        try:
+            done = stream.run()
+        except NotInPartsError:
+            fixed = self._whole(source, source.everything())
+            assert isinstance(fixed.text, bytes)
+            return Fixed(outlet.after(fixed.text, source.path), fixed.changed, fixed.report)
+        return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
 
 
 def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> Job:
-    from ncfix.compensate.fix import FixOptions
+    from ncfix.compensate.options import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"

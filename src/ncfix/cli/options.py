@@ -13,6 +13,7 @@ from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
     from ncfix.machine import Machine
+    from ncfix.program.dialect import Dialect
     from ncfix.program.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
@@ -67,12 +68,19 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None)
 
     A control that has no dialect of its own leaves it to what the program looks like.
     """
-    from ncfix.program import dialects
     from ncfix.program.reader import read as read_source
 
-    if dialect is None and machine is not None and machine.control in dialects.names():
-        dialect = machine.control
-    return read_source(read(path), shown(path), dialect)
+    source = read(path)
+    return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
+
+
+def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
+    """The dialect of that name, else of the machine's control, else what the beginning of a program looks like."""
+    from ncfix.program import dialects
+
+    if name is None and machine is not None and machine.control in dialects.names():
+        name = machine.control
+    return dialects.detect(head, path) if name is None else dialects.get(name)
 
 
 def subprograms(path: str) -> Callable[[str], bytes | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ncfix import files
@@ -51,10 +51,11 @@ class Target:
         """The name under which the input is kept when the output takes its place."""
         return f"{self.path}.orig"
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes | Iterable[bytes]) -> None:
         """Write the output whole or not at all; raises `UsageError` NCF004 ... NCF008."""
         if self.path == STREAM:
-            console.put(data)
+            for part in (data,) if isinstance(data, bytes) else data:
+                console.put(part)
         elif self.in_place:
             files.replace_keeping(self.path, self.backup, data)
         else:

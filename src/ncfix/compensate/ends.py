@@ -132,7 +132,7 @@ def with_closed_circles(intent: Intent, wanted: Array, kept: Mask, within: float
     joined = (moves.start[rows[1:]] == moves.end[rows[:-1]]).all(axis=1)
     chained[1:] = (np.diff(rows) == 1) & same & joined
     first = rows[np.maximum.accumulate(np.where(chained, 0, np.arange(len(rows))))]
-    where = standing(intent.machine, moves, wanted, kept)
+    where = standing(intent.machine, moves, wanted, kept, intent.before)
     shift = (where.start - moves.start)[first[:, None], columns]
     own = (wanted - moves.end)[rows[:, None], columns]
     off = arcs.across(shift - own, moves.normal[rows])

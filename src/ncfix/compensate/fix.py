@@ -14,6 +14,7 @@ import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import proven
@@ -57,7 +58,7 @@ def fix_program(
     caller to decide.
     """
     strategy = get_strategy(options.strategy)
-    _refuse_stamped(program, options)
+    refuse_stamped(program, options)
     if machine.is_perfect:
         return _untouched(program)
     on_machine = placed(machine, setup)
@@ -77,7 +78,8 @@ def fix_program(
     return Fixed(proof.text, proof.text != program.source, report)
 
 
-def _refuse_stamped(program: Program, options: FixOptions) -> None:
+def refuse_stamped(program: Program, options: FixOptions) -> None:
+    """Raise RefusedError NCF430 for a program that carries a stamp, unless that is what the options want."""
     block = stamp.find(program)
     if block is not None and not options.force:
         text = "the program has been corrected already; correcting it again would put the error back in"
@@ -87,14 +89,18 @@ def _refuse_stamped(program: Program, options: FixOptions) -> None:
 def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
     if not len(settled.emission.splices):
         return program.source
+    edit = stamp.insertion(program, stamp_of(program, machine, options, followed.assumed))
+    return spliced(program.source, Splices.joined([settled.emission.splices, Splices.of([edit])]))
+
+
+def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: tuple[str, ...]) -> str:
+    """The text of the stamp that a corrected program gets; `assumed` names what was taken as zero."""
     words = (
         f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
     )
-    if followed.assumed:
-        words += f", assumed zero: {', '.join(followed.assumed)}"
-    limit = program.dialect.line_limit or 250
-    edit = stamp.insertion(program, words[: limit - 10])
-    return spliced(program.source, Splices.joined([settled.emission.splices, Splices.of([edit])]))
+    if assumed:
+        words += f", assumed zero: {', '.join(assumed)}"
+    return words[: (program.dialect.line_limit or 250) - 10]
 
 
 def _errors(machine: Machine, settled: Settled) -> PathError:
@@ -122,9 +128,7 @@ def _report(
 ) -> FixReport:
     moves = followed.moves
     account = Account.of(moves, settled.kept, settled.reasons)
-    refused = [
-        Refusal(program.line(block), reason.code, reason.text) for block, reason in sorted(account.refused.items())
-    ]
+    refused = refusals(program, account)
     findings = [
         message
         for finding in settled.plan.findings
@@ -138,7 +142,7 @@ def _report(
         passed=len(account.passed),
         changed=bool(len(settled.emission.splices)),
         inserted_blocks=settled.emission.added_blocks,
-        max_correction_um=_largest_correction(moves, settled) * 1e3,
+        max_correction_um=largest_correction(moves, settled) * 1e3,
         error_before_um=_figures(errors.before) if errors else {},
         error_after_um=_figures(errors.after) | {"where": _line_of(program, moves, errors.after)} if errors else {},
         refused=tuple(refused),
@@ -148,10 +152,18 @@ def _report(
     )
 
 
-def _largest_correction(moves: Moves, settled: Settled) -> float:
-    """The largest shift of a linear command, mm."""
+def refusals(program: Program, account: Account) -> list[Refusal]:
+    """What was refused, by line."""
+    blocks = sorted(account.refused)
+    lines = program.lines(np.array(blocks, dtype=np.int64)).tolist()
+    reasons = (account.refused[block] for block in blocks)
+    return [Refusal(line, reason.code, reason.text) for line, reason in zip(lines, reasons, strict=True)]
+
+
+def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
+    """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
     pieces = settled.plan.pieces
     last = np.searchsorted(pieces.move, np.arange(len(moves)), side="right") - 1
     shift = settled.emission.end[last] - moves.end
-    shift = shift[~settled.kept][:, ~moves.rotary]
+    shift = shift[~settled.kept if own is None else own & ~settled.kept][:, ~moves.rotary]
     return float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)) if len(shift) else 0.0

@@ -49,10 +49,12 @@ def proven(program: Program, attempt: Callable[[Reading | None], tuple[Settled, 
         if text == program.source:
             return Proven(text, settled)
         again = _followed(program, text, settled, follow)
-        wrong = _differences(settled, again)
+        wrong = differences(settled, again)
+        assert wrong is not None, "the numbers of motions have been compared"
         if not wrong.any():
             return Proven(text, settled)
         reading = Reading.of(again, settled.plan.pieces)
+    assert wrong is not None
     piece = int(np.argmax(wrong))
     line = program.line(int(settled.moves.block[settled.plan.pieces.move[piece]]))
     raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {settled.emission.end[piece]}")
@@ -69,13 +71,19 @@ def _followed(program: Program, text: bytes, settled: Settled, follow: Follow) -
     return again
 
 
-def _differences(settled: Settled, again: Moves) -> Mask:
-    """(m,) pieces that the control would understand otherwise than they were meant."""
+def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask | None:
+    """Pieces that the control would understand otherwise than they were meant; None if their number differs.
+
+    own  (m,) pieces that stand in the text that was read; all if not given
+    """
     emission, pieces = settled.emission, settled.plan.pieces
-    differs: Mask = _differs(again.end, emission.end)
-    arcs = np.flatnonzero(pieces.arc & ~pieces.kept)
+    rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
+    if len(again) != len(rows):
+        return None
+    differs: Mask = _differs(again.end, emission.end[rows])
+    arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     in_plane = np.where(np.abs(again.normal[arcs]) < 0.5, 1.0, np.nan)
-    centres_differ = _differs(again.centre[arcs] * in_plane, emission.centre[arcs] * in_plane)
+    centres_differ = _differs(again.centre[arcs] * in_plane, emission.centre[rows[arcs]] * in_plane)
     differs[arcs[centres_differ]] = True
     return differs
 

@@ -55,6 +55,7 @@ class PathError:
     before, after             figures over all motions looked at
     move_before, move_after   (n,) mm: largest error on each motion, 0 where not looked at
     samples                   how many places were looked at
+    way                       mm that they stand for
     """
 
     before: Figures
@@ -62,6 +63,7 @@ class PathError:
     move_before: Array
     move_after: Array
     samples: int
+    way: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,4 +218,4 @@ class _Tally:
             Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction, tilt)
             for (value, move, fraction), squares, tilt in zip(self.at, self.squares, self.tilts, strict=True)
         )
-        return PathError(before, after, self.most[0], self.most[1], self.samples)
+        return PathError(before, after, self.most[0], self.most[1], self.samples, self.way)

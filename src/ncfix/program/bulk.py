@@ -64,8 +64,7 @@ class Bulk:
         first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
         layouts = _layouts(language, program, moves)
         fit = _qualified(program, moves, pieces, first_piece, layouts) & ~jumps.any(axis=1)
-        straight = np.array([not (each.diameter or (each.rotation != np.eye(3)).any()) for each in frames])
-        fit &= straight[frame] if len(frames) else False
+        fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         breaks = np.ones(len(moves) + 1, dtype=np.bool_)
         breaks[:-1] = ~fit
         ends = np.append(np.flatnonzero(breaks[:-1]), len(moves))
@@ -93,6 +92,12 @@ class Bulk:
         stretch = stretch if count == stop - row else Stretch.of(self, row, row + count, position, frame, decimals)
         self.parts.append(stretch.splices())
         return stretch.commands()
+
+
+def _is_plain(frame: Frame) -> bool:
+    """Whether each number in a frame stands for one axis, with a point or without."""
+    turned = bool((frame.rotation != np.eye(3)).any())
+    return not (turned or frame.diameter) and frame.increments == (1.0, 1.0)
 
 
 def _layouts(language: Language, program: Program, moves: Moves) -> dict[int, BulkLayout]:

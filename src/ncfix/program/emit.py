@@ -136,9 +136,9 @@ class _Emitter:
         if done is not None:
             self.position = done.copy()
         while row < len(self.moves):
-            done = self._stretch(row)
-            if done:
-                row += done
+            count = self._stretch(row)
+            if count:
+                row += count
                 continue
             self._resync(row)
             self.start[row] = self.position

@@ -13,13 +13,14 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from ncfix.program.flatten import Unroll
     import numpy as np
     from numpy.typing import NDArray
 
     from ncfix.program.build import Parsed
     from ncfix.program.dialect import Dialect
+    from ncfix.program.flatten import Unroll
     from ncfix.program.moves import Kinematics, Trace
+    from ncfix.program.parts import Follower
     from ncfix.program.render import Rendered, Target
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
@@ -86,6 +87,7 @@ class Language:
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
+    follower  as `follow`, but for a program that comes in parts; takes a dialect and then the arguments of `trace`
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -99,6 +101,7 @@ class Language:
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
     unroll: Unroll | None = None
+    follower: Callable[..., Follower] | None = None
 
 
 @lru_cache(maxsize=32)

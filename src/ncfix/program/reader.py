@@ -99,6 +99,7 @@ class Reading:
     index      shape -> its template; for a block without a shape, its text and a line feed
     rows       the template of each block so far
     reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
+    first_line the line of the file on which the text begins
     """
 
     source: bytes
@@ -112,6 +113,7 @@ class Reading:
     rows: list[int] = field(default_factory=list)
     reach: Reach = field(default_factory=Reach)
     followed: int = 0
+    first_line: int = 1
 
     def program(self) -> Program:
         """Read all parts, then what follows the end of the tape."""
@@ -128,6 +130,7 @@ class Reading:
             first_number=np.concatenate(([0], np.cumsum(counts))),
             number_spans=spans,
             numbers=values,
+            first_line=self.first_line,
         )
 
     def parts(self) -> Iterator[tuple[int, int]]:
@@ -205,7 +208,7 @@ class Reading:
         except BlockError as fault:
             if self.language.lenient and self.in_doubt(block):
                 return NOT_READ
-            raise source_error(self.path, block, text.decode("latin-1"), fault) from None
+            raise source_error(self.path, block + self.first_line - 1, text.decode("latin-1"), fault) from None
         texts_of(self.dialect).keep(text, parsed)
         return parsed
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -263,6 +263,7 @@ class Program:
     first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
     number_spans  (m, 2) start and stop byte of each number in the source, sign included
     numbers       (m,) their values as written (in the program's units)
+    first_line    the line of the file on which `source` begins, where that is a part of it
     """
 
     source: bytes
@@ -274,6 +275,7 @@ class Program:
     first_number: NDArray[np.int64]
     number_spans: NDArray[np.int64]
     numbers: NDArray[np.float64]
+    first_line: int = 1
 
     def __len__(self) -> int:
         return len(self.template)
@@ -316,10 +318,15 @@ class Program:
 
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
-        start = int(self.blocks[block, 0])
-        return (
-            self.source.count(b"\n", 0, start) + 1 if b"\n" in self.source else self.source.count(b"\r", 0, start) + 1
-        )
+        ending = b"\n" if b"\n" in self.source else b"\r"
+        return self.first_line + self.source.count(ending, 0, int(self.blocks[block, 0]))
+
+    def lines(self, blocks: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+        """The line numbers on which blocks (n,) start, all at once."""
+        text = np.frombuffer(self.source, dtype=np.uint8)
+        ends = np.flatnonzero(text == ord("\n" if b"\n" in self.source else "\r"))
+        lines: NDArray[np.int64] = self.first_line + np.searchsorted(ends, self.blocks[blocks, 0])
+        return lines
 
     def place(self, block: int, span: Span | None = None) -> Place:
         """Where a block, or a span of it, stands in the file: for messages."""

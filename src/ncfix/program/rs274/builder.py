@@ -187,6 +187,11 @@ class Builder:
             **self._style_columns(style),
         )
 
+    def clear(self) -> None:
+        """Forget the motions so far; styles, reasons and frames keep their numbers."""
+        self.count = 0
+        self._buffer, self._stretches, self._arcs = Buffer(), [], {}
+
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
         rows = list(self._styles)

@@ -14,6 +14,7 @@ from ncfix.program.reach import tape_end
 from ncfix.program.render import BlockRenderer, Rendered, Target
 from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.following import RS274Follower
 from ncfix.program.rs274.interpreter import Interpreter
 from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.setup import Setup
@@ -105,4 +106,5 @@ RS274 = Language(
     unroll=unroll,
     arc_pieces=True,
     bulk=in_bulk,
+    follower=RS274Follower,
 )

@@ -1,0 +1,160 @@
+"""Long programs, corrected while they are read; what goes to a pipe goes there part by part."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import IO, TYPE_CHECKING
+
+from ncfix import files
+from ncfix.cli import console
+from ncfix.cli.targets import STREAM, Target, shown
+from ncfix.diagnostics import Place, RefusedError
+
+if TYPE_CHECKING:
+    from ncfix.compensate.account import FixReport
+    from ncfix.compensate.stream import Stamp
+
+LONG = 1 << 22
+"""Bytes from which on a program is long; a shorter one is read as a whole."""
+COPIED = 1 << 20
+"""Bytes that are copied at once."""
+
+
+def part_bytes() -> int:
+    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
+    from ncfix.compensate.stream import PART_BYTES
+
+    return max(int(os.environ.get("NCFIX_PART_BYTES") or PART_BYTES), 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A corrected program: what of it is not written yet, whether it differs from the original, and the report."""
+
+    text: bytes | Iterator[bytes]
+    changed: bool
+    report: FixReport
+
+
+@contextmanager
+def source_of(path: str) -> Iterator[Source]:
+    """An input file, or standard input, to be read from its beginning."""
+    if path == STREAM:
+        with tempfile.TemporaryFile() as kept:
+            yield Source(path, sys.stdin.buffer, kept)
+        return
+    try:
+        handle = open(path, "rb")  # noqa: SIM115
+    except OSError as error:
+        raise files.unreadable(shown(path), error) from error
+    with handle:
+        yield Source(path, handle, None)
+
+
+@dataclass(slots=True)
+class Source:
+    """A text that can be read part by part, and again as a whole: what is read of standard input is kept in a file."""
+
+    path: str
+    handle: IO[bytes]
+    kept: IO[bytes] | None
+    head: bytes = b""
+
+    def looked_into(self) -> bytes:
+        """The first `LONG` bytes, which `read` gives once more."""
+        self.head = self._read(LONG)
+        return self.head
+
+    def read(self, size: int) -> bytes:
+        """The next bytes, up to `size`; none at the end."""
+        if self.head:
+            part, self.head = self.head[:size], self.head[size:]
+            return part
+        return self._read(size)
+
+    def _read(self, size: int) -> bytes:
+        try:
+            part = self.handle.read(size)
+        except OSError as error:
+            raise files.unreadable(shown(self.path), error) from error
+        if self.kept is not None:
+            self.kept.write(part)
+        return part
+
+    def everything(self) -> bytes:
+        """The whole text."""
+        if self.kept is None:
+            return files.read_bytes(self.path)
+        while self._read(COPIED):
+            pass
+        self.kept.seek(0)
+        return self.kept.read()
+
+
+@dataclass(slots=True)
+class Outlet:
+    """Where corrected text goes: into a file at first, and to standard output as soon as its stamp is written.
+
+    stamped  whether the stamp, which says all there is to say, is part of what was put in
+    """
+
+    kept: IO[bytes]
+    direct: bool
+    stamped: Callable[[], bool]
+    sent: int = 0
+    digest: hashlib._Hash = field(default_factory=hashlib.sha256)
+
+    def put(self, data: bytes) -> None:
+        """Take the next part."""
+        if not (self.direct and self.stamped()):
+            self.kept.write(data)
+            return
+        for part in self._emptied():
+            self._send(part)
+        self._send(data)
+
+    def _send(self, data: bytes) -> None:
+        console.put(data)
+        self.sent += len(data)
+        self.digest.update(data)
+
+    def _emptied(self) -> Iterator[bytes]:
+        self.kept.seek(0)
+        while part := self.kept.read(COPIED):
+            yield part
+        self.kept.seek(0)
+        self.kept.truncate()
+
+    def remaining(self, stamp: Stamp) -> Iterator[bytes]:
+        """What was not sent, with the stamp as it has to be."""
+        parts = self._emptied()
+        if self.sent or stamp.written == stamp.wanted:
+            yield from parts
+            return
+        first = next(parts, b"")
+        yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
+        yield from parts
+
+    def after(self, text: bytes, path: str) -> bytes:
+        """What is left of a text of which the beginning was sent; raises RefusedError NCF438 if it was another."""
+        if hashlib.sha256(text[: self.sent]).digest() != self.digest.digest():
+            problem = "what has been written to the pipe already would have to be different"
+            raise RefusedError.of(
+                "NCF438", problem, Place(shown(path)), "give the program as a file, not through a pipe"
+            )
+        return text[self.sent :]
+
+
+@contextmanager
+def outlet_for(target: Target, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
+    """An outlet; `sure`: everything that the stamp says is known from the beginning."""
+    direct = target.path == STREAM
+    folder = None if direct else os.path.dirname(target.path) or "."
+    with tempfile.TemporaryFile(dir=folder if folder and os.path.isdir(folder) else None) as kept:
+        yield Outlet(kept, direct and sure, stamped)

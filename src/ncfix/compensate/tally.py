@@ -1,0 +1,136 @@
+"""The report of a correction that was made part by part: the same as of one that was made at once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.findings import MOST, Finding, Mask
+from ncfix.compensate.fix import largest_correction, refusals
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.settle import Settled
+from ncfix.compensate.verify import Figures, PathError
+from ncfix.diagnostics import Message
+from ncfix.program.moves import Moves
+from ncfix.program.tree import Program
+
+ORDER = ("NCF408", "NCF414", "NCF402", "NCF403", "NCF415", "NCF413", "NCF409", "NCF410")
+"""Findings of a plan in the order in which it reports them."""
+ONCE = frozenset({"NCF409"})
+"""Findings that hold for the whole program, and are told of its first motion only."""
+
+
+@dataclass(slots=True)
+class Found:
+    """Messages of one kind, the first few, and how many there are."""
+
+    shown: list[Message] = field(default_factory=list)
+    count: int = 0
+
+
+@dataclass(slots=True)
+class Side:
+    """Tip errors on one side of the correction: largest, its line, sum of squares times way."""
+
+    max: float = 0.0
+    line: int | None = None
+    squares: float = 0.0
+
+    def add(self, figures: Figures, way: float, line: int | None) -> None:
+        """Take in the figures of a part."""
+        self.squares += figures.rms**2 * way
+        if figures.max > self.max:
+            self.max, self.line = figures.max, line
+
+    def as_dict(self, way: float) -> dict[str, float | int | None]:
+        """The figures, um."""
+        rms = math.sqrt(self.squares / way) if way else 0.0
+        return {"max": round(self.max * 1e3, 4), "rms": round(rms * 1e3, 4)}
+
+
+@dataclass(slots=True)
+class Tally:
+    """What has been done to the parts so far."""
+
+    blocks: int = 0
+    moves: int = 0
+    compensated: int = 0
+    passed: int = 0
+    inserted: int = 0
+    changed: bool = False
+    largest: float = 0.0
+    way: float = 0.0
+    before: Side = field(default_factory=Side)
+    after: Side = field(default_factory=Side)
+    refused: list[Refusal] = field(default_factory=list)
+    notes: dict[tuple[str, str], Message] = field(default_factory=dict)
+    found: dict[tuple[str, str, str], Found] = field(default_factory=dict)
+
+    def add(self, program: Program, settled: Settled, own: Mask, errors: PathError | None) -> None:
+        """Take in a part; `own` (n,) motions that were not the last of the part before."""
+        moves = settled.moves
+        account = Account.of(moves, settled.kept, settled.reasons)
+        theirs = set(moves.block[~own].tolist())
+        self.moves += int(own.sum())
+        self.compensated += len(account.compensated - theirs)
+        self.passed += len(account.passed.keys() - theirs)
+        self.inserted += settled.emission.added_blocks
+        self.changed |= len(settled.emission.splices) > 0
+        self.largest = max(self.largest, largest_correction(moves, settled, own))
+        refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
+        self.refused += refusals(program, Account(account.compensated, account.passed, refused))
+        for finding in settled.plan.findings:
+            self._note(finding, program, moves, own)
+        if errors is not None:
+            self._figures(errors, program, moves)
+
+    def _figures(self, errors: PathError, program: Program, moves: Moves) -> None:
+        self.way += errors.way
+        for side, figures in ((self.before, errors.before), (self.after, errors.after)):
+            line = program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
+            side.add(figures, errors.way, line)
+
+    def _note(self, finding: Finding, program: Program, moves: Moves, own: Mask) -> None:
+        key = (finding.code, finding.text, finding.hint)
+        if finding.code in ONCE and key in self.found:
+            return
+        note = self.found.setdefault(key, Found())
+        for k in np.flatnonzero(own[finding.moves])[: max(MOST - note.count, 0)].tolist():
+            place = program.place(int(moves.block[finding.moves[k]]))
+            note.shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
+        note.count += int(own[finding.moves].sum())
+
+    def warnings(self) -> list[Message]:
+        """What the plans found, in the order of one plan."""
+        messages = []
+        for code, note in sorted(
+            ((key[0], note) for key, note in self.found.items()), key=lambda each: ORDER.index(each[0])
+        ):
+            messages += note.shown
+            if note.count > MOST:
+                messages.append(Message(code, f"and {note.count - MOST} more motions like these"))
+        return messages
+
+    def report(self, path: str, messages: tuple[Message, ...], leaves: str, options: FixOptions) -> FixReport:
+        """The report; `messages` are those of following the program."""
+        figures = options.verify
+        after = self.after.as_dict(self.way) | {"where": self.after.line}
+        return FixReport(
+            path=path,
+            blocks=self.blocks,
+            moves=self.moves,
+            compensated=self.compensated,
+            passed=self.passed,
+            changed=self.changed,
+            inserted_blocks=self.inserted,
+            max_correction_um=self.largest * 1e3,
+            error_before_um=self.before.as_dict(self.way) if figures else {},
+            error_after_um=after if figures else {},
+            refused=tuple(self.refused),
+            warnings=(*messages, *self.notes.values(), *self.warnings()),
+            strategy=options.strategy,
+            leaves=leaves,
+        )

@@ -1,0 +1,180 @@
+"""A program in parts: read and followed one after the other, so that its length does not matter to the memory.
+
+A part ends between two blocks of plain words, where nothing else can be under way. Its lines are those of the file, and
+templates, frames and reasons have the same numbers in all parts, so that parts can be put together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Message
+from ncfix.program.content import check_content, header_length
+from ncfix.program.dialect import Dialect
+from ncfix.program.language import Language, language_of
+from ncfix.program.moves import Moves
+from ncfix.program.reader import Reading
+from ncfix.program.tree import Flow, Program, Skip, Template
+
+CALL = 980
+"""M98 in tenths."""
+
+TABLES = frozenset({"axes", "rotary", "frames", "reasons"})
+"""The fields of `Moves` that are the same for all rows."""
+
+
+class NotInPartsError(Exception):
+    """The program cannot be taken part by part: it has to be read as a whole."""
+
+
+class Follower(Protocol):
+    """Follows a program part by part."""
+
+    @property
+    def ended(self) -> bool:
+        """The control has come to the end of the program."""
+
+    def follow(self, program: Program, last: bool) -> Moves:
+        """The motions of the next part; `last`: nothing comes after it."""
+
+    @property
+    def lacking(self) -> tuple[Message, ...]:
+        """What the program used so far and the setup does not give, and axes that the machine lacks."""
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What there is to say so far."""
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was taken as zero so far, in words."""
+
+
+@dataclass(slots=True)
+class PartReader:
+    """Reads parts of one program.
+
+    first_line  the line on which the next part begins
+    plain       shape -> whether a part may end before or after a block of it
+    """
+
+    path: str
+    dialect: Dialect
+    first_line: int = 1
+    language: Language = field(init=False)
+    templates: list[Template] = field(default_factory=list)
+    index: dict[bytes | None, int] = field(default_factory=dict)
+    plain: dict[int, bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.language = language_of(self.dialect)
+
+    def read(self, source: bytes) -> Program:
+        """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
+        begun = self.first_line > 1
+        check_content(source if source.strip() or not begun else b"(blank)", self.path, self.dialect)
+        blocks = self.language.split(source)
+        if not begun:
+            blocks[0, 0] = header_length(source)
+        end = self._end_later(source, blocks) if begun else self.language.end(source, blocks)
+        reading = Reading(source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index)
+        reading.first_line = self.first_line
+        before = len(self.templates)
+        program = reading.program()
+        if not all(map(_is_straight_on, self.templates[before:])):
+            raise NotInPartsError("the program does not run straight from its first line to its last")
+        return program
+
+    def _end_later(self, source: bytes, blocks: NDArray[np.int64]) -> int:
+        """The block that ends the text, where this is not the first part."""
+        before = b"X\n"
+        return self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
+
+    def last_cut(self, program: Program) -> int:
+        """The last block before which a part may end; 0 if there is none."""
+        for shape, block in zip(*np.unique(program.template, return_index=True), strict=True):
+            if int(shape) not in self.plain:
+                self.plain[int(shape)] = self._is_plain(program, int(block))
+        plain = np.array([self.plain.get(shape, False) for shape in range(len(self.templates))], dtype=np.bool_)
+        fine = plain[program.template]
+        cuts = np.flatnonzero(fine[1:] & fine[:-1])
+        return int(cuts[-1]) + 1 if len(cuts) else 0
+
+    def _is_plain(self, program: Program, block: int) -> bool:
+        template = program.templates[int(program.template[block])]
+        if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
+            return False
+        return self.language.bulk(program, block) is not None
+
+
+def _is_straight_on(template: Template) -> bool:
+    return not any(isinstance(item, Flow) for item in template.items) and CALL not in template.m_codes
+
+
+def stretch(program: Program, start: int, stop: int) -> Program:
+    """The blocks from `start` up to `stop` as a program of their own, its line end included."""
+    ends = (0 if start == 0 else int(program.blocks[start, 0]), len(program.source))
+    if stop < len(program):
+        ends = ends[0], int(program.blocks[stop, 0])
+    numbers = slice(program.first_number[start], program.first_number[stop])
+    return Program(
+        source=program.source[slice(*ends)],
+        path=program.path,
+        dialect=program.dialect,
+        templates=program.templates,
+        template=program.template[start:stop],
+        blocks=program.blocks[start:stop] - ends[0],
+        first_number=program.first_number[start : stop + 1] - program.first_number[start],
+        number_spans=program.number_spans[numbers] - ends[0],
+        numbers=program.numbers[numbers],
+        first_line=program.first_line + start,
+    )
+
+
+def joined(parts: list[Program]) -> Program:
+    """Parts that follow each other, as one."""
+    if len(parts) == 1:
+        return parts[0]
+    bytes_before = np.cumsum([0, *(len(part.source) for part in parts)])
+    numbers_before = np.cumsum([0, *(len(part.numbers) for part in parts)])
+    shifted = list(zip(parts, bytes_before.tolist(), numbers_before.tolist(), strict=False))
+    return Program(
+        source=b"".join(part.source for part in parts),
+        path=parts[0].path,
+        dialect=parts[0].dialect,
+        templates=parts[-1].templates,
+        template=np.concatenate([part.template for part in parts]),
+        blocks=np.concatenate([part.blocks + at for part, at, _ in shifted]),
+        first_number=np.concatenate([part.first_number[:-1] + n for part, _, n in shifted] + [numbers_before[-1:]]),
+        number_spans=np.concatenate([part.number_spans + at for part, at, _ in shifted]),
+        numbers=np.concatenate([part.numbers for part in parts]),
+        first_line=parts[0].first_line,
+    )
+
+
+def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
+    """The motions of parts that follow each other; `blocks`: how many blocks each of the parts has."""
+    if len(parts) == 1:
+        return parts[0]
+    before = np.cumsum([0, *blocks[:-1]])
+    columns: dict[str, Any] = {
+        each.name: np.concatenate([getattr(part, each.name) for part in parts])
+        for each in fields(Moves)
+        if each.name not in TABLES
+    }
+    shifted = [part.block + at for part, at in zip(parts, before.tolist(), strict=True)]
+    columns["block"] = np.concatenate(shifted).astype(np.int32)
+    return Moves(**columns, **{name: getattr(parts[-1], name) for name in TABLES})
+
+
+def rows_of(moves: Moves, start: int, stop: int, block: int) -> Moves:
+    """Some of the motions; blocks are counted from `block`."""
+    columns: dict[str, Any] = {
+        each.name: getattr(moves, each.name)[start:stop] for each in fields(Moves) if each.name not in TABLES
+    }
+    columns["block"] = columns["block"] - np.int32(block)
+    return Moves(**columns, **{name: getattr(moves, name) for name in TABLES})

@@ -1,0 +1,102 @@
+"""Following a program part by part: the control keeps its state, the interpreter goes on where it was."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Message
+from ncfix.program.dialect import Dialect
+from ncfix.program.language import Resolve
+from ncfix.program.moves import Kinematics, Moves
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.interpreter import Interpreter
+from ncfix.program.setup import Setup
+from ncfix.program.tree import Program
+
+
+class PartInterpreter(Interpreter):
+    """An interpreter whose text ends where the next part begins.
+
+    first  this is the first part
+    last   this is the last part
+    ended  the program has ended
+    """
+
+    first = True
+    last = False
+    ended = False
+
+    def go_on(self, program: Program) -> None:
+        """Take the next part."""
+        self.main = self.unit_of(program, "")
+        self.flow.unit, self.flow.block = self.main, 0
+        self.first = False
+
+    def run_part(self, last: bool, max_blocks: int) -> None:
+        """Follow the part to its end, or to that of the program."""
+        self.budget = max_blocks
+        self.last = last
+        self.ended = True
+        self.run()
+
+    def at_end_of_text(self) -> None:
+        """The text is over; that of the program only if it was the last part."""
+        if self.last:
+            super().at_end_of_text()
+        else:
+            self.ended = False
+
+    def at_tape(self, index: int) -> bool:
+        """`%` ends the tape, if it does not begin it."""
+        if self.first:
+            return super().at_tape(index)
+        if fault := self.flow.unfinished():
+            raise fault
+        return True
+
+
+class RS274Follower:
+    """See `parts.Follower`."""
+
+    def __init__(
+        self,
+        dialect: Dialect,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        resolve: Resolve | None,
+        max_blocks: int,
+        kinematics: Kinematics | None,
+    ) -> None:
+        self.control = Control(setup, axes, rotary, dialect, kinematics)
+        self.resolve = resolve
+        self.max_blocks = max_blocks
+        self.interpreter: PartInterpreter | None = None
+
+    @property
+    def ended(self) -> bool:
+        """The control has come to the end of the program."""
+        return self.interpreter is not None and self.interpreter.ended
+
+    def follow(self, program: Program, last: bool) -> Moves:
+        """The motions of the next part."""
+        if self.interpreter is None:
+            self.interpreter = PartInterpreter(self.control, program, self.resolve, self.max_blocks)
+        else:
+            self.interpreter.go_on(program)
+        self.control.builder.clear()
+        self.interpreter.run_part(last, self.max_blocks)
+        return self.control.builder.moves()
+
+    @property
+    def lacking(self) -> tuple[Message, ...]:
+        """What has been missing so far."""
+        return (*self.control.foreign.values(), *self.control.knowledge.missing.values())
+
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What there is to say so far."""
+        return (*self.control.knowledge.assumed.values(), *self.control.messages.values())
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was taken as zero so far."""
+        return tuple(self.control.knowledge.assumed)

@@ -1,0 +1,169 @@
+"""A program corrected part by part comes out, byte for byte, as one that is corrected as a whole."""
+
+from __future__ import annotations
+
+import io
+import random
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.compensate.fix import fix_program
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.stream import Stream
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, load
+from ncfix.program import dialects
+from ncfix.program.parts import NotInPartsError
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
+SETUP = Setup(assume_zero=True)
+SIZES = (150, 1500)
+
+
+def streamed(source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS) -> tuple[bytes, dict[str, Any]]:
+    out: list[bytes] = []
+    dialect = dialects.get("linuxcnc")
+    given = io.BytesIO(source)
+    done = Stream(machine, SETUP, options, None, "p.ngc", dialect, given.read, out.append, size).run()
+    text, stamp = b"".join(out), done.stamp
+    assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
+    return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()
+
+
+def whole(source: bytes, machine: Machine, options: FixOptions = OPTIONS) -> tuple[bytes, dict[str, Any]]:
+    fixed = fix_program(read(source, "p.ngc", "linuxcnc"), machine, SETUP, options)
+    return fixed.text, fixed.report.as_dict()
+
+
+def assert_same(source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS) -> bool:
+    """Whether it could be done in parts; if so it is the same."""
+    try:
+        text, report = streamed(source, machine, size, options)
+    except NotInPartsError:
+        return False
+    expected, reference = whole(source, machine, options)
+    assert text.decode("latin-1") == expected.decode("latin-1")
+    for name, value in reference.items():
+        if name in ("error_before_um", "error_after_um", "max_correction_um"):
+            assert report[name] == pytest.approx(value, abs=2e-4), name
+        else:
+            assert report[name] == value, name
+    return True
+
+
+ODDS = (
+    "G0 Z60.",
+    "(PASS 3 POINT 7)",
+    "",
+    "M5",
+    "T2 M6",
+    "/G4 P0.1",
+    "#100=3.5 (SAFE)\nG0 Z[#100+5.]",
+    "G91\nG1 X.5 Y-.25\nX-.5 Y.25\nG90",
+    "G1 X20. Y20. Z5. B0. C0.\nG2 X22. Y22. I2. J0.\nG3 X20. Y20. Z4. I-2. J0.\nG1",
+    "G81 X5. Y5. Z-2. R2. F100.\nX10.\nX15.\nG80\nG1",
+    "G53 G0 Z90.",
+    "G93\nG1 X3. B4. F20.\nG94\nF500.",
+    "G55\nG54",
+    "G1 X9000.",
+)
+
+
+def program(seed: int, lines: int, odd: float) -> bytes:
+    """A path that winds about, with all words or only those that change, and now and then something else."""
+    rng = random.Random(seed)
+    full = rng.random() < 0.5
+    at = [20.0, 20.0, 5.0, 10.0, 30.0]
+    out = ["%", "(PART)", "G21 G90 G94 G54 G17 F800.", "G0 X20. Y20. Z5. B10. C30.", "G1"]
+    for k in range(lines):
+        if rng.random() < odd:
+            out.append(rng.choice(ODDS))
+        at = [value + rng.uniform(-1, 1) * rng.choice((0.0, 0.3, 2.0)) for value in at]
+        chosen = [i for i in range(5) if full or rng.random() < 0.5] or [0]
+        words = " ".join(f"{'XYZBC'[i]}{at[i]:.{rng.choice((3, 4))}f}" for i in chosen)
+        out.append(f"N{10 * k} G1 {words}" if full else words)
+    return rng.choice(("\n", "\r\n")).join([*out, "M30", "%", "what follows X1", ""]).encode()
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(root / "benchmarks" / "five_axis.toml")
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_parts_as_the_whole(seed: int, machine: Machine) -> None:
+    source = program(seed, 80, 0.0 if seed < 2 else 0.1)
+    for size in SIZES:
+        assert_same(source, machine, size)
+
+
+def test_plain_programs_are_done_in_parts(machine: Machine) -> None:
+    assert all(assert_same(program(seed, 60, 0.0), machine, 300) for seed in (1, 5))
+
+
+def test_play_remembers_the_way_across_parts(root: Path) -> None:
+    machine = load(root / "examples" / "machines" / "wCBXFZYSt.toml")
+    assert any(effect.basis.needs_direction for effect in machine.effects)
+    source = b"G21 G90 G94 F800\nG0 X0 Y0 Z100 B0 C0\n" + b"".join(
+        b"G1 X%.3f Y%.3f\n" % (20 * (k % 7), -15 * (k % 5)) if k % 2 else b"G1 X%.3f Z%.3f\n" % (20 * (k % 7), 100 + k)
+        for k in range(40)
+    )
+    assert all(assert_same(source + b"M2\n", machine, size) for size in (150, 400))
+
+
+def test_what_looks_at_the_whole_path_is_not_done_in_parts(machine: Machine) -> None:
+    source = program(1, 30, 0.0)
+    with pytest.raises(NotInPartsError):
+        streamed(source, machine, 300, replace(OPTIONS, strategy="full"))
+    with pytest.raises(NotInPartsError):
+        streamed(source.replace(b"(PART)", b"o1 sub\no1 endsub"), machine, 300)
+    with pytest.raises(NotInPartsError, match="machine stands"):
+        streamed(source.replace(b"M30", b"G92 X1\nG1 X2 Y2 Z5 B0 C0\nX3\nX4\nM30"), machine, 300)
+
+
+def test_a_refusal_that_reaches_back_is_seen(machine: Machine) -> None:
+    lines = b"".join(b"X%d.\n" % (k % 9) for k in range(200))
+    source = b"G21 G90 G94 F800 G17\nG1 X0 Y0 Z5 B0 C0\n" + lines + b"G91 G1 X9000.\nG90 M2\n"
+    with pytest.raises(NotInPartsError, match="reaches back"):
+        streamed(source, machine, 100)
+
+
+def test_errors_are_those_of_the_whole(machine: Machine) -> None:
+    source = program(1, 60, 0.0)
+    for wrong in (b"G1 X1 X2", b"G1 X%", b"G2 X1 Y1 I5 J5", b"U5", b"G84.5"):
+        broken = source.replace(b"M30", wrong + b"\nM30")
+        errors = []
+        for way in (lambda text: streamed(text, machine, 200), lambda text: whole(text, machine)):
+            with pytest.raises(NcfixError) as caught:
+                way(broken)
+            errors.append([str(message) for message in caught.value.messages])
+        assert errors[0] == errors[1]
+
+
+def test_a_stamp_is_found_in_any_part(machine: Machine) -> None:
+    stamped = program(1, 60, 0.0).replace(b"M30", b"(ncfix 1.0.0 machine abc)\nM30")
+    with pytest.raises(NcfixError, match="NCF430"):
+        streamed(stamped, machine, 200)
+
+
+def test_corpus(shared: Callable[[str], Path], machine: Machine, figures: Callable[[str], None]) -> None:
+    """Programs of the corpus that this machine can follow: in parts as the whole, or not in parts."""
+    done = tried = 0
+    for path in sorted(shared("corpus").glob("linuxcnc/*"))[:120:2]:
+        source = path.read_bytes()
+        if not 300 < len(source) < 20_000:
+            continue
+        try:
+            whole(source, machine)
+        except NcfixError:
+            continue
+        tried += 1
+        done += assert_same(source, machine, 500)
+    figures(f"{done} of {tried} programs of the corpus corrected in parts, with the same bytes")
+    assert tried
