@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ncfix.diagnostics import Code
+from ncfix.program.sinumerik.codes import SINUMERIK_CODES
 from ncfix.program.trace_codes import TRACE_CODES
 
 CODES: dict[str, Code] = {
@@ -82,3 +83,4 @@ CODES: dict[str, Code] = {
         "One of sub, endsub, call, return, if, elseif, else, endif, while, do, repeat, break, continue.",
     ),
 } | TRACE_CODES
+CODES.update(SINUMERIK_CODES)

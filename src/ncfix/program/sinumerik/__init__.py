@@ -1,0 +1,1 @@
+"""SINUMERIK 840D: its blocks, what they mean, and how corrected motions are put into them."""

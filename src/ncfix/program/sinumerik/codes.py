@@ -1,0 +1,32 @@
+"""The codes of following a SINUMERIK program, beyond those that all controls have."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+SINUMERIK_CODES: dict[str, Code] = {
+    "NCF250": Code(
+        "Block not understood",
+        "The block holds a name, and does not fit the grammar of the language: it may be a call of the machine's "
+        "builder, and may move axes or change coordinates.",
+        "Motions after it are refused. Correct the block, or take it out.",
+    ),
+    "NCF251": Code(
+        "Synchronized action",
+        "The control may do this at any time while the blocks that follow are executed, and it may move axes.",
+        "Motions after it are refused.",
+    ),
+    "NCF252": Code(
+        "Cycle not known",
+        "A name stands alone in a block, and no subprogram of that name is here. It is taken as a cycle of the "
+        "machine's builder that leaves frames, offsets and modal codes as they are; where the axes stand after it is "
+        "not known until the program says so.",
+        "Put the file of the subprogram beside the program.",
+    ),
+    "NCF253": Code(
+        "Way of the rotary axes",
+        "Rotary axes turn until the tool stands along a direction, and there is more than one way. Which one a control "
+        "takes depends on its machine data; here it is the one that the message says.",
+        "State the rotary axes in the program if they are others.",
+    ),
+}

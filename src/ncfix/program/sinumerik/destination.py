@@ -1,0 +1,210 @@
+"""Where the axis words of a block lead: absolute, incremental, word by word otherwise, in polar coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ncfix.program.rs274.control import Unknown
+from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, rotated
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
+
+RUNTIME = "where the axis {} stands is known only at run time"
+POLAR = "NCF223"
+NO_POLE = "polar coordinates (AP, RP) while no pole is known"
+TURN = 2 * math.pi
+
+
+@dataclass(slots=True)
+class Words:
+    """The words of a block while it is executed.
+
+    block    the block in its program
+    values   address -> number, in program units; None where it is known only at run time
+    forms    address -> how the word is meant (`ac`, `ic`, `dc`, ...), where it says so
+    axes     bit mask of the axis words
+    texts    address -> text, as in T="DRILL"
+    """
+
+    block: int
+    values: dict[str, float | None]
+    forms: Mapping[str, str]
+    axes: int
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def get(self, address: str, default: float = 0.0) -> float:
+        """The number of a word; the default where it is not there, or not known."""
+        value = self.values.get(address)
+        return default if value is None else value
+
+    def runtime(self, *addresses: str) -> bool:
+        """Whether one of these words is there and known only at run time."""
+        return any(address in self.values and self.values[address] is None for address in addresses)
+
+
+@dataclass(slots=True)
+class End:
+    """Where a motion ends: the command, which axes are not known there, and which coordinates."""
+
+    target: Vector
+    unknown: Unknown
+    lost: Unknown
+
+
+def destination(control: Sinumerik, words: Words) -> End:
+    """The command at which a motion of this block ends."""
+    program = control.program_position()
+    lost = dict(control.lost)
+    moved = set()
+    for letter in LETTERS:
+        if letter in words.values:
+            place(control, words, letter, program, lost)
+            moved.add(INDEX[letter])
+    if "AP" in words.values or "RP" in words.values:
+        moved |= polar(control, words, program, lost)
+    return End(command(control, program, moved), control.unknown_for(lost), lost)
+
+
+def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: Unknown) -> None:
+    """Take one axis word."""
+    index, value = INDEX[letter], words.values[letter]
+    form = words.forms.get(letter, "")
+    if form != INCREMENTAL and (form or not control.modal.incremental):
+        control.check_offset()
+        lost.pop(index, None)
+        if index in control.shaky:
+            lost[index] = control.shaky[index]
+    if value is None:
+        lost[index] = RUNTIME
+        return
+    step = control.scale[index] * value
+    if form == INCREMENTAL or (not form and control.modal.incremental):
+        step *= 2.0 if index == 0 and control.modal.diameter and control.modes.diameter == "DIAM90" else 1.0
+        program[index] += step
+    elif form in TURNING:
+        program[index] = turned(form, program[index], step, known=index not in control.lost)
+        control.over += (index,)
+        if index in control.lost:
+            lost.pop(index, None)
+    else:
+        assert form in ("", ABSOLUTE)
+        program[index] = step
+
+
+def turned(form: str, here: float, angle: float, *, known: bool) -> float:
+    """The angle at which a rotary axis arrives: on the shortest way, or in the positive or negative sense, rad."""
+    if not known:
+        return angle
+    step = (angle - here) % TURN
+    if form == "dc":
+        return here + (step if step <= math.pi else step - TURN)
+    return here + step if form == "acp" or step == 0.0 else here + step - TURN
+
+
+def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:
+    """The command of a point in the program's frame; axes that are not moved stay exactly where they are."""
+    inner = rotated(control.rotation, program) if control.is_rotated else program
+    result = [a + b for a, b in zip(inner, control.offset, strict=True)]
+    turning = moved & set(GEOMETRY)
+    for index in range(len(LETTERS)):
+        mixed = index in GEOMETRY and any(control.rotation[index][k] != 0.0 for k in turning)
+        if index not in moved and not mixed:
+            result[index] = control.position[index]
+    return result
+
+
+# -- polar coordinates ------------------------------------------------------------------------------------------------
+
+
+def polar(control: Sinumerik, words: Words, program: Vector, lost: Unknown) -> set[int]:
+    """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
+    plane, pole = control.modal.plane, control.modes.pole
+    angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
+    control.modes.polar = angle, radius
+    control.check_offset()
+    if pole is None or angle is None or radius is None:
+        lost |= dict.fromkeys((plane.first, plane.second), RUNTIME if pole else NO_POLE)
+        return {plane.first, plane.second}
+    program[plane.first] = pole[0] + radius * math.cos(angle)
+    program[plane.second] = pole[1] + radius * math.sin(angle)
+    for index in (plane.first, plane.second):
+        lost.pop(index, None)
+    return {plane.first, plane.second}
+
+
+def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
+    """AP in rad or RP in mm: as written, added to the last one, or the last one."""
+    before = control.modes.polar[0 if address == "AP" else 1]
+    if address not in words.values:
+        return before
+    value = words.values[address]
+    if value is None:
+        return None
+    value *= math.pi / 180 if address == "AP" else control.stretch
+    form = words.forms.get(address, "")
+    if form == INCREMENTAL or (not form and control.modal.incremental):
+        return None if before is None else before + value
+    return value
+
+
+def set_pole(control: Sinumerik, words: Words, code: int) -> None:
+    """G110 to G112: the pole is given from where the axes stand, in the frame, or from the last pole."""
+    plane = control.modal.plane
+    here = control.program_position()
+    base: tuple[float, float] | None = (0.0, 0.0)
+    if code == 1100:
+        control.settle_all()
+        known = not {plane.first, plane.second} & control.lost.keys()
+        base = (here[plane.first], here[plane.second]) if known else None
+    elif code == 1120:
+        base = control.modes.pole or (0.0, 0.0)
+    steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
+    if "AP" in words.values or "RP" in words.values:
+        angle, radius = math.radians(words.get("AP")), words.get("RP")
+        steps = [radius * math.cos(angle), radius * math.sin(angle)]
+        if words.runtime("AP", "RP"):
+            base = None
+    if base is None or steps[0] is None or steps[1] is None:
+        control.modes.pole = None
+        return
+    control.modes.pole = base[0] + control.stretch * steps[0], base[1] + control.stretch * steps[1]
+    control.modes.polar = (None, None)
+
+
+# -- machine coordinates ----------------------------------------------------------------------------------------------
+
+
+def machine_destination(control: Sinumerik, words: Words) -> End:
+    """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on."""
+    target, unknown = control.position[:], dict(control.unknown)
+    tool = [0.0] * len(LETTERS) if control.tcp else control.offsets.tool
+    for letter in LETTERS:
+        if letter not in words.values:
+            continue
+        index, value, form = INDEX[letter], words.values[letter], words.forms.get(letter, "")
+        if form == INCREMENTAL or (not form and control.modal.incremental):
+            target[index] += control.of_setup(letter) * (value or 0.0)
+        else:
+            target[index] = tool[index] + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+            unknown.pop(index, None)
+        if value is None:
+            unknown[index] = RUNTIME
+    if "AP" in words.values or "RP" in words.values:
+        raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
+    if not control.is_rotated:
+        return End(target, unknown, dict(unknown))
+    hidden = {index: why for index, why in unknown.items() if index in GEOMETRY}
+    lost = {index: why for index, why in unknown.items() if index not in GEOMETRY}
+    if hidden:
+        lost |= {index: why for why in list(hidden.values())[:1] for index in GEOMETRY if index in control.machine}
+    return End(target, unknown, lost)
+
+
+def control_unit(control: Sinumerik, index: int) -> float:
+    """mm per program unit of a linear axis in machine coordinates; 1 for rotary axes."""
+    if control.rotary[index]:
+        return 1.0
+    return control.modal.unit / (2.0 if index == 0 and control.modal.diameter else 1.0)

@@ -1,0 +1,190 @@
+"""Frames, planes, diameters, tools: what a block sets before it moves.
+
+Source: Siemens, "SINUMERIK 840D sl, NC programming": frames, CYCLE800, tool offsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ncfix.program.rs274.coordinates import INCH, INDEX, PLANES, Vector, zeros
+from ncfix.program.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
+from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.state import Sinumerik
+
+FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
+UNEQUAL = "a scale that differs from axis to axis ({})"
+ROTARY_FRAME = "a {} of a rotary axis"
+AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
+LENGTH_ACROSS = "$sc_tool_length_const"
+PLANE_LENGTH = (
+    "in this plane the control adds the tool length along another axis, unless $SC_TOOL_LENGTH_CONST is 17: "
+    'variables."$SC_TOOL_LENGTH_CONST" in the setup file'
+)
+
+
+# -- programmable frames ----------------------------------------------------------------------------------------------
+
+
+def programmable(control: Sinumerik, name: str, words: Words) -> None:
+    """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force."""
+    kind = name.removeprefix("a") if name.startswith("a") else name
+    if any(value is None for value in words.values.values()):
+        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(name.upper())
+        return
+    frame, fault = FRAMES[kind](control, words)
+    if fault:
+        control.suspended["frame"] = fault
+    elif name == kind:
+        control.suspended.pop("frame", None)
+    before = control.frames.program if name != kind else WORLD
+    control.frames.program = before.then(frame)
+    control.refresh()
+
+
+def translation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """TRANS."""
+    steps = {INDEX[letter]: value for letter, value in axis_values(words).items()}
+    return shifted({index: value * unit(control, index) for index, value in steps.items()}), ""
+
+
+def rotation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """ROT X Y Z, or ROT RPL in the plane."""
+    if "RPL" in words.values:
+        return turned_in(control.modal.plane, words.get("RPL")), ""
+    return turned(axis_values(words)), ""
+
+
+def scaling(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """SCALE: one factor for all three axes is followed."""
+    factors = axis_values(words)
+    plain = {letter: factor for letter, factor in factors.items() if factor != 1.0}
+    if not plain:
+        return WORLD, ""
+    if set(plain) >= {"X", "Y", "Z"} and len(set(plain.values())) == 1 and len(plain) == 3:
+        return scaled(plain["X"]), ""
+    return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not follow"
+
+
+def mirroring(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """MIRROR: the axes named run the other way."""
+    letters = "".join(axis_values(words))
+    if set(letters) - set("XYZ"):
+        return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not follow"
+    return mirrored(letters), ""
+
+
+FRAMES: dict[str, Callable[[Sinumerik, Words], tuple[Affine, str]]] = {
+    "trans": translation,
+    "rot": rotation,
+    "scale": scaling,
+    "mirror": mirroring,
+}
+PROGRAMMABLE = frozenset(FRAMES) | {"a" + name for name in FRAMES}
+
+
+def axis_values(words: Words) -> dict[str, float]:
+    """The axis words of a block."""
+    return {letter: value for letter, value in words.values.items() if letter in INDEX and value is not None}
+
+
+def unit(control: Sinumerik, index: int) -> float:
+    """mm or rad per unit of a shift; a shift of X is no diameter."""
+    return control.of_setup("XYZABCUVW"[index]) * (1.0 if control.rotary[index] else control.modal.unit)
+
+
+def programmed_shift(control: Sinumerik, words: Words, code: int) -> None:
+    """G58 and G59 with axis words: the shift of the programmable frame is replaced, or added to."""
+    values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
+    if any(value is None for value in words.values.values()):
+        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(f"G{code // 10}")
+        return
+    frame = control.frames.program
+    if code == 590:
+        values = {index: value + frame.shift[index] for index, value in values.items()}
+    control.frames.program = with_shift(frame, values)
+    control.refresh()
+
+
+# -- codes ------------------------------------------------------------------------------------------------------------
+
+
+def plane(control: Sinumerik, code: int) -> None:
+    """G17, G18, G19."""
+    if PLANES[code] is not control.modal.plane:
+        control.modes.pole, control.modes.polar = None, (None, None)
+    control.modal.plane = PLANES[code]
+    set_length(control)
+
+
+def units(control: Sinumerik, code: int) -> None:
+    """G70, G71, G700, G710."""
+    control.modal.unit = INCH if code in (700, 7000) else 1.0
+    control.refresh()
+
+
+def diameter(control: Sinumerik, name: str) -> None:
+    """DIAMON, DIAM90, DIAMOF."""
+    control.modes.diameter = "" if name == "diamof" else name.upper()
+    control.modal.diameter = name != "diamof"
+    control.refresh()
+
+
+def settable(control: Sinumerik, code: int) -> None:
+    """G54 to G57, G505 to G599; G500 switches them off."""
+    control.select(f"G{code // 10}")
+
+
+def feed_mode(control: Sinumerik, code: int) -> None:
+    """G93, G94, G95, and G96, G961, G97, G971, which go with feeds per turn or minute."""
+    mode = {960: 95, 970: 95, 961: 94, 9610: 94, 9710: 94}.get(code, code // 10)
+    if mode != control.modal.feed_mode:
+        control.modal.feed, control.modal.feed_given = float("nan"), False
+    control.modal.feed_mode = mode
+
+
+def compensation(control: Sinumerik, code: int) -> None:
+    """G40, G41, G42."""
+    control.modal.compensated = 0 if code == 400 else code // 10
+
+
+# -- tools ------------------------------------------------------------------------------------------------------------
+
+
+def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
+    """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
+    if "T" in words.values or "T" in words.texts:
+        name = words.texts.get("T")
+        value = words.values.get("T")
+        if name is None and value is None:
+            control.refusal = control.refusal or "the tool (T) is known only at run time"
+            return
+        control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
+    if change or (at_once and ("T" in words.values or "T" in words.texts)):
+        control.tools.spindle = control.tools.selected
+        control.edge = 1
+    if "D" in words.values:
+        if words.values["D"] is None:
+            control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
+            return
+        control.edge = round(words.get("D"))
+    if change or at_once or "D" in words.values:
+        set_length(control)
+
+
+def set_length(control: Sinumerik) -> None:
+    """The length of the tool in force, across the plane: the position stays, its name changes."""
+    number, edge = control.tools.spindle, control.edge
+    length = control.length_of(number, edge) if edge and number else 0.0
+    vector: Vector = zeros()
+    across = control.modal.plane.across
+    constant = control.variables.value(LENGTH_ACROSS)
+    control.suspended.pop("length", None)
+    if across == 2 or constant == 17.0:
+        vector[2] = length
+    elif length and constant is None:
+        control.suspended["length"] = PLANE_LENGTH
+    else:
+        vector[across] = length
+    control.tools.offset = number if edge and number else None
+    control.switch_tcp(vector)

@@ -1,0 +1,215 @@
+"""The walk through a program of SINUMERIK: block after block, as control structures and calls lead."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from ncfix.diagnostics import Place, SourceError
+from ncfix.program.moves import Moves
+from ncfix.program.reader import read
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.lane import run_lane
+from ncfix.program.sinumerik.course import AtRuntimeError, Course
+from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
+from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.statements import BY_THEMSELVES, Turn, act, call_word, finish_block, let_axis_go, say
+from ncfix.program.sinumerik.sweep import demoted, sweep
+from ncfix.program.sinumerik.unit import Unit, units_of
+from ncfix.program.tree import Program, Span
+
+ENDLESS = "NCF233"
+SKIPPED_BLOCKS = "NCF235"
+NOT_UNDERSTOOD = "NCF250"
+SYNCHRONOUS = "NCF251"
+PROGRAM_ENDS = frozenset({20, 300, 170})
+SAFE_ACTION = re.compile(
+    r"(?:DO|WHEN|WHENEVER|EVERY|FROM)\b(?!.*\b(?:DELDTG|STOPREOF|POS|POSA|MOV|PRESETON|TRAILON|LEADON|COUPON|OVR|MEASA|"
+    r"MEAWA|SYNFCT|FTOC)\b)",
+    re.IGNORECASE,
+)
+
+
+class Interpreter:
+    """Follows one program."""
+
+    def __init__(
+        self, control: Sinumerik, program: Program, resolve: Callable[[str], bytes | None] | None, max_blocks: int
+    ) -> None:
+        self.control = control
+        self.resolve = resolve
+        self.budget = max_blocks
+        self.units = units_of(program)
+        self.files: dict[str, Unit | None] = {unit.name: unit for unit in self.units[1:] if unit.name}
+        self.course = Course(control, self.units[0], self.units[0].begin)
+        self.span: Span | None = None
+        self.again: int | None = None
+        control.locate = self.place
+        plans = self.units[0].text.plans
+        self.at_once = not any(60 in plan.m for plan in plans)
+        control.modes.whole_polar = all(
+            {"AP", "RP"} <= {each.address for each in plan.settings}
+            or not {"AP", "RP"} & {each.address for each in plan.settings}
+            for plan in plans
+        )
+        for parameter in self.units[0].parameters:
+            control.variables.scopes[0].kinds[parameter.name] = ""
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        unit, block = self.course.unit, self.course.block - 1
+        return unit.program.place(max(block, unit.begin), self.span)
+
+    def find(self, name: str) -> Unit | None:
+        """A subprogram: in this text, or in a file of its own."""
+        key = name.upper()
+        if key not in self.files:
+            self.files[key] = None
+            spellings = dict.fromkeys((name, key, name.lower(), f"{key}.SPF", f"{name.lower()}.spf", f"{key}.MPF"))
+            sources = (source for each in spellings if self.resolve and (source := self.resolve(each)))
+            source = next(sources, None)
+            if source:
+                program = read(source, name, self.units[0].program.dialect)
+                self.files[key] = units_of(program, external=name)[0]
+        return self.files[key]
+
+    def run(self) -> Moves:
+        """Follow the program to its end; raises SourceError where the control would stop."""
+        try:
+            self.walk()
+        except AtRuntimeError:
+            self.again = sweep(self.course)
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+        return demoted(self.control.builder.moves(), self.again)
+
+    def walk(self) -> None:
+        """Block after block."""
+        course, control = self.course, self.control
+        while True:
+            course.turn_back()
+            if course.block >= course.unit.stop:
+                if not course.calls:
+                    return
+                course.finish()
+                continue
+            main = not course.unit.external
+            if course.unit.plan(course.block).lane is not None and self.lane_is_open():
+                done = run_lane(control, course.unit, course.block, main)  # type: ignore[arg-type]
+                if done:
+                    course.block += done
+                    self.spend(done)
+                    continue
+            plan = course.unit.plan(course.block)
+            course.block += 1
+            self.spend(1)
+            if self.execute(plan):
+                return
+
+    def lane_is_open(self) -> bool:
+        """Whether plain motions may go many at a time."""
+        control = self.control
+        quiet = not (control.modes.modal_cycle or control.lost or control.over or self.course.sections)
+        return quiet and control.modes.diameter != "DIAM90"
+
+    def spend(self, blocks: int) -> None:
+        """Count executed blocks; raises `Fault` when there are too many."""
+        self.budget -= blocks
+        if self.budget < 0:
+            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan) -> bool:
+        """Execute the block before `course.block`; True if the program ends there."""
+        control, course = self.control, self.course
+        unit, index = course.unit, course.block - 1
+        control.numbers, control.first = unit.text.numbers, unit.text.first[index]
+        self.span = None
+        control.external = unit.external
+        if not unit.external:
+            control.row_block = index
+        if plan.skip >= 0 and self.is_skipped():
+            return False
+        if plan.opaque:
+            self.opaque(plan, unit.program.text_of(index))
+        words = self.evaluate(plan, index)
+        turn = Turn(words, plan, self.at_once)
+        for step in plan.steps:
+            self.span = step.span
+            match step:
+                case Letting(name) if name in BY_THEMSELVES:
+                    let_axis_go(control, turn, step)
+                case Letting():
+                    course.let(step)
+                case Calling():
+                    act(control, turn, step, self.find)
+                case Branching():
+                    continue
+        self.span = None
+        if turn.subprogram is None:
+            call_word(turn, self.find)
+        finish_block(control, turn)
+        return self.go_on(plan, turn)
+
+    def go_on(self, plan: Plan, turn: Turn) -> bool:
+        """Where the block leads: into a subprogram, to the end, by a jump, or on. True if the program ends."""
+        course = self.course
+        if turn.subprogram is not None:
+            course.call(turn.subprogram, turn.arguments, turn.written, turn.times)
+            return False
+        branchings = [step for step in plan.steps if isinstance(step, Branching)]
+        for step in branchings:
+            self.span = step.span
+            if step.keyword in ("repeat", "repeatb") and step.label:
+                if turn.words.runtime("P"):
+                    raise AtRuntimeError
+                course.repeat(step, round(turn.words.get("P", 1.0)))
+            else:
+                course.follow(step, plan.steps)
+            if step.keyword in ("if", "case"):
+                break
+        if turn.ends or not PROGRAM_ENDS.isdisjoint(plan.m):
+            if not course.calls:
+                return True
+            course.finish()
+        return False
+
+    def is_skipped(self) -> bool:
+        """Whether blocks with `/` are passed over."""
+        if self.control.setup.block_skip:
+            return True
+        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "--block-skip: they are skipped")
+        return False
+
+    def opaque(self, plan: Plan, text: str) -> None:
+        """Text that is no motion, or that nobody understands."""
+        control = self.control
+        if is_statement(plan):
+            why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
+            control.refusal = control.refusal or why
+            control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
+        if "synchronized" in plan.opaque and not SAFE_ACTION.search(text):
+            why = f"the synchronized action {say(text)} may move axes"
+            control.refusal = control.refusal or why
+            control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")
+
+    def evaluate(self, plan: Plan, index: int) -> Words:
+        """The values of the words of a block."""
+        values: dict[str, float | None] = {}
+        texts: dict[str, str] = {}
+        forms: dict[str, str] = {}
+        control = self.control
+        for setting in plan.settings:
+            self.span = setting.span
+            value = setting.value(control)
+            if isinstance(value, str):
+                texts[setting.address] = value
+                continue
+            values[setting.address] = value
+            if setting.form:
+                forms[setting.address] = setting.form
+        self.span = None
+        return Words(index, values, forms, plan.axes, texts)

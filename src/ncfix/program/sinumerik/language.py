@@ -1,0 +1,60 @@
+"""SINUMERIK as a `Language`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import UsageError
+from ncfix.program import stamp
+from ncfix.program.language import Language, Resolve
+from ncfix.program.moves import Kinematics, Trace
+from ncfix.program.setup import Setup
+from ncfix.program.shapes import split_blocks
+from ncfix.program.sinumerik.blocks import parse_block
+from ncfix.program.sinumerik.interpreter import Interpreter
+from ncfix.program.sinumerik.layout import layout_of
+from ncfix.program.sinumerik.render import render
+from ncfix.program.sinumerik.scanning import scan
+from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.tree import Program
+
+
+def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
+    """There is no mark that ends the text: subprograms may follow the program."""
+    return len(blocks)
+
+
+def follow(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    resolve: Resolve | None,
+    max_blocks: int,
+    kinematics: Kinematics | None,
+) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    control = Sinumerik(setup, axes, rotary, program.dialect, kinematics)
+    moves = Interpreter(control, program, resolve, max_blocks).run()
+    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
+    if lacking:
+        raise UsageError.collected(lacking)
+    marked = stamp.find(program)
+    return Trace(
+        moves=moves,
+        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
+        assumed=tuple(control.knowledge.assumed),
+        stamp="" if marked is None else program.text_of(marked),
+    )
+
+
+SINUMERIK = Language(
+    split=split_blocks,
+    end=whole_text,
+    scan=scan,
+    parse=parse_block,
+    follow=follow,
+    layout=layout_of,
+    render=render,
+)

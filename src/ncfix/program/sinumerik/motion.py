@@ -1,0 +1,119 @@
+"""What one block moves: straight lines, arcs, machine coordinates, reference points, and what is not followed."""
+
+from __future__ import annotations
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.sinumerik.circles import arc, through_point
+from ncfix.program.sinumerik.destination import End, Words, destination, machine_destination
+from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix.program.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
+
+MACHINE = "machine coordinates ({})"
+MEASURING = "measuring (MEAS)"
+AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
+REFERENCE = {740: "reference point (G74)", 750: "fixed point (G75)"}
+AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
+APPROACH = frozenset({1400, 1410, 1420, 1430, 1470, 1480, 2470, 2480, 3400, 3410, 3470, 3480})
+SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
+AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
+NO_MOTION = -1
+
+CIP, CT, POLY = MOTIONS["cip"], MOTIONS["ct"], MOTIONS["poly"]
+
+
+def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
+    """The motion of a block; `special` says what applies to this block only (`supa`, `meas`, ...)."""
+    code = control.modal.motion
+    if code in (0, 10):
+        control.modal.straight = code
+    machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
+    if machine:
+        to_machine_position(control, words, machine.upper())
+    elif "meas" in special:
+        measure(control, words)
+    elif "soft" in special:
+        soft_approach(control, words)
+    elif code in (20, 30):
+        arc(control, words, code)
+    elif code == CIP:
+        through_point(control, words, code)
+    elif code == CT:
+        refused(control, words, code, "an arc that continues the motion before it (CT)")
+    elif code in UNFOLLOWED_MOTIONS:
+        refused(control, words, code, UNFOLLOWED_MOTIONS[code])
+    else:
+        straight(control, words, 10 if code not in (0, 10) else code)
+    control.wrap()
+
+
+def straight(control: Sinumerik, words: Words, code: int) -> None:
+    """G0 and G1."""
+    end = destination(control, words)
+    control.go(Kind.FEED if code else Kind.RAPID, words, end, code, refusal=refusal_of(control, words))
+
+
+def refusal_of(control: Sinumerik, words: Words) -> str:
+    """Why a straight motion is refused, though its end is known."""
+    if control.modes.diameter == "DIAM90" and "X" in words.values and control.modal.incremental:
+        return "an increment of X as a radius while absolute ones are diameters (DIAM90)"
+    if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.runtime("RND", "RNDM", "CHF", "CHR"):
+        return "a rounding or chamfer is known only at run time"
+    if "ANG" in words.values:
+        return "a contour that is given by an angle (ANG)"
+    if words.values.keys() & {"AP", "RP"} and not control.modes.whole_polar:
+        return "polar coordinates of which only one is written (AP and RP are needed in every such block)"
+    return ""
+
+
+def refused(control: Sinumerik, words: Words, code: int, why: str) -> None:
+    """A motion that is followed only as far as its end."""
+    control.settle_all()
+    control.go(Kind.FEED, words, destination(control, words), code, refusal=why)
+
+
+def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
+    """SUPA, G53 and G153."""
+    end = machine_destination(control, words)
+    code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
+    kind = Kind.RAPID if code == 0 else Kind.FEED
+    control.go(kind, words, end, code, passing=MACHINE.format(name))
+
+
+def measure(control: Sinumerik, words: Words) -> None:
+    """MEAS: towards the words until the probe switches."""
+    end = destination(control, words)
+    gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
+    lost = end.lost | dict.fromkeys(spread(control, gone), AFTER_MEASURING)
+    ends = End(end.target, end.unknown | gone, lost)
+    control.go(Kind.FEED, words, ends, control.modal.motion, passing=MEASURING)
+
+
+def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
+    """The coordinates of the program that are not known where these axes are not."""
+    hidden = control.is_rotated and any(index in GEOMETRY for index in gone)
+    return sorted(set(gone) | ({index for index in GEOMETRY if index in control.machine} if hidden else set()))
+
+
+def soft_approach(control: Sinumerik, words: Words) -> None:
+    """G147, G148 and their like: the control adds motions of its own."""
+    refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
+    control.lose_axes(GEOMETRY, AFTER_APPROACH)
+
+
+def to_reference(control: Sinumerik, words: Words, code: int) -> None:
+    """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
+    named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
+    gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
+    unknown = dict(control.unknown) | dict.fromkeys(gone, AFTER_REFERENCE)
+    lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
+    words = Words(words.block, {}, {}, sum(1 << index for index in gone))
+    end = End(control.position[:], unknown, lost)
+    control.go(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code])
+
+
+def dwell(control: Sinumerik, words: Words) -> None:
+    """G4: F is seconds, S turns of the spindle."""
+    still = Words(words.block, {}, {}, 0)
+    end = End(control.position, control.unknown, control.lost)
+    control.go(Kind.DWELL, still, end, control.modal.motion, passing="dwell")

@@ -1,0 +1,191 @@
+"""A plan for each shape of block: what its words, names and jumps are, as functions that give their values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.rs274.plans import Lane
+from ncfix.program.sinumerik.blocks import STATEMENT
+from ncfix.program.sinumerik.build import BRACKET
+from ncfix.program.sinumerik.values import Evaluate, compiled, nothing
+from ncfix.program.sinumerik.vocabulary import FORMS
+from ncfix.program.tree import (
+    Assignment,
+    Call,
+    Command,
+    Comment,
+    Constant,
+    Expression,
+    Flow,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Parameter,
+    Skip,
+    Span,
+    Template,
+    Text,
+    Unary,
+    Word,
+)
+
+LANE_LETTERS = INDEX.keys() | {"F", "N"}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A word: its address, its value, and how it is meant (`ac`, `ic`, `dc`, ... or nothing)."""
+
+    address: str
+    value: Evaluate
+    form: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Letting:
+    """A variable that gets a value: its name, the index if it is an element, and the value (None: a list)."""
+
+    name: str
+    index: tuple[Evaluate, ...]
+    value: Evaluate | None
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Calling:
+    """A name with the values of its arguments, and these as written."""
+
+    name: str
+    arguments: tuple[Evaluate, ...]
+    written: tuple[Expression | None, ...]
+    called: bool
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Branching:
+    """A control structure or jump."""
+
+    keyword: str
+    label: str
+    values: tuple[Evaluate, ...]
+    written: tuple[Expression, ...]
+    span: Span
+
+
+Step = Letting | Calling | Branching
+
+
+@dataclass(slots=True)
+class Plan:
+    """What is done with every block of a shape.
+
+    settings   words but G and M with plain codes, and N
+    steps      assignments, names, jumps, in the order written
+    g, m       codes in tenths
+    axes       bit mask of the axis words
+    skip       the level of block skip, 0 without
+    opaque     kinds of text that is passed over or not understood
+    lane       set if the block may go through the fast lane
+    """
+
+    template: Template
+    settings: tuple[Setting, ...] = ()
+    steps: tuple[Step, ...] = ()
+    g: tuple[int, ...] = ()
+    m: tuple[int, ...] = ()
+    axes: int = 0
+    skip: int = -1
+    opaque: frozenset[str] = frozenset()
+    lane: Lane | None = None
+    names: frozenset[str] = field(default=frozenset())
+
+
+def plan_of(template: Template) -> Plan:
+    """The plan for a shape."""
+    items = template.items
+    words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
+    plan = Plan(template)
+    plan.settings = tuple(map(setting, words))
+    makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, Flow: branching}
+    plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
+    plan.g, plan.m = template.g_codes, template.m_codes
+    plan.axes = sum(1 << INDEX[letter] for letter in {word.address for word in words} if letter in INDEX)
+    plan.skip = next((item.level for item in items if isinstance(item, Skip)), -1)
+    plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
+    plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
+    plan.lane = lane_of(plan)
+    return plan
+
+
+def is_code(word: Word) -> bool:
+    """Whether a word is G or M with a plain number."""
+    return word.address in ("G", "M") and isinstance(word.value, Constant)
+
+
+def setting(word: Word) -> Setting:
+    """A word with its value as a function."""
+    value = word.value
+    if isinstance(value, Call) and value.name in FORMS and not value.indexed:
+        inner = value.arguments[0] if value.arguments else None
+        return Setting(word.address, nothing if inner is None else compiled(inner), value.name, word.span)
+    return Setting(word.address, compiled(value), "", word.span)
+
+
+def letting(item: Assignment) -> Letting:
+    """An assignment with its value as a function."""
+    values = isinstance(item.value, Call) and item.value.name in (BRACKET, "set", "rep")
+    value = None if values else compiled(item.value)
+    match item.target:
+        case Parameter(number):
+            return Letting("r", (compiled(number),), value, item.span)
+        case NamedParameter(name):
+            return Letting(name, (), value, item.span)
+        case Call(name, arguments):
+            index = tuple(nothing if part is None else compiled(part) for part in arguments)
+            return Letting(name, index, value, item.span)
+    raise AssertionError("there are no other targets")
+
+
+def calling(item: Command) -> Calling:
+    """A name with its arguments as functions."""
+    values = tuple(nothing if part is None else compiled(part) for part in item.arguments)
+    return Calling(item.name, values, item.arguments, item.called, item.span)
+
+
+def branching(item: Flow) -> Branching:
+    """A control structure with its values as functions."""
+    label = item.label if isinstance(item.label, str) else ""
+    return Branching(item.keyword, label, tuple(map(compiled, item.arguments)), item.arguments, item.span)
+
+
+def lane_of(plan: Plan) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
+    items = plan.template.items
+    plain = all(isinstance(item, Word | Comment) for item in items)
+    words = plan.template.words
+    letters = {word.address for word in words} - {"G", ":"}
+    if not plain or plan.m or len(plan.g) > 1 or not set(plan.g) <= {0, 10} or not letters <= LANE_LETTERS:
+        return None
+    if any(not isinstance(word.value, Literal) for word in words if not is_code(word)) or len(letters) < len(
+        [word for word in words if not is_code(word)]
+    ):
+        return None
+    slots = {word.address: word.value.slot for word in words if isinstance(word.value, Literal)}
+    axes = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)
+    return Lane(axes, slots.get("F", -1), plan.g[0] if plan.g else -1)
+
+
+def plain_text(expression: Expression | None) -> str | None:
+    """The text that an argument is, if it is one."""
+    while isinstance(expression, Unary):
+        expression = expression.operand
+    return expression.value if isinstance(expression, Text) else None
+
+
+def is_statement(plan: Plan) -> bool:
+    """Whether the block could not be understood."""
+    return STATEMENT in plan.opaque

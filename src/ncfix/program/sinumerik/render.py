@@ -1,0 +1,176 @@
+"""The text of one corrected motion in SINUMERIK: `X=`, `X=AC(..)`, CR=, AR=, CIP, AP= and RP=, packed words."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.layout import CENTRE_LETTERS
+from ncfix.program.number_style import NumberStyle
+from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.sinumerik.circles import VIA, circle_through
+from ncfix.program.sinumerik.layout import SinumerikLayout
+from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
+from ncfix.program.tree import Call, Literal, Program, Word
+
+FloatArray = NDArray[np.float64]
+
+FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
+CIP = MOTIONS["cip"]
+
+
+def render(program: Program, block: int, layout: SinumerikLayout, target: Target) -> Rendered:
+    """The text of a corrected motion."""
+    return SinumerikRenderer(program, block, layout, target).render()
+
+
+class SinumerikRenderer(BlockRenderer):
+    """Renders one motion of one block."""
+
+    layout: SinumerikLayout
+
+    # -- axes ---------------------------------------------------------------------------------------------------------
+
+    def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
+        if self.layout.polar and self._polar_stays(end):
+            kept = super()._first_piece(position, np.where(self._plane_columns(), position, end))
+            return np.where(self._plane_columns(), self.target.nominal, kept)
+        for word in self.layout.polar.values():
+            self._remove(word)
+        return super()._first_piece(position, end)
+
+    def _polar_stays(self, end: FloatArray) -> bool:
+        near = np.abs(end - self.target.nominal) < self.half
+        return len(self.target.ends) == 1 and bool(near[self._plane_columns()].all())
+
+    def _plane_columns(self) -> NDArray[np.bool_]:
+        """The columns that no word of the block names while it has polar coordinates."""
+        return np.array([letter in "XYZ" and letter not in self.layout.axes for letter in self.target.letters])
+
+    def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
+        form = self._form(word)
+        if not form:
+            super()._present_axis(position, column, end, word)
+            return
+        base = position[column] if form == INCREMENTAL else 0.0
+        value = end - base
+        turns = 0.0
+        if form not in (ABSOLUTE, INCREMENTAL):
+            turns = np.floor(value / 360.0 + 1e-12) * 360.0
+        written = self._value(word, np.nan)
+        whole = len(self.target.ends) == 1
+        same = np.isfinite(written) and abs(value - turns - written) < self.half[column]
+        unchanged = abs(end - self.target.nominal[column]) < self.half[column] and form != INCREMENTAL
+        if whole and (same or (unchanged and not np.isfinite(written))):
+            position[column] = base + (written + turns if np.isfinite(written) else value)
+            return
+        position[column] = base + turns + self._rewrite(word, value - turns, int(self.target.decimals[column]))
+
+    # -- numbers in brackets ------------------------------------------------------------------------------------------
+
+    def _form(self, word: Word) -> str:
+        """How the word is meant, if it says so: `ac`, `ic`, `dc`, ..."""
+        return word.value.name if isinstance(word.value, Call) and word.value.name in FORMS else ""
+
+    def _value(self, word: Word, otherwise: float) -> float:
+        if self._form(word):
+            assert isinstance(word.value, Call)
+            inner = word.value.arguments[0] if word.value.arguments else None
+            if isinstance(inner, Literal):
+                return float(self.program.values_of(self.block)[inner.slot])
+            return otherwise
+        return super()._value(word, otherwise)
+
+    def _rewrite(self, word: Word, value: float, decimals: int) -> float:
+        start, stop = self.program.span(self.block, word.value_span)
+        found = FORM.match(self.program.source[start:stop].decode("latin-1")) if self._form(word) else None
+        if found is None:
+            return super()._rewrite(word, value, decimals)
+        inner = found["value"]
+        literal = bool(re.fullmatch(r"[-+]?\d*\.?\d*", inner)) and any(each.isdigit() for each in inner)
+        text = (NumberStyle.of(inner) if literal else NumberStyle()).write(value, decimals)
+        self.out.edits.append((start + found.start("value"), start + found.end("value"), text))
+        return float(text)
+
+    # -- codes and arcs -----------------------------------------------------------------------------------------------
+
+    def _motion_code(self) -> None:
+        wanted, word = self.target.code, self.layout.motion
+        if word is not None and word.address != "G" and wanted != CIP:
+            self.out.edits.append((*self.program.span(self.block, word.span), self._cased("G") + f"{wanted // 10}"))
+        elif wanted == CIP and word is None and self.target.active_code != CIP:
+            at = self.program.position(self.block, self.layout.code_at)
+            self.out.edits.append((at, at, "CIP "))
+        else:
+            super()._motion_code()
+
+    def _arc_words(self, start: FloatArray, end: FloatArray) -> None:
+        if not self.target.arc:
+            for word in (*self.layout.via.values(), self.layout.angle):
+                if word is not None:
+                    self._remove(word)
+        super()._arc_words(start, end)
+
+    def _kept_arc(self, start: FloatArray, end: FloatArray) -> None:
+        if self.layout.via:
+            self._via(start, end)
+            return
+        if self.layout.angle is not None:
+            self._remove(self.layout.angle)
+        super()._kept_arc(start, end)
+
+    def _centre_word(self, index: int, base: float, had_centre: bool) -> float:
+        """Centre words count from the start, but for those that say `AC`."""
+        word = self.layout.centre.get(CENTRE_LETTERS[index])
+        if word is None or self._form(word) != ABSOLUTE:
+            return super()._centre_word(index, base, (had_centre and self.layout.angle is None) or word is not None)
+        value, column = float(self.target.centre[index]), self.target.spatial[index]
+        written = self._value(word, float(self.target.original_centre[index]))
+        if abs(value - written) >= self.half[column]:
+            written = self._rewrite(word, value, int(self.target.decimals[column]))
+        return float(written)
+
+    def _via(self, start: FloatArray, end: FloatArray) -> None:
+        """The intermediate point of CIP, moved as the ends are."""
+        target = self.target
+        begin, finish = self._xyz(start), self._xyz(end)
+        nominal_end = self._xyz(target.nominal)
+        incremental = {address: self._is_incremental(word) for address, word in self.layout.via.items()}
+        via = target.origin.copy()
+        for index, address in enumerate(VIA):
+            if address in self.layout.via:
+                written = self._value(self.layout.via[address], np.nan)
+                via[index] = written + (target.origin[index] if incremental[address] else 0.0)
+        known = np.where(np.isfinite(via), via, target.origin)
+        before, after = (float(np.linalg.norm(arm)) for arm in (known - target.origin, nominal_end - known))
+        share = before / max(before + after, 1e-9)
+        wanted = known + (1 - share) * (begin - target.origin) + share * (finish - nominal_end)
+        for index, address in enumerate(VIA):
+            wanted[index] = self._via_word(address, index, wanted, begin, incremental.get(address, False))
+        circle = circle_through(tuple(begin), tuple(wanted), tuple(finish))
+        self.out.centre = np.array(circle.centre)
+
+    def _via_word(self, address: str, index: int, wanted: FloatArray, begin: FloatArray, incremental: bool) -> float:
+        """One word of the intermediate point; what the control will read."""
+        column = self.target.spatial[index]
+        word = self.layout.via.get(address)
+        if column < 0:
+            return float(wanted[index])
+        base = float(begin[index]) if incremental or (word is None and self.target.incremental) else 0.0
+        value, digits = float(wanted[index]) - base, int(self.target.decimals[column])
+        if word is not None:
+            written = self._value(word, np.nan)
+            if np.isfinite(written) and abs(written - value) < self.half[column]:
+                return base + written
+            return base + self._rewrite(word, value, digits)
+        if abs(float(wanted[index]) - float(begin[index])) < self.half[column]:
+            return float(begin[index])
+        text = f"{value:.{digits}f}"
+        self.added.append(f"{self.layout.blank or ' '}{address}={text}")
+        return base + float(text)
+
+    def _is_incremental(self, word: Word) -> bool:
+        form = self._form(word)
+        return form == INCREMENTAL or (not form and self.target.incremental)

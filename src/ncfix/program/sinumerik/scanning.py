@@ -1,0 +1,63 @@
+"""The shapes of a text's blocks in SINUMERIK: where its numbers would be, without understanding it.
+
+A digit inside a name belongs to the name, and so does the number of an extended address (`C1=`): they are part of the
+shape. The reader compares with the grammar for every shape, and goes by the grammar where the two differ.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.numbers import NUMERIC, find_numbers, table
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, odd_blocks, shape_keys
+
+FIXED = table(b"GgMmRr")
+"""A number after these is no value but says which code or parameter it is."""
+
+LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
+LETTER = table(LETTERS)
+NAMES = table(LETTERS + b"0123456789")
+
+PASSIVE = re.compile(rb'"[^"\r\n]*"|(?P<comment>;[^\r\n]*)')
+"""Strings and comments: there are no numbers in them."""
+
+PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
+"""The line of an archive that says where a program belongs: no comment, though it looks like one."""
+
+EXTENSION = re.compile(rb"(?<![A-Za-z_$])[A-Za-z](\d+)(?=[ \t]*=)")
+"""The number of an extended address."""
+
+
+def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """Find the numbers and the shape of every block."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    quiet = np.array([match.span() for match in PASSIVE.finditer(source)], dtype=np.int64).reshape(-1, 2)
+    final = [match.span() for match in PASSIVE.finditer(source) if match["comment"] is not None]
+    comments = np.array(final, dtype=np.int64).reshape(-1, 2)
+    numeric = NUMERIC[text] & ~cover(len(text), quiet[:, 0], quiet[:, 1]) & ~in_names(text, source)
+    numbers = find_numbers(text, numeric, FIXED)
+    owner = block_of(blocks, numbers.spans[:, 0])
+    comment = np.full(len(blocks), -1, dtype=np.int64)
+    comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
+    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
+    shapes = shape_keys(text, blocks, numbers.spans, comments, marks)
+    heads = np.array([match.start() for match in PATH.finditer(source)], dtype=np.int64)
+    for block in {*owner[numbers.broken].tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}:
+        shapes[block] = None
+    first = np.searchsorted(owner, np.arange(len(blocks) + 1))
+    return Scan(shapes, comment, first, numbers.spans, numbers.values)
+
+
+def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
+    """(n,) the digits that belong to a name of two letters or more, or to an extended address."""
+    word = NAMES[text]
+    begins = word & ~np.concatenate(([False], word[:-1]))
+    start = np.maximum.accumulate(np.where(begins, np.arange(len(text)), 0))
+    second = text[np.minimum(start + 1, len(text) - 1)]
+    named = word & LETTER[text[start]] & LETTER[second]
+    for match in EXTENSION.finditer(source):
+        named[slice(*match.span(1))] = True
+    return np.asarray(named)

@@ -1,0 +1,284 @@
+"""The control while it follows a program: frames, modes, tool, variables, and where the axes stand.
+
+What is common to all controls (positions, motions, what is known and what is asked of the setup) is that of the RS274
+family; here is what SINUMERIK has of its own: a chain of frames, and a book of what is not known that is kept in the
+coordinates of the program, since in a turned frame one unknown coordinate would hide three axes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ncfix.program.dialect import Dialect
+from ncfix.program.moves import Kind, Kinematics
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.builder import Arc
+from ncfix.program.rs274.control import AT_START, Control, Unknown
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
+from ncfix.program.rs274.modal import Modal
+from ncfix.program.setup import Setup
+from ncfix.program.sinumerik.affine import WORLD, Affine, shifted
+from ncfix.program.sinumerik.variables import Variables
+
+if TYPE_CHECKING:
+    from ncfix.program.sinumerik.destination import End, Words
+
+GEOMETRY = (X, Y, Z)
+TURNED = "where the axis {} stands in the turned coordinates is not known"
+RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
+NO_SYSTEM = "G500"
+"""The name under which the setup may give what is in force while no settable frame is."""
+
+
+@dataclass(slots=True)
+class Frames:
+    """The chain of frames in force.
+
+    name      of the settable frame, G54 ... G599 or G500
+    settable  its shift
+    swivel    the plane of CYCLE800
+    program   TRANS, ROT, SCALE, MIRROR
+    """
+
+    name: str = NO_SYSTEM
+    settable: Affine = WORLD
+    swivel: Affine = WORLD
+    program: Affine = WORLD
+
+    @property
+    def whole(self) -> Affine:
+        """All of them."""
+        return self.settable.then(self.swivel).then(self.program)
+
+
+@dataclass(slots=True)
+class Modes:
+    """What is in force besides the modal state that all controls have.
+
+    diameter     "", "DIAMON" or "DIAM90"
+    pole         of polar coordinates in the frame of the program, mm; None until one is programmed
+    polar        the last AP and RP
+    transformed  TRAORI is on
+    swivelled    CYCLE800 has tilted the plane
+    modal_cycle  what MCALL calls after each block with a motion; empty for nothing
+    whole_polar  every block with a polar coordinate has both
+    """
+
+    diameter: str = ""
+    pole: tuple[float, float] | None = None
+    polar: tuple[float | None, float | None] = (None, None)
+    transformed: bool = False
+    swivelled: bool = False
+    modal_cycle: str = ""
+    whole_polar: bool = True
+
+
+@dataclass(slots=True)
+class Named:
+    """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
+
+    numbers: dict[str, int] = field(default_factory=dict)
+
+    def number(self, name: str) -> int:
+        """The number of a name."""
+        return self.numbers.setdefault(name, 1_000_000 + len(self.numbers))
+
+    def name(self, number: int) -> str:
+        """How people call a tool."""
+        return next((f'"{name}"' for name, known in self.numbers.items() if known == number), str(number))
+
+
+class Sinumerik(Control):
+    """Everything that the steps of a block read and change.
+
+    lost  letter index -> why that coordinate of the program's frame is not known
+    over  rotary axes that the last motion took past a full turn
+    edge  cutting edge in force (D), 0 for none
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        dialect: Dialect,
+        kinematics: Kinematics | None = None,
+    ) -> None:
+        self.frames = Frames()
+        self.modes = Modes()
+        self.lost: Unknown = {}
+        self.over: tuple[int, ...] = ()
+        self.edge = 0
+        self.variables = Variables.given(setup.variables)
+        self.named = Named()
+        super().__init__(setup, axes, rotary, dialect, kinematics)
+        self.lost = dict(self.unknown)
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Compose the frames; to be called after any of them, the unit, the tool or the diameter mode has changed."""
+        whole = self.frames.whole
+        before = self.rotation if hasattr(self, "rotation") else whole.rotation
+        tool = zeros() if self.tcp else self.offsets.tool
+        self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
+        self.rotation = whole.rotation
+        self.is_rotated = self.rotation != WORLD.rotation
+        self.inverse = transposed(self.rotation)
+        self.stretch = self.modal.unit * whole.scale
+        self.scale = [DEGREE if turning else self.stretch for turning in self.rotary]
+        if self.modal.diameter:
+            self.scale[0] /= 2
+        self._frame = -1
+        if self.rotation != before:
+            self.hide_in_turned_frame()
+
+    def hide_in_turned_frame(self) -> None:
+        """Coordinates of a frame that has just been turned are known if all of them are."""
+        mine = {index: why for index, why in self.lost.items() if index not in GEOMETRY}
+        hidden = [index for index in GEOMETRY if index in self.unknown]
+        if hidden and self.is_rotated:
+            self.lost = mine | {index: TURNED for index in GEOMETRY if index in self.machine}
+        else:
+            self.lost = mine | {index: self.unknown[index] for index in hidden}
+
+    @property
+    def frame(self) -> int:
+        """The index of the frame that is in force."""
+        if self._frame < 0:
+            self._frame = self.builder.frame(self.offset, self.rotation, self.stretch, self.modal.diameter)
+        return self._frame
+
+    def unit_of(self, index: int) -> float:
+        """mm or rad per program unit of an axis, X not as a diameter."""
+        return DEGREE if self.rotary[index] else self.stretch
+
+    def select(self, name: str) -> None:
+        """A settable frame comes into force."""
+        self.frames.name = name
+        given = self.setup.work_offsets.get(name, {})
+        stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
+        self.frames.settable = shifted(stored)
+        for index, letter in enumerate(LETTERS):
+            value = self.variables.shared.get((f"$p_uifr_{name.lower()}", (float(index),)), 0.0)
+            if value is None and index in self.machine:
+                self.shaky[index] = RUNTIME_OFFSET
+            elif letter in given:
+                self.shaky.pop(index, None)
+        self.offset_checked = False
+        self.refresh()
+
+    def of_setup(self, letter: str) -> float:
+        """mm or rad per unit of the setup."""
+        return DEGREE if self.rotary[INDEX[letter]] else 1.0
+
+    def check_offset(self) -> None:
+        """The settable frame is used: it is given, or lacking."""
+        if self.offset_checked:
+            return
+        self.offset_checked = True
+        if self.frames.name not in self.setup.work_offsets:
+            self.knowledge.work_offset(self.frames.name)
+
+    def restore(self, modal: Modal, modes: Modes, frames: Frames) -> None:
+        """Bring back what was in force before a subprogram that says SAVE."""
+        motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
+        self.modal, self.frames = modal, frames
+        self.modal.motion, self.modal.straight, self.modal.feed = motion, straight, feed
+        transformed, swivelled = self.modes.transformed, self.modes.swivelled
+        self.modes = modes
+        self.modes.transformed, self.modes.swivelled = transformed, swivelled
+        self.refresh()
+
+    # -- tool-centre-point control ------------------------------------------------------------------------------------
+
+    def switch_tcp(self, tool: Vector | None = None) -> None:
+        """Take TRAORI, a swivelled plane or another tool into force: the machine stands still, its tip may not."""
+        on = self.setup.tcp or self.modes.transformed or self.modes.swivelled
+        new = self.offsets.tool if tool is None else tool
+        if on or self.tcp:
+            known = dict(self.unknown)
+            tcp.switch(self, new, on)
+            self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
+        self.tcp = on
+        self.offsets.tool = new
+        self.refresh()
+
+    # -- what is known ------------------------------------------------------------------------------------------------
+
+    def lose_all(self, reason: str) -> None:
+        """No axis stands where it is known to from here on; `reason` has a `{}` for the axis letter."""
+        self.lose_axes(self.machine, reason)
+
+    def lose_axes(self, indices: tuple[int, ...], reason: str) -> None:
+        """These axes stand somewhere that is not known from here on."""
+        self.lose(indices, reason)
+        gone = {index for index in indices if index in self.machine}
+        if self.is_rotated and gone & set(GEOMETRY):
+            gone |= {index for index in GEOMETRY if index in self.machine}
+        self.lost |= dict.fromkeys(sorted(gone), reason)
+
+    def settle_all(self) -> None:
+        """All start positions matter: they are given, or lacking and taken as zero."""
+        self.settle(tuple(self.unknown))
+        self.forget_settled()
+
+    def forget_settled(self) -> None:
+        """Coordinates whose start position has been asked for are known."""
+        self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
+
+    def unknown_for(self, lost: Unknown) -> Unknown:
+        """Which axes are not known where these coordinates of the program's frame are not."""
+        if not lost:
+            return {}
+        unknown = {index: why for index, why in lost.items() if index not in GEOMETRY}
+        for index in GEOMETRY:
+            mixed = [k for k in GEOMETRY if self.rotation[index][k] != 0.0 and k in lost]
+            if mixed and index in self.machine:
+                unknown[index] = lost[mixed[0]]
+        return unknown
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def go(
+        self,
+        kind: Kind,
+        words: Words,
+        end: End,
+        code: int,
+        *,
+        refusal: str = "",
+        passing: str = "",
+        arc: Arc | None = None,
+    ) -> None:
+        """A motion to `end`, with the reason for which it is refused or passed."""
+        axes = words.axes
+        if words.values.keys() & {"AP", "RP"}:
+            axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
+        self.lost = end.lost
+        self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
+        self.forget_settled()
+
+    def wrap(self) -> None:
+        """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""
+        if self.over:
+            self.position = [
+                value % (2 * math.pi) if index in self.over else value for index, value in enumerate(self.position)
+            ]
+            self.over = ()
+
+    # -- tools --------------------------------------------------------------------------------------------------------
+
+    def length_of(self, number: int, edge: int) -> float:
+        """The length of a tool for its cutting edge, mm; zero if it is lacking."""
+        known = self.knowledge.known_tool_length(number)
+        if number == 0:
+            return 0.0
+        if known is not None and edge == 1:
+            return known
+        name = self.named.name(number)
+        what = f"length of tool {name}" if edge == 1 else f"length of tool {name}, edge D{edge}"
+        self.knowledge.lack("NCF202", what, "is used", f"--tool {name}=LENGTH")
+        return 0.0

@@ -1,0 +1,333 @@
+"""What the codes and names of a block do, and in which order: settings first, then frames, tools, and the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.settings import unknown_code
+from ncfix.program.sinumerik import framing, motion
+from ncfix.program.sinumerik.affine import WORLD
+from ncfix.program.sinumerik.destination import End, Words, set_pole
+from ncfix.program.sinumerik.plans import Calling, Letting, Plan
+from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.unit import Unit
+from ncfix.program.sinumerik.values import Evaluate
+from ncfix.program.sinumerik.vocabulary import (
+    ASYNCHRONOUS,
+    DRILLING,
+    ENDS,
+    HARMLESS,
+    MADE_BY_THE_CONTROL,
+    MOTIONS,
+    UNFOLLOWED,
+    UNFOLLOWED_MOTIONS,
+)
+from ncfix.program.tree import Call, Expression, NamedParameter, Text
+
+Find = Callable[[str], Unit | None]
+
+CONFLICT = "NCF208"
+UNKNOWN_CYCLE = "NCF252"
+AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
+AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
+ORIENTATION = frozenset(
+    {"A2", "B2", "C2", "A3", "B3", "C3", "A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA"}
+)
+_PASSED = """
+    G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
+    G962 G972 G973 G290 G471 G472
+"""
+PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
+"""G codes that change nothing of where axes go."""
+
+Handler = Callable[[Sinumerik, int], None]
+SETTINGS: dict[int, Handler] = {
+    **dict.fromkeys((170, 180, 190), framing.plane),
+    **dict.fromkeys((700, 710, 7000, 7100), framing.units),
+    **dict.fromkeys((930, 940, 950, 960, 9610, 970, 9710), framing.feed_mode),
+    **dict.fromkeys((400, 410, 420), framing.compensation),
+    **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
+}
+BY_THEMSELVES = frozenset(ASYNCHRONOUS) | {"pos"}
+"""What with an axis as index lets it move on its own, `POS[X]=100`."""
+
+STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
+FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
+POLES = frozenset({1100, 1110, 1120})
+TAKES_WORDS = frozenset({40, 740, 750, 250, 260, 580, 590}) | POLES
+
+
+@dataclass(slots=True)
+class Turn:
+    """One block while it is executed.
+
+    at_once     T itself changes the tool
+    special     what applies to this block only: `supa`, `g53`, `meas`, `soft`
+    frame       the name of a frame instruction, which takes the axis words
+    subprogram  what is called after the block, with its arguments, so many times
+    modal       MCALL stands in the block
+    ends        RET stands in the block
+    used        something takes the axis words for itself
+    """
+
+    words: Words
+    plan: Plan
+    at_once: bool
+    special: set[str] = field(default_factory=set)
+    frame: str = ""
+    subprogram: Unit | None = None
+    arguments: tuple[Evaluate, ...] = ()
+    written: tuple[Expression | None, ...] = ()
+    times: int = 1
+    modal: bool = False
+    ends: bool = False
+    used: bool = False
+
+
+# -- names ------------------------------------------------------------------------------------------------------------
+
+
+def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """Do what a name says, as far as it does not wait for the words of the block."""
+    name = step.name
+    if name in SPECIAL:
+        SPECIAL[name](control, turn, step)
+    elif name in framing.PROGRAMMABLE:
+        turn.frame = name
+    elif name in MOTIONS:
+        control.modal.motion = MOTIONS[name]
+    elif name in ("diamon", "diam90", "diamof"):
+        framing.diameter(control, name)
+    elif name in UNFOLLOWED:
+        control.suspended["coordinates"] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
+    elif name in HARMLESS or name.startswith(("ori", "g_", "msg")):
+        return
+    elif name == "cycle800":
+        swivel(control, turn, step)
+    elif name in DRILLING or name in MADE_BY_THE_CONTROL:
+        cycle(control, turn, step)
+    else:
+        subprogram(control, turn, step, find)
+
+
+def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """SUPA: this block goes in machine coordinates."""
+    turn.special.add("supa")
+
+
+def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TRAORI."""
+    control.modes.transformed = True
+    control.switch_tcp()
+
+
+def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TRAFOOF."""
+    control.modes.transformed = False
+    if control.suspended.pop("coordinates", None):
+        control.lose_all(framing.AFTER_UNFOLLOWED)
+    control.switch_tcp()
+
+
+def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TOROTOF, PAROTOF: coordinates are followed again."""
+    if control.suspended.pop("coordinates", None):
+        control.lose_all(framing.AFTER_UNFOLLOWED)
+
+
+def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """MCALL: what follows it is called after each motion; alone it ends that."""
+    turn.modal = True
+    control.modes.modal_cycle = ""
+
+
+def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """DEF."""
+    kind = str(step.arguments[0](control))
+    for place in range(1, len(step.written), 2):
+        variable, value = step.written[place], step.written[place + 1]
+        assert isinstance(variable, NamedParameter | Call)
+        control.variables.define(kind, variable.name)
+        if isinstance(variable, Call) and value is not None:
+            control.variables.forget(variable.name)
+        elif value is not None:
+            control.variables.assign(variable.name, step.arguments[place + 1](control))
+
+
+def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """RET."""
+    turn.ends = True
+
+
+def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """MEAS and MEAW without a value stand with a motion."""
+    turn.special.add("meas")
+
+
+SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
+    "supa": supa,
+    "traori": transformation,
+    "trafoof": no_transformation,
+    "mcall": modal_call,
+    "def": define,
+    "ret": come_back,
+    "meas": measure,
+    "meaw": measure,
+    **dict.fromkeys(ENDS - {"trafoof"}, end_unfollowed),
+}
+
+
+def cycle(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """A cycle of the control."""
+    name = step.name.upper()
+    if turn.modal:
+        control.modes.modal_cycle = step.name
+        control.suspended["cycle"] = f"the modal cycle {name} is in force, which ncfix does not follow"
+        return
+    control.lose_all(AFTER_CYCLE)
+
+
+def swivel(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
+    if all(part is None or part == Text("") or part == Text("0") for part in step.written):
+        control.frames.swivel = WORLD
+        control.modes.swivelled = False
+        control.switch_tcp()
+        return
+    control.suspended["coordinates"] = "a tilted plane (CYCLE800) is in force, which ncfix does not follow"
+
+
+def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
+    """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
+    name = step.index[0](control) if step.index else None
+    known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
+    gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.machine
+    if not gone:
+        return
+    why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
+    if step.name in ("pos", "posa"):
+        still = Words(turn.words.block, {}, {}, sum(1 << index for index in gone))
+        lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
+        control.go(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why)
+    else:
+        control.refusal = control.refusal or f"{why} is not followed"
+
+
+def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """A subprogram, or a cycle of the machine's builder."""
+    unit = find(step.name)
+    if unit is not None:
+        turn.subprogram, turn.arguments, turn.written = unit, step.arguments, step.written
+        turn.times = round(turn.words.get("P", 1.0))
+        return
+    if turn.modal:
+        control.suspended["cycle"] = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not know"
+        return
+    text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
+    control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
+    control.lose_all(AFTER_CYCLE)
+
+
+def call_word(turn: Turn, find: Find) -> None:
+    """`L123`: a subprogram by its number."""
+    value = turn.words.values.get("L")
+    if value is None:
+        return
+    unit = find(f"L{value:g}")
+    if unit is None:
+        raise Fault("NCF231", f"there is no subprogram L{value:g}", "put its file beside the program")
+    turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))
+
+
+# -- the block --------------------------------------------------------------------------------------------------------
+
+
+def finish_block(control: Sinumerik, turn: Turn) -> None:
+    """Codes and words of the block, and its motion."""
+    words, plan = turn.words, turn.plan
+    if turn.modal and "mcall" in plan.names and len(plan.names) == 1:
+        control.suspended.pop("cycle", None)
+    codes(control, turn)
+    if turn.frame:
+        framing.programmable(control, turn.frame, words)
+        return
+    framing.tool(control, words, 60 in plan.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
+    feed(control, turn)
+    strangers(control, words)
+    if "MEAS" in words.values or "MEAW" in words.values:
+        turn.special.add("meas")
+    if turn.used:
+        return
+    if plan.axes or words.values.keys() & {"AP", "RP", "AR", "TURN"} or is_full_circle(control, words):
+        if words.values.keys() & ORIENTATION:
+            control.refusal = control.refusal or "the tool direction is given by a vector or by angles"
+        motion.moved(control, words, frozenset(turn.special))
+
+
+def is_full_circle(control: Sinumerik, words: Words) -> bool:
+    """An arc with no end point: it ends where it began."""
+    return control.modal.motion in (20, 30) and bool(words.values.keys() & {"I", "J", "K"})
+
+
+def codes(control: Sinumerik, turn: Turn) -> None:
+    """The G codes of a block."""
+    chosen = [code for code in turn.plan.g if code in STRAIGHT_AND_ARCS]
+    if len(set(chosen)) > 1:
+        first, second = chosen[0] // 10, chosen[1] // 10
+        raise Fault(CONFLICT, f"G{first} and G{second} exclude one another (both set the motion)")
+    for code in turn.plan.g:
+        if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS:
+            control.modal.motion = code
+        elif code in SETTINGS:
+            SETTINGS[code](control, code)
+        elif code in (900, 910):
+            control.modal.incremental = code == 910
+        elif code in FOR_THIS_BLOCK:
+            turn.special.add(FOR_THIS_BLOCK[code])
+        elif code in TAKES_WORDS:
+            takes_words(control, turn, code)
+        elif code not in PASSED:
+            unknown_code(control, code)
+
+
+def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
+    """Codes that take the words of the block for themselves."""
+    turn.used = True
+    if code == 40:
+        motion.dwell(control, turn.words)
+    elif code in motion.REFERENCE:
+        motion.to_reference(control, turn.words, code)
+    elif code in POLES:
+        set_pole(control, turn.words, code)
+    elif code in (580, 590):
+        framing.programmed_shift(control, turn.words, code)
+
+
+def feed(control: Sinumerik, turn: Turn) -> None:
+    """F, unless it is the time of a dwell."""
+    if "F" not in turn.words.values or 40 in turn.plan.g:
+        return
+    value, modal = turn.words.values["F"], control.modal
+    unit = 1.0 if modal.feed_mode == 93 else modal.unit
+    modal.feed = float("nan") if value is None else unit * value
+
+
+def strangers(control: Sinumerik, words: Words) -> None:
+    """Axes that the program moves and the machine lacks."""
+    for address in words.values:
+        extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
+        if address in ORIENTATION or (extended and address[1:] in "234567" and address[0] in "ABC"):
+            continue
+        lacking = address in INDEX and INDEX[address] not in control.machine
+        if (lacking or extended) and address not in control.foreign:
+            control.note_foreign(address)
+
+
+def say(text: str) -> str:
+    """A block as it is named in a message."""
+    short = " ".join(text.split(";")[0].split())
+    return f"'{short[:40]}...'" if len(short) > 40 else f"'{short}'"

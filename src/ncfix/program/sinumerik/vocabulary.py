@@ -1,0 +1,115 @@
+"""The words of SINUMERIK that are names, and what each of them is to whoever follows a program.
+
+Source: Siemens, "SINUMERIK 840D sl, NC programming": tables of statements. All names are lower case here.
+"""
+
+from __future__ import annotations
+
+_SETTERS = """
+    ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
+    ovr ovrra fl fb fz fprda spos sposa meas meaw meawa measa po pl pw sd prio rpl lims disrp dism
+"""
+SETTERS = frozenset(_SETTERS.split())
+"""Names that take a value as an address does: `CR=5`. They are words, other names that get a value are variables."""
+
+ABSOLUTE, INCREMENTAL = "ac", "ic"
+TURNING = frozenset({"dc", "acp", "acn"})
+FORMS = TURNING | {ABSOLUTE, INCREMENTAL}
+"""How one word is meant, `X=IC(10)`: absolutely, incrementally, or to an angle on the shortest way or in a sense."""
+
+MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 1040, "cspline": 1050}
+MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060)
+"""Names that belong to the group of G0 to G3; the numbers are ours, for the column `modal`."""
+
+UNFOLLOWED_MOTIONS = {
+    1020: "polynomials (POLY)",
+    1030: "splines (ASPLINE)",
+    1040: "splines (BSPLINE)",
+    1050: "splines (CSPLINE)",
+    1060: "involutes (INVCW, INVCCW)",
+    330: "threading (G33)",
+    331: "rigid tapping (G331)",
+    332: "rigid tapping (G332)",
+    340: "threading (G34)",
+    350: "threading (G35)",
+    630: "tapping (G63)",
+    3310: "rigid tapping (G331)",
+    3320: "rigid tapping (G332)",
+    3350: "threading (G335)",
+    3360: "threading (G336)",
+}
+
+_HARMLESS = """
+    msg stopre waitp waits waitm waitmc waite setal clralm setm clearm getd get release write read delete isfile mmc
+    fnorm flin fcub fpo ffwon ffwof brisk soft drive briska softa drivea jerka sblof sblon displof displon
+    contpron contdcon stopfifo startfifo fifoctrl setint enable disable clrint liftfast alf lfon lfof walimon walimof
+    walcs0 walcs1 walcs2 walcs3 setms spcon spcof cdon cdof cdof2 dynnorm dynpos dynrough dynsemifin dynfinish dynprec
+    compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
+    cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
+    cancel cycle832 group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
+    coupdef coupdel coupon coupof couponc coupofs waitc ctabdef ctabend ctabdel resetmon tang adisposa
+    protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
+"""
+HARMLESS = frozenset(_HARMLESS.split())
+"""Names that move no geometry axis and change no coordinates: passed over."""
+
+UNFOLLOWED = {
+    "transmit": "face transformation (TRANSMIT)",
+    "tracyl": "cylinder transformation (TRACYL)",
+    "traang": "oblique axis (TRAANG)",
+    "tracon": "chained transformations (TRACON)",
+    "trafoon": "a transformation (TRAFOON)",
+    "torot": "a frame along the tool (TOROT)",
+    "torotx": "a frame along the tool (TOROTX)",
+    "toroty": "a frame along the tool (TOROTY)",
+    "torotz": "a frame along the tool (TOROTZ)",
+    "toframe": "a frame along the tool (TOFRAME)",
+    "toframex": "a frame along the tool (TOFRAMEX)",
+    "toframey": "a frame along the tool (TOFRAMEY)",
+    "toframez": "a frame along the tool (TOFRAMEZ)",
+    "tcoabs": "a tool carrier (TCOABS)",
+    "tcofr": "a tool carrier (TCOFR)",
+    "tcofrx": "a tool carrier (TCOFRX)",
+    "tcofry": "a tool carrier (TCOFRY)",
+    "tcofrz": "a tool carrier (TCOFRZ)",
+    "parot": "a frame along the table (PAROT)",
+    "rots": "a frame by solid angles (ROTS)",
+    "arots": "a frame by solid angles (AROTS)",
+    "crots": "a frame by solid angles (CROTS)",
+    "geoax": "exchanged geometry axes (GEOAX)",
+    "preseton": "a preset position (PRESETON)",
+    "presetons": "a preset position (PRESETONS)",
+    "toffon": "an online tool offset (TOFFON)",
+    "ftocon": "an online tool offset (FTOCON)",
+    "trailon": "coupled axes (TRAILON)",
+    "leadon": "coupled axes (LEADON)",
+    "egon": "an electronic gear (EGON)",
+    "egonsyn": "an electronic gear (EGONSYN)",
+    "tangon": "tangential control (TANGON)",
+    "execstring": "text that is executed as a block (EXECSTRING)",
+    "corrtc": "a corrected tool carrier (CORRTC)",
+}
+"""Names after which coordinates are no longer those that are followed."""
+
+ENDS = frozenset({"trafoof", "torotof", "parotof"})
+"""Names that end some of them."""
+
+ASYNCHRONOUS = {
+    "posa": "a positioning axis that the program does not wait for (POSA)",
+    "os": "an axis that oscillates (OS)",
+    "mov": "an axis that is started (MOV)",
+    "oscill": "an axis that oscillates (OSCILL)",
+}
+"""Names that with an axis as index, `OS[Z]=1`, let it move by itself."""
+
+DRILLING = frozenset({*(f"cycle{number}" for number in range(81, 90)), "cycle840"})
+"""Cycles whose first arguments are RTP, RFP, SDIS, DP, DPR and that drill where the axes stand."""
+
+_CYCLES = """
+    holes1 holes2 cycle801 cycle802 pocket1 pocket2 pocket3 pocket4 slot1 slot2 longhole cycle60 cycle61 cycle62
+    cycle63 cycle64 cycle70 cycle71 cycle72 cycle73 cycle74 cycle75 cycle76 cycle77 cycle78 cycle79 cycle90 cycle899
+    cycle92 cycle93 cycle94 cycle95 cycle96 cycle97 cycle98 cycle99 cycle930 cycle940 cycle951 cycle952
+    cycle971 cycle973 cycle976 cycle977 cycle978 cycle979 cycle982 cycle994 cycle995 cycle996 cycle997 cycle998
+"""
+MADE_BY_THE_CONTROL = frozenset(_CYCLES.split())
+"""Cycles whose motions the control makes up."""

@@ -1,0 +1,241 @@
+"""Where SINUMERIK programs lead, worked out by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import SourceError, UsageError
+from ncfix.program.moves import Rule
+from ncfix.program.setup import Setup, Tool
+from program.siemens.following import KNOWN, ZERO, follow
+from program.tracing import ends, last, reasons
+
+
+def xs(text: str, **given: object) -> list[float]:
+    """X of the ends of the motions."""
+    return [row[0] for row in ends(follow(text, **given))]  # type: ignore[arg-type]
+
+
+# -- words ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "end"),
+    [
+        ("G0X10Y-20.5Z.5", [10, -20.5, 0.5]),
+        ("G0 X=10 Y=-20.5", [10, -20.5, 0]),
+        ("G0 X10\nX=IC(5) Y=IC(-2)", [15, -2, 0]),
+        ("G91 G0 X10\nX5 Y=AC(3)", [15, 3, 0]),
+        ("R1=3 R2=R1*2\nG0 X=R1+R2 Y=POT(R1) Z=SQRT(16)", [9, 9, 4]),
+        ("DEF REAL DEEP=-2, WIDE\nG0 Z=DEEP X=WIDE Y=SIN(30)", [0, 0.5, -2]),
+        ("DEF INT NUM\nNUM=2.5\nG0 X=NUM", [3, 0, 0]),
+        ("R[1+1]=7\nG0 X=R2 Y=R[2]", [7, 7, 0]),
+        ("G700 G0 X1", [25.4, 0, 0]),
+        ("G70 G0 X1\nG71 X2", [2, 0, 0]),
+        ("DIAMON\nG0 X10", [5, 0, 0]),
+        ("G0 X10 ; X99\n;X98", [10, 0, 0]),
+    ],
+)
+def test_words(text: str, end: list[float]) -> None:
+    assert last(follow(text)) == pytest.approx(end)
+
+
+@pytest.mark.parametrize(
+    ("word", "angle"), [("DC(350)", -10), ("DC(10)", 10), ("ACP(350)", 350), ("ACN(10)", -350), ("IC(30)", 30)]
+)
+def test_rotary_axes_turn_as_they_are_told(word: str, angle: float) -> None:
+    assert last(follow(f"G0 C={word}", "XYZC"))[3] == pytest.approx(angle)
+
+
+def test_after_a_full_turn_angles_count_from_zero() -> None:
+    moves = follow("G0 C=DC(350)\nG0 C10", "XYZC").moves
+    assert math.degrees(moves.start[1, 3]) == pytest.approx(350)
+    assert math.degrees(moves.end[1, 3]) == pytest.approx(10)
+
+
+# -- control structures -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("R1=1\nIF R1==1\nG0 X1\nELSE\nG0 X2\nENDIF", [1]),
+        ("R1=2\nIF R1==1\nG0 X1\nELSE\nG0 X2\nENDIF\nG0 X3", [2, 3]),
+        ("R1=3\nWHILE R1>0\nG0 X=R1\nR1=R1-1\nENDWHILE", [3, 2, 1]),
+        ("FOR R1=1 TO 3\nG0 X=R1\nENDFOR\nG0 X9", [1, 2, 3, 9]),
+        ("R1=0\nREPEAT\nR1=R1+1\nG0 X=R1\nUNTIL R1>=2", [1, 2]),
+        ("R1=0\nLOOP\nR1=R1+1\nIF R1==3 GOTOF OUT\nG0 X=R1\nENDLOOP\nOUT: G0 X9", [1, 2, 9]),
+        ("GOTOF N30\nN20 G0 X2\nN30 G0 X3", [3]),
+        ("R1=2\nCASE R1 OF 1 GOTOF AA 2 GOTOF BB DEFAULT GOTOF CC\nAA: G0 X1\nBB: G0 X2\nCC: G0 X3", [2, 3]),
+        ("MARK: G91 G0 X1\nREPEATB MARK P=2\nG0 X10", [1, 2, 3, 13]),
+        ("G91\nAA: G0 X1\nBB: X2\nREPEAT AA BB P=2", [1, 3, 4, 6, 7, 9]),
+    ],
+)
+def test_control_structures(text: str, found: list[float]) -> None:
+    assert xs(text) == pytest.approx(found)
+
+
+def test_subprograms_take_arguments_and_give_results() -> None:
+    files = {"SUB1": "PROC SUB1(REAL WIDE, VAR REAL BACK)\nG0 X=WIDE\nBACK=WIDE*2\nM17\n"}
+    followed = follow("DEF REAL MINE\nSUB1(5,MINE)\nG0 X=MINE", files=files)
+    assert [row[0] for row in ends(followed)] == [5, 10]
+    assert followed.moves.rule.tolist() == [Rule.REFUSE, Rule.CORRECT]
+
+
+def test_subprograms_may_follow_in_the_text() -> None:
+    text = "%_N_A_MPF\nSUB1(7)\nL5 P2\nM30\n%_N_SUB1_SPF\nPROC SUB1(REAL WIDE)\nG0 X=WIDE\nRET\n"
+    followed = follow(text + "%_N_L5_SPF\nG91 G0 X1\nM17\n")
+    assert [row[0] for row in ends(followed)] == [7, 8, 9]
+    assert (followed.moves.rule == Rule.CORRECT).all()
+
+
+def test_save_brings_modal_codes_back() -> None:
+    files = {"SUB1": "PROC SUB1 SAVE\nG91\nM17", "SUB2": "PROC SUB2\nG91\nM17"}
+    assert xs("G0 X5\nSUB1\nG0 X1", files=files)[-1] == 1
+    assert xs("G0 X5\nSUB2\nG0 X1", files=files)[-1] == 6
+
+
+# -- what is known only at run time -----------------------------------------------------------------------------------
+
+
+def test_a_branch_decided_at_run_time_refuses_what_may_be_executed() -> None:
+    text = "G0 X0\nAGAIN: G0 X1\nG0 X2\nIF NOBODY_KNOWS==1 GOTOF OUT\nG0 X3\nGOTOB AGAIN\nOUT: G0 X4"
+    moves = follow(text).moves
+    refused = {int(block) for block in moves.block[moves.rule == Rule.REFUSE]}
+    assert refused == {1, 2, 4, 6}
+
+
+def test_a_variable_that_nobody_knows_makes_its_motions_refused() -> None:
+    followed = follow("G0 X=$AA_IW[X] Y1\nG0 X5")
+    assert followed.moves.rule.tolist() == [Rule.REFUSE, Rule.CORRECT]
+    assert "known only at run time" in reasons(followed)[0]
+
+
+def test_comparisons_without_brackets_are_not_guessed() -> None:
+    followed = follow("R1=1\nIF R1==1 AND R2==2\nG0 X1\nENDIF\nG0 X2")
+    assert (followed.moves.rule == Rule.REFUSE).all()
+
+
+def test_a_block_that_nobody_understands_refuses_what_follows() -> None:
+    followed = follow('G0 X1\nCGTECH_MACRO "x" 5\nG0 X2')
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE]
+    assert [message.code for message in followed.messages] == ["NCF250"]
+
+
+def test_a_cycle_that_nobody_knows_leaves_axes_anywhere() -> None:
+    followed = follow("G0 X1 Y1 Z1\nHEAD_CLEAN\nG0 X2\nG0 Y2 Z2\nG1 X3 F100")
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert [message.code for message in followed.messages] == ["NCF252"]
+
+
+# -- arcs -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "centre", "sweep", "end"),
+    [
+        ("G2 X10 Y0 I5 J0", (5, 0, 0), -180, (10, 0)),
+        ("G3 X10 Y0 I=AC(5) J=AC(0)", (5, 0, 0), 180, (10, 0)),
+        ("G2 X10 Y0 CR=5", (5, 0, 0), -180, (10, 0)),
+        ("G3 X10 Y0 CR=-10", (5, -8.660254, 0), 300, (10, 0)),
+        ("G3 I5 J0", (5, 0, 0), 360, (0, 0)),
+        ("G3 I5 J0 TURN=2", (5, 0, 0), 1080, (0, 0)),
+        ("G3 X10 AR=90", (5, 5, 0), 90, (10, 0)),
+        ("G3 I0 J5 AR=90", (0, 5, 0), 90, (5, 5)),
+        ("CIP X10 Y0 I1=5 J1=5", (5, 0, 0), 180, (10, 0)),
+        ("CIP X10 Y0 I1=5 J1=-5", (5, 0, 0), 180, (10, 0)),
+    ],
+)
+def test_arcs(text: str, centre: tuple[float, ...], sweep: float, end: tuple[float, ...]) -> None:
+    moves = follow("F100\n" + text).moves
+    assert moves.rule.tolist() == [Rule.CORRECT]
+    assert moves.centre[0] == pytest.approx(centre, abs=1e-6)
+    assert math.degrees(moves.sweep[0]) == pytest.approx(sweep)
+    assert moves.end[0, :2] == pytest.approx(end, abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["G2 X10 Y0 I4 J0", "G2 X10 Y0", "G2 X10 CR=4", "CIP X10 I1=5", "G3 X5 AR=400"])
+def test_impossible_arcs_are_errors(text: str) -> None:
+    with pytest.raises(SourceError) as caught:
+        follow("F100\n" + text)
+    assert caught.value.messages[0].code == "NCF220"
+
+
+def test_in_a_mirrored_frame_arcs_run_the_other_way() -> None:
+    moves = follow("MIRROR X0\nG3 X10 Y0 CR=5 F100").moves
+    turn = moves.sweep[0] * moves.normal[0, 2]
+    assert moves.end[0, 0] == pytest.approx(-10)
+    assert turn == pytest.approx(-math.pi)
+
+
+# -- frames -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "end"),
+    [
+        ("TRANS X10\nG0 X1", [11, 0]),
+        ("TRANS X10\nATRANS X5 Y1\nG0 X1 Y1", [16, 2]),
+        ("TRANS X10\nTRANS Y5\nG0 X1 Y1", [1, 6]),
+        ("TRANS X10\nTRANS\nG0 X1", [1, 0]),
+        ("ROT RPL=90\nG0 X1 Y0", [0, 1]),
+        ("ROT Z90\nG0 X1 Y0", [0, 1]),
+        ("TRANS X10\nAROT RPL=90\nG0 X1 Y0", [10, 1]),
+        ("ROT RPL=90\nATRANS X10\nG0 X1 Y0", [0, 11]),
+        ("SCALE X2 Y2 Z2\nG0 X1 Y1", [2, 2]),
+        ("MIRROR X0\nG0 X1 Y1", [-1, 1]),
+        ("G54 G0 X1 Y1", [101, 1]),
+        ("G54\nTRANS X10\nG0 X1 Y1", [111, 1]),
+        ("G505 G0 X1", [1, 0]),
+        ("G54\nG500 G0 X1 Y0", [1, 0]),
+        ("G54 G0 SUPA X1 Y0", [1, 0]),
+        ("G54\nG53 G0 X1 Y0", [1, 0]),
+        ("G54\nG153 G0 X1 Y0", [1, 0]),
+        ("G111 X5 Y5\nG0 AP=90 RP=2", [5, 7]),
+        ("G0 X5 Y5\nG110 X0 Y0\nG0 AP=0 RP=2", [7, 5]),
+    ],
+)
+def test_frames(text: str, end: list[float]) -> None:
+    offsets = {**KNOWN.work_offsets, "G54": {**ZERO, "X": 100.0}}
+    assert last(follow(text, work_offsets=offsets))[:2] == pytest.approx(end)
+
+
+def test_a_scale_that_differs_from_axis_to_axis_is_refused() -> None:
+    followed = follow("SCALE X2\nG0 X1\nSCALE\nG0 X1 Y1 Z1")
+    assert followed.moves.rule.tolist() == [Rule.REFUSE, Rule.CORRECT]
+
+
+def test_machine_coordinates_pass_and_keep_the_tool_length() -> None:
+    setup = Setup(work_offsets=KNOWN.work_offsets, tools={5: Tool(100.0)}, initial=ZERO)
+    followed = follow("T5 M6\nG54 G0 Z0\nSUPA Z0\nD0\nSUPA Z0", setup=setup)
+    assert [row[2] for row in ends(followed)] == [100, 100, 0]
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.PASS]
+
+
+def test_what_is_not_given_is_asked_for() -> None:
+    with pytest.raises(UsageError) as caught:
+        follow('T="DRILL 8.5" M6\nG54 G0 X1 Y1 Z1', setup=Setup(initial=ZERO))
+    texts = [message.text for message in caught.value.messages]
+    assert texts == ['length of tool "DRILL 8.5" is used and not given', "work offset G54 is used and not given"]
+
+
+def test_an_axis_that_the_machine_lacks_is_named() -> None:
+    with pytest.raises(UsageError, match="axis C1"):
+        follow("G0 X1 C1=DC(5)")
+
+
+def test_dwells_take_f_as_their_time() -> None:
+    moves = follow("G1 X1 F100\nG4 F3\nX2").moves
+    assert moves.feed[-1] == pytest.approx(100)
+
+
+def test_plain_blocks_go_through_the_fast_lane_with_the_same_result() -> None:
+    body = "".join(f"N{10 * i} G1 X{i * 0.5:.3f} Y{i * i * 0.01:.3f} F{1000 + i}\n" for i in range(60))
+    fast = follow("G54\n" + body).moves
+    slow = follow("G54\n" + body.replace(" F", " R1=1 F")).moves
+    assert np.array_equal(fast.end, slow.end)
+    assert np.array_equal(fast.feed, slow.feed)
+    assert np.array_equal(fast.programmed, slow.programmed)
