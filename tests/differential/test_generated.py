@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -15,8 +14,7 @@ from differential.errors import LETTERS, Machine
 from differential.generator import Generator
 from differential.judge import Terms, judge
 
-CASES = int(os.environ.get("NCFIX_GENERATED", "60"))
-SECONDS = 60.0 * max(1, CASES // 60)
+CASES = int(os.environ.get("NCFIX_GENERATED", "24"))
 SETUP = Controls(
     offsets={"G54": (12.0, -7.5, 20.0), "G55": (-30.0, 4.0, 11.0), "G56": (5.0, 5.0, 5.0)},
     references={"G28": (0.0, 0.0, 100.0), "G30": (10.0, 20.0, 120.0)},
@@ -35,10 +33,7 @@ def test_programs_made_up_at_random(
 ) -> None:
     found: Counter[str] = Counter()
     wrong: list[str] = []
-    end = time.monotonic() + SECONDS
     for seed in range(int(os.environ.get("NCFIX_SEED", "0")), CASES):
-        if time.monotonic() > end:
-            break
         name = MACHINES[seed % len(MACHINES)]
         model = machine(name)
         axes = "".join(LETTERS[column] for column in (*model.linear, *model.rotary))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import time
 from pathlib import Path
 
 import pytest
@@ -51,16 +50,6 @@ def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:
 def test_a_grammar_that_is_not_there_is_a_fault_of_who_names_it() -> None:
     with pytest.raises(FileNotFoundError, match=r"no grammar 'none\.lark'"):
         find_grammar("none.lark")
-
-
-@pytest.mark.parametrize("name", ["iso.lark", "linuxcnc.lark"])
-def test_a_parser_is_made_quickly(name: str) -> None:
-    """0.2 s is what a short program may wait for; processor time, as the machine may be busy."""
-    parser(name)
-    parser.cache_clear()
-    started = time.process_time()
-    parser(name)
-    assert time.process_time() - started < 0.2
 
 
 def test_a_parser_leaves_no_files(tmp_path: Path, root: Path) -> None:
