@@ -240,20 +240,13 @@ class _Emitter:
             self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
         for piece, centre in rendered.centres.items():
             self.centre[rows.start + piece] = frame.command_point(centre, self.moves.axes)
-        self.position = self._stay_where_unmoved(
-            self.end[rows.stop - 1], np.array(rendered.ends)[-1], target, self._before(row)
-        )
+        still = frame.still(np.array(rendered.ends)[-1] == target.start)
+        self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
         self._note_code(row, target.last_code)
         earlier = self.written.setdefault(block, rendered)
         if earlier is not rendered and earlier.text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
-
-    def _stay_where_unmoved(
-        self, command: FloatArray, program: FloatArray, target: Target, before: FloatArray
-    ) -> FloatArray:
-        """An axis that was not told to move stands exactly where it stood, free of the rounding of the frame maps."""
-        return np.where(program == target.start, before, command)
 
     def _target(self, row: int, rows: slice) -> Target:
         moves, pieces = self.moves, self.pieces

@@ -31,6 +31,17 @@ class FrameMap:
             values[..., self.spatial] = values[..., self.spatial] @ self.rotation
         return values / self.scale
 
+    def still(self, unmoved: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Axes that stand exactly where they stood, free of the rounding of these maps.
+
+        unmoved  (n_axes,) those that the program did not tell to move; in a rotated frame one of X Y Z moves them all
+        """
+        if not self.rotated or unmoved[self.spatial].all():
+            return unmoved
+        result = unmoved.copy()
+        result[self.spatial] = False
+        return result
+
     def command(self, program: FloatArray) -> FloatArray:
         """Command of program numbers."""
         values = program * self.scale
