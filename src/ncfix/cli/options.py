@@ -27,7 +27,7 @@ dialect_option = click.option("--dialect", metavar="NAME", help="The control's l
 table_option = click.option("-o", "--output", metavar="FILE", default=STREAM, help="Where to write the table (CSV).")
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
-SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc")
+SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".SPF", ".mpf", ".MPF")
 """Under what a subprogram's file may go besides its name."""
 
 

@@ -50,7 +50,7 @@ def number(text: str) -> float:
 def offset_values(name: str, text: str) -> dict[str, float]:
     """A work offset by axis letter: `0,0,-300`, or `X=..` where the option is written `G54=X0,Z-300`."""
     parts = [part.strip() for part in text.split(",")]
-    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?", name):
+    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)", name):
         raise ValueError(f"{name} is not a work offset")
     if all(AXIS.match(part.upper()) for part in parts):
         return {part[0].upper(): number(part[1:]) for part in parts}
@@ -61,8 +61,8 @@ def offset_values(name: str, text: str) -> dict[str, float]:
 
 def tool_values(name: str, text: str) -> tuple[float, ...]:
     """The length of a tool, and its radius if it is given."""
-    if not name.isdecimal():
-        raise ValueError(f"{name!r} is not a tool number")
+    if (len(name) < 2 and not name.isdecimal()) or re.fullmatch(r"T\d+", name):
+        raise ValueError(f"{name!r} is not a tool number, nor a name")
     values = tuple(map(number, text.split(",")))
     if len(values) > 2:
         raise ValueError("a length, and a radius if wanted")
@@ -150,11 +150,14 @@ class SetupOptions:
         tools = dict(setup.tools)
         if self.tool_table:
             tools |= load_tool_table(self.tool_table)
-        tools |= {int(key): Tool(*values) for key, values in self.tools}
+        given = {key.strip('"'): Tool(*values) for key, values in self.tools}
+        tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
+        named = {key: tool for key, tool in given.items() if not key.isdecimal()}
         return replace(
             setup,
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
             tools=tools,
+            named_tools={**setup.named_tools, **named},
             initial={**setup.initial, **(self.initial or {})},
             inputs={**setup.inputs, **dict(self.inputs)},
             no_point=self.no_point or setup.no_point,

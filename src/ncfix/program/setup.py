@@ -40,9 +40,10 @@ class Setup:
 
     work_offsets      "G54" -> values for the axes in the order X Y Z A B C, or by axis letter
     tools             tool number -> `Tool`; tool 0 is what is in the spindle when the program starts
+    named_tools       tools that are called by name, in upper case; a further cutting edge has its D number after it
     initial           axis letter -> start position, machine axes, mm or degree
     references        "G28" | "G30" -> axis letter -> machine position
-    variables         "#100" or "#<name>" -> value
+    variables         "#100", "#<name>", "R1" or "NAME" -> value
     inputs            what the errors of the machine depend on besides its axes: "temp_spindle" -> 24.5
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     tcp               X Y Z are tool-tip coordinates from the start of the program
@@ -63,3 +64,4 @@ class Setup:
     assume_zero: bool = False
     block_skip: bool = False
     no_point: str = ""
+    named_tools: Mapping[str, Tool] = field(default_factory=dict)

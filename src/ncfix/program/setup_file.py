@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -23,7 +24,14 @@ NOT_TOML = "NCF381"
 UNKNOWN_KEY = "NCF382"
 WRONG_VALUE = "NCF383"
 
-SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+SYSTEM = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P\d+|G500|G5(?:0[5-9]|[1-9]\d)")
+"""Names of work offsets: G54 to G59.3, G54.1 P1 and so on, and those of SINUMERIK: G500, G505 to G599."""
+
+VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
+"""Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""
+
+TOOL = re.compile(r"\d+|(?!T\d+$).{2,}")
+"""A tool is called by its number or by a name."""
 
 
 def load(path: str) -> Setup:
@@ -43,7 +51,11 @@ def loads(text: str, path: str = "<setup>") -> Setup:
     values = {key: reading.entry(key, value) for key, value in content.items()}
     if reading.faults:
         raise ConfigError.collected(reading.faults)
-    return Setup(**{key: value for key, value in values.items() if key != "ncfix"})
+    tools: dict[str, Tool] = values.pop("tools", {})
+    numbered = {int(name): tool for name, tool in tools.items() if name.isdigit()}
+    named = {name: tool for name, tool in tools.items() if not name.isdigit()}
+    rest = {key: value for key, value in values.items() if key != "ncfix"}
+    return Setup(tools=numbered, named_tools=named, **rest)
 
 
 @dataclass(slots=True)
@@ -134,7 +146,7 @@ class Reading:
     def offset(self, key: str, value: Any) -> dict[str, float]:
         """A work offset: numbers in the order X Y Z A B C, or a table by axis letter."""
         name = key.partition(".")[2]
-        if name not in SYSTEMS and not name.startswith("G54.1P"):
+        if not SYSTEM.fullmatch(name):
             self.fault(UNKNOWN_KEY, key, "no work offset", "they are G54 ... G59.3, and G54.1P1 ...")
         if isinstance(value, list):
             if not 1 <= len(value) <= len(OFFSET_AXES):
@@ -149,26 +161,24 @@ class Reading:
         return self.position(key, value)
 
     def variable(self, key: str, value: Any) -> float:
-        """The value of a parameter, `"#100"` or `"#<name>"`."""
-        name = key.partition(".")[2]
-        if not name.startswith("#") or not (name[1:].isdigit() or (name.startswith("#<") and name.endswith(">"))):
+        """The value of a parameter or variable, `"#100"`, `"#<name>"`, `R1`, `NAME`."""
+        if not VARIABLE.fullmatch(key.partition(".")[2]):
             self.fault(UNKNOWN_KEY, key, "no parameter", 'they are written "#100" or "#<name>"')
         return self.number(key, value)
 
-    def tools(self, key: str, value: Any) -> dict[int, Tool]:
-        """Tools by number."""
+    def tools(self, key: str, value: Any) -> dict[str, Tool]:
+        """Tools by number, or by name."""
         if not isinstance(value, Mapping):
             self.fault(WRONG_VALUE, key, "expected a table like 12 = { length = 120.0 }")
             return {}
-        return {
-            int(name): self.tool(f"{key}.{name}", part) for name, part in value.items() if self.is_number(key, name)
-        }
+        called = {name: self.tool(f"{key}.{name}", part) for name, part in value.items() if self.is_tool(key, name)}
+        return {name.strip().upper(): tool for name, tool in called.items()}
 
-    def is_number(self, key: str, name: str) -> bool:
-        """Whether a key is a tool number."""
-        if not name.isdigit():
+    def is_tool(self, key: str, name: str) -> bool:
+        """Whether a key can be what a tool is called."""
+        if not TOOL.match(name):
             self.fault(UNKNOWN_KEY, f"{key}.{name}", "no tool number")
-        return name.isdigit()
+        return TOOL.match(name) is not None
 
     def tool(self, key: str, value: Any) -> Tool:
         """Length and radius of a tool; a plain number is the length."""

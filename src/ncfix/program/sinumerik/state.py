@@ -87,7 +87,7 @@ class Named:
 
     def name(self, number: int) -> str:
         """How people call a tool."""
-        return next((f'"{name}"' for name, known in self.numbers.items() if known == number), str(number))
+        return next((name for name, known in self.numbers.items() if known == number), str(number))
 
 
 class Sinumerik(Control):
@@ -273,12 +273,28 @@ class Sinumerik(Control):
 
     def length_of(self, number: int, edge: int) -> float:
         """The length of a tool for its cutting edge, mm; zero if it is lacking."""
-        known = self.knowledge.known_tool_length(number)
         if number == 0:
             return 0.0
-        if known is not None and edge == 1:
-            return known
+        name = self.named.name(number) if edge == 1 else f"{self.named.name(number)} D{edge}"
+        known = self.given_length(number, edge)
+        if known is None:
+            self.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')
+            return 0.0
+        return known
+
+    def given_length(self, number: int, edge: int = 1) -> float | None:
+        """The length of a tool, mm, if the setup gives it."""
+        tools = self.setup.named_tools
         name = self.named.name(number)
-        what = f"length of tool {name}" if edge == 1 else f"length of tool {name}, edge D{edge}"
-        self.knowledge.lack("NCF202", what, "is used", f"--tool {name}=LENGTH")
-        return 0.0
+        if edge != 1:
+            tool = tools.get(f"{name} D{edge}".upper())
+        else:
+            tool = tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
+        return None if tool is None else tool.length
+
+    def tool_length(self) -> tuple[int, float]:
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        if self.tools.offset is not None:
+            return self.tools.offset, self.offsets.tool[2]
+        known = self.given_length(self.tools.spindle)
+        return self.tools.spindle, math.nan if known is None else known
