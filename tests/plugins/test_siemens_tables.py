@@ -7,12 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ncfix_siemens.cec import Style, cec_text, read_cec
-from ncfix_siemens.combine import TERMS, Reading, compensation
-from ncfix_siemens.eec import read_eec
-from ncfix_siemens.probe import READINGS
-from ncfix_siemens.syntax import Assignment, assignments, parsed, written
-from ncfix_siemens.table import Table
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine
@@ -22,6 +16,12 @@ from ncfix.tables.export import Exported, export
 from ncfix.tables.lines import Remarks
 from ncfix.tables.poses import ranges_of
 from ncfix.testing import check_control, single_error
+from ncfix_siemens.cec import Style, cec_text, read_cec
+from ncfix_siemens.combine import TERMS, Reading, compensation
+from ncfix_siemens.eec import read_eec
+from ncfix_siemens.probe import READINGS
+from ncfix_siemens.syntax import Assignment, assignments, parsed, written
+from ncfix_siemens.table import Table
 
 CONTROL = get_control("siemens")
 HEAD = b"""%_N_NC_CEC_INI
@@ -352,7 +352,7 @@ def test_good_files_are_not_remarked_on(content: bytes) -> None:
 
 def test_a_file_that_lists_each_table_only_once() -> None:
     """`axes` may be bare or in brackets; METRIC and comments do no harm; the order of lines is free."""
-    lines = [line for line in ONE.splitlines(keepends=True)[::-1]]
+    lines = list(ONE.splitlines(keepends=True)[::-1])
     mixed = HEAD + b"METRIC\n; anything\n\n" + b"".join(lines).replace(b"(AX2)", b"AX2 ; base") + b"M17 ; end\n"
     assert not CONTROL.lint({"a.INI": mixed})
     assert at({"a.INI": mixed}, Y=-75)[0] == pytest.approx(-0.002)

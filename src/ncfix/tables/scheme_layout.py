@@ -70,14 +70,16 @@ class Layout:
 
 
 def tables_of(layouts: Sequence[Layout]) -> int:
-    """How many tables it takes to correct one axis: that without direction, and those for the ways of axes.
+    """How many tables absorbed layouts take to correct one axis: that without direction, and those for ways of axes.
 
-    What changes with the way takes a table for either way; a sum shares the pair with the table that is there anyway.
+    A constant without sums is a table, too. What changes with the way takes a table for either way; a sum shares the
+    pair with the table that is there anyway.
     """
     plain = {axis for layout in layouts if layout.way is None for axis in layout.sums}
     count = 0
     for layout in layouts:
         both = 1 if layout.way is None else 2
+        count += int(layout.constant != 0.0)
         count += sum(1 if layout.way is None or axis in plain else 2 for axis in layout.sums)
         count += sum(1 + both * len(star.leaves) for star in layout.stars)
     return count
@@ -141,7 +143,7 @@ def _shares(part: Product, axis: int, centres: Sequence[Array], tolerance: float
 def absorbed(layout: Layout, tolerance: float) -> Layout:
     """The same function with fewer tables: sums hidden in the factors of products, where they are multiples of them.
 
-    The values may be those at the nodes or at any other positions. The constant ends up in a sum.
+    The values may be those at the nodes or at any other positions. The constant goes into a sum, if there is one.
     """
     sums, stars, constant = dict(layout.sums), list(layout.stars), layout.constant
     if layout.way is None:
@@ -150,14 +152,12 @@ def absorbed(layout: Layout, tolerance: float) -> Layout:
         for axis in layout.sums:
             if axis in sums:
                 constant = _hide_in_centres(sums, stars, constant, axis, tolerance)
-        if sums or abs(constant) > tolerance:
-            home = min(sums, default=_any_axis(layout))
-            sums[home] = sums.get(home, np.zeros(1)) + constant
-    return Layout(dict(sorted(sums.items())), tuple(stars), layout.way)
-
-
-def _any_axis(layout: Layout) -> int:
-    return min(layout.axes, default=0)
+        if sums:
+            home = min(sums)
+            sums[home], constant = sums[home] + constant, 0.0
+        elif abs(constant) <= tolerance:
+            constant = 0.0
+    return Layout(dict(sorted(sums.items())), tuple(stars), layout.way, constant)
 
 
 def _hide_in_leaves(sums: dict[int, Array], stars: list[Star], constant: float, axis: int, tolerance: float) -> float:

@@ -112,7 +112,7 @@ class Selection:
 
 def needed(output: int, layouts: Sequence[Layout], free: frozenset[int]) -> int:
     """How many tables these layouts of an axis take, without that over the axis itself if that is free."""
-    ways = {layout.way for layout in layouts if output in layout.sums}
+    ways = {layout.way for layout in layouts if output in layout.sums or layout.constant}
     return tables_of(layouts) - int(output in free and ways == {None})
 
 

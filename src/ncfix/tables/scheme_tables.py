@@ -89,7 +89,10 @@ class Stage:
 
     def _sums(self, output: int, layouts: Sequence[Layout], limit: float, points: int) -> Iterator[Term]:
         """A table for each axis, or one for either way; what changes with the way is joined to what does not."""
-        plain = next((layout.sums for layout in layouts if layout.way is None), {})
+        plain: dict[int, Array] = {}
+        for layout in layouts:
+            if layout.way is None:
+                plain = {**layout.sums} if layout.sums or not layout.constant else {output: np.full(1, layout.constant)}
         turned = {way: layout.sums[way] for layout in layouts if (way := layout.way) is not None and way in layout.sums}
         for axis in sorted({*plain, *turned}):
             mean = plain.get(axis, np.zeros(1))
