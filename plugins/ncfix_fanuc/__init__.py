@@ -42,7 +42,7 @@ HAAS = replace(
     title="Haas (mill)",
     suffixes=(),
     signature=(
-        rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:187|154[ \t]*P\d|150|47[ \t]*P|103[ \t]*P)(?!\d)",
+        rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:(?:187|150)(?!\d)|154[ \t]*P|47[ \t]*[PE]|103[ \t]*P)",
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*97[ \t]*P",
     ),
     semantics="haas",

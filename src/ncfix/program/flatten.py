@@ -86,7 +86,8 @@ def flatten(
 ) -> Flat:
     """Write a program out flat; arguments as of `trace` and `Unroll`.
 
-    Raises RefusedError NCF237 and NCF238 where `Unroll` does, NCF239 if the language cannot, or if the flat program would not make the same motions.
+    Raises RefusedError NCF237 and NCF238 where `Unroll` does, NCF239 if the language cannot, or if the flat program
+    would not make the same motions.
     """
     unroll = language_of(program.dialect).unroll
     if unroll is None:

@@ -5,9 +5,10 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 
 from __future__ import annotations
 
+from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS
+from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
 from ncfix.program.rs274.systems import (
     SYSTEM_NAMES,
     activate,
@@ -19,6 +20,7 @@ from ncfix.program.rs274.systems import (
 )
 
 WORK_OFFSETS = 6
+AFTER_ENGRAVING = "where the axis {} stands after engraving (G47) is not followed"
 LENGTHS = (10,)
 UNFOLLOWED = {
     11: "tool wear (G10 L11)",
@@ -38,6 +40,12 @@ def nothing(control: Control, block: Block, code: int) -> None:
 def extended(control: Control, block: Block, code: int) -> None:
     """G154 Pn of Haas: an additional work offset."""
     extended_system(control, block)
+
+
+def engrave(control: Control, block: Block, code: int) -> None:
+    """G47 of Haas: the control writes a text by itself."""
+    unknown = dict(control.unknown) | {i: AFTER_ENGRAVING for i in (X, Y, Z) if i in control.machine}
+    control.move(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal="engraving of text (G47)")
 
 
 def set_data(control: Control, block: Block, code: int) -> None:

@@ -79,8 +79,13 @@ FANUC = Rules(
     compiled=compiled,
 )
 
-HAAS = replace(FANUC, g_groups=FANUC_G | {1540: groups.SYSTEM}, steps={**FANUC.steps, 1540: data.extended})
-"""Haas has its additional work offsets under G154 Pn; they are G54.1Pn in the setup."""
+HAAS = replace(
+    FANUC,
+    g_groups=FANUC_G | {1540: groups.SYSTEM, 470: groups.NON_MODAL},
+    steps={**FANUC.steps, 1540: data.extended, 470: data.engrave},
+    takes=FANUC.takes | {470},
+)
+"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), and engraves texts."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS}
 """By `Dialect.semantics`."""

@@ -15,6 +15,7 @@ BAD_MOTION = "NCF221"
 MACHINE_COORDINATES = "machine coordinates (G53)"
 REFERENCE_POINT = "reference point ({})"
 PROBING = "probing"
+AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
 AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
@@ -48,7 +49,7 @@ def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
     """G53 with G0 or G1."""
     if code not in (0, 10):
         raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
-    if control.modal.incremental:
+    if control.modal.incremental and control.rules.strict:
         raise Fault(BAD_MOTION, "G53 cannot be used with incremental coordinates (G91)")
     if code:
         check_feed(control, block)
@@ -57,6 +58,8 @@ def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
         target, unknown = machine_destination(control, block)
         kind = Kind.FEED if code else Kind.RAPID
         control.move(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES)
+        if control.modal.incremental:
+            control.lose([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
 
 def one_way(control: Control, block: Block, code: int) -> None:
