@@ -21,6 +21,12 @@ PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
 PROGRAM = "G21 G90 G94\nG1 X1 Y2 F100\nM2\n"
 
 
+def packages() -> set[str]:
+    """The import packages that the project says that it brings."""
+    project = tomllib.loads((Path(__file__).resolve().parents[1] / "pyproject.toml").read_text())
+    return {path.split("/")[-1] for path in project["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]}
+
+
 def build(source: Path, folder: Path) -> Path:
     """The wheel of a source tree or sdist."""
     command = [*PIP, "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", str(folder), str(source)]
@@ -47,7 +53,7 @@ def run(arguments: list[str], cwd: Path, *path: Path) -> Any:
 
 def origin(cwd: Path, *path: Path) -> list[Path]:
     """Where ncfix and its built-in plugins come from."""
-    names = ["ncfix", "ncfix_fanuc", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc"]
+    names = sorted(packages())
     script = "import sys, importlib; print(*(importlib.import_module(name).__file__ for name in sys.argv[1:]))"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, path))}
     command = [sys.executable, "-c", script, *names]
@@ -69,8 +75,7 @@ def test_the_wheel_holds_the_packages_and_the_grammars_and_nothing_else(root: Pa
     assert wheel.name == f"ncfix-{__version__}-py3-none-any.whl"
     names = zipfile.ZipFile(wheel).namelist()
     tops = {name.split("/")[0] for name in names}
-    packages = {"ncfix", "ncfix_fanuc", "ncfix_gcode", "ncfix_isg", "ncfix_linuxcnc"}
-    assert tops == packages | {f"ncfix-{__version__}.dist-info"}
+    assert tops == packages() | {f"ncfix-{__version__}.dist-info"}
     grammars = {f"ncfix/grammars/{path.name}" for path in (root / "grammars").glob("*.lark")}
     assert grammars
     assert {name for name in names if "/grammars/" in name} == grammars
