@@ -19,8 +19,8 @@ format:
 	$(PYTHON) -m ruff format .
 	$(PYTHON) -m ruff check --fix .
 
-accuracy:        ## work out docs/accuracy.md (half an hour)
-	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py
+accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." of it
+	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py $(STUDIES)
 
 hidden:          ## the hidden-effect benchmark into docs/accuracy.md (an hour); FINAL=1 for the final seeds
 	$(PYTHON) -m tests.hidden --command $(dir $(PYTHON))ncfix $(if $(FINAL),--final) --table docs/accuracy.md

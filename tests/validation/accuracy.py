@@ -47,7 +47,7 @@ def plans(options: argparse.Namespace) -> str:
 
 def controls(options: argparse.Namespace) -> str:
     """Esmaeili's headline reductions, in simulation: two minutes."""
-    from validation import esmaeili as study
+    from validation import esmaeili_reductions as study
 
     return study.table()
 

@@ -73,6 +73,7 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
     from ncfix.measure.residuals import residuals, rms_by_set
 
     diagnosis = residuals(found.problem, found.estimate)
+    bars = {"ball_bar": rows} if (rows := _ball_bars(found)) else {}
     sigma, covariance = found.sigma, found.covariance
     return {
         "parameters": [
@@ -88,8 +89,19 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
         "condition": found.estimate.solution.condition,
         "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
         "largest_cook": float(diagnosis.cook.max(initial=0.0)),
+        **bars,
         "remarks": [message.as_dict() for message in found.remarks],
     }
+
+
+def _ball_bars(found: Calibration) -> list[dict[str, Any]]:
+    """What ball-bar tests say by themselves, um."""
+    from dataclasses import asdict
+
+    from ncfix.measure.ball_bar import figures
+
+    seen = (each.measurement for each in found.problem.observations)
+    return [asdict(each) for measurement in seen for each in figures(measurement, found.problem.machine)]
 
 
 def _set_up(found: Calibration) -> dict[str, float]:
@@ -106,7 +118,21 @@ def _print(found: Calibration) -> None:
         known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
         rows.append((label, f"{factor * value:.4g}", known, unit))
     console.table(("coefficient", "value", "sigma", "unit"), rows)
+    for bar in _ball_bars(found):
+        _say_bar(bar)
     console.say(
         f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
         f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
     )
+
+
+def _say_bar(bar: dict[str, Any]) -> None:
+    centre = ", ".join(f"{value:.1f}" for value in bar["centre"])
+    text = (
+        f"ball-bar set {bar['name']}: size {bar['size']:+.1f} um, form {bar['form']:.1f} um, centre off by {centre} um"
+    )
+    circle = bar["circle"]
+    if circle:
+        names = {"G(b)": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
+        text += "; ISO 230-4: " + ", ".join(f"{name} {circle[key]:.1f}" for name, key in names.items())
+    console.say(text)
