@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 @dialect_option
 @setup_options
 @click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
+@click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
 @json_option
 def fix(
@@ -95,9 +96,8 @@ class Job:
     def outcome(self, target: Target) -> Outcome:
         """Fix one program and say what came of it; an error ends this program only."""
         try:
-            with console.busy(f"fixing {shown(target.source)}"):
-                with self.fixed(target) as fixed:
-                    return _written(fixed, target, self.options.allow_refused)
+            with console.busy(f"fixing {shown(target.source)}"), self.fixed(target) as fixed:
+                return _written(fixed, target, self.options.allow_refused)
         except NcfixError as error:
             console.tell(*error.messages)
             entry = {"path": shown(target.source), "output": None}
@@ -108,8 +108,8 @@ class Job:
         """The corrected program; a long one is corrected while it is read, if it can be."""
         with source_of(target.source) as source:
             head = source.looked_into()
-            if len(head) < LONG:
-                yield self._whole(source, head)
+            if len(head) < LONG or self.options.flatten:
+                yield self._whole(source, head if len(head) < LONG else source.everything())
                 return
             dialect = dialect_of(head, shown(target.source), self.dialect, self.machine)
             with self._outlet(source, target, dialect) as (stream, outlet):
@@ -117,11 +117,13 @@ class Job:
 
     def _whole(self, source: Source, text: bytes) -> Fixed:
         from ncfix.compensate.fix import fix_program
+        from ncfix.compensate.flat import fix_flat
         from ncfix.program.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        fixed = fix_program(program, self.machine, self.setup, self.options, resolve=subprograms(source.path))
+        fix = fix_flat if self.options.flatten else fix_program
+        fixed = fix(program, self.machine, self.setup, self.options, resolve=subprograms(source.path))
         return Fixed(fixed.text, fixed.changed, fixed.report)
 
     @contextmanager

@@ -134,4 +134,10 @@ CODES = {
         "what comes before it: a refusal that reaches far back, or frames that are set where the machine stands.",
         "give the program as a file; then it is looked at as a whole before anything is written",
     ),
+    "NCF445": Code(
+        "Program written out flat",
+        "With --flatten every block is written as often as it is executed, because some of them need another correction "
+        "each time. Loops, subprogram calls and expressions are gone from the program that is written.",
+        "Keep the original: changes are better made there.",
+    ),
 }

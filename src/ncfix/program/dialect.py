@@ -35,6 +35,9 @@ class Dialect:
     needs_end           the control wants M2/M30 or `%` at the end
     feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
                         "all" (of all axes together), or "" where that differs from control to control
+    understands         what is followed and corrected, a short sentence each; for `ncfix dialects NAME`
+    passes              what is left as it is, by rule
+    refuses             what cannot be corrected, and is named with its line
     language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
     semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
                         refuses is an error) or "iso" (codes that cannot move anything are passed over)
@@ -53,5 +56,8 @@ class Dialect:
     block_skip_executed: bool = True
     needs_end: bool = False
     feed_of: str = ""
+    understands: tuple[str, ...] = ()
+    passes: tuple[str, ...] = ()
+    refuses: tuple[str, ...] = ()
     language: str = "ncfix.program.rs274.language:RS274"
     semantics: str = "iso"
