@@ -75,12 +75,12 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None)
 
 
 def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
-    """The dialect of that name, else of the machine's control, else what the beginning of a program looks like."""
+    """The dialect of that name, else what the beginning of a program shows, else that of the machine's control."""
     from ncfix.program import dialects
 
-    if name is None and machine is not None and machine.control in dialects.names():
-        name = machine.control
-    return dialects.detect(head, path) if name is None else dialects.get(name)
+    if name is not None:
+        return dialects.get(name)
+    return dialects.detect(head, path, "" if machine is None else machine.control)
 
 
 def subprograms(path: str) -> Callable[[str], bytes | None]:

@@ -136,8 +136,8 @@ CODES = {
     ),
     "NCF445": Code(
         "Program written out flat",
-        "With --flatten every block is written as often as it is executed, because some of them need another correction "
-        "each time. Loops, subprogram calls and expressions are gone from the program that is written.",
+        "With --flatten every block is written as often as it is executed, for some need another correction each time. "
+        "Loops, subprogram calls and expressions are gone from the program that is written.",
         "Keep the original: changes are better made there.",
     ),
 }

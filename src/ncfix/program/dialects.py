@@ -32,13 +32,15 @@ def get(name: str) -> Dialect:
     return known[name]
 
 
-def detect(source: bytes, path: str) -> Dialect:
-    """The dialect of a text: by its content, else by its file suffix, else plain ISO code."""
+def detect(source: bytes, path: str, control: str = "") -> Dialect:
+    """The dialect of a text: by its content, else that of the machine's control, else by its file suffix, else ISO."""
     known: dict[str, Dialect] = registry("dialects")
     head = source[:PROBE_BYTES]
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
     if ranks:
         return known[min(ranks, key=lambda name: (ranks[name], name))]
+    if control in known:
+        return known[control]
     suffix = PurePath(path).suffix.lower()
     by_suffix = [name for name, dialect in sorted(known.items()) if suffix in dialect.suffixes]
     return known[by_suffix[0]] if by_suffix else get(DEFAULT)
