@@ -24,9 +24,11 @@ FloatArray = NDArray[np.float64]
 
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
 LENGTH = 100.0
-STEP = 1e-6
-STARTS = np.radians(np.arange(-180.0, 180.0, 60.0))
-ITERATIONS = 30
+THIRDS = 2 * np.pi * np.arange(3) / 3
+STARTS = np.radians(np.arange(-180.0, 180.0, 30.0))
+ITERATIONS = 40
+STRIDE = 0.5
+"""Angles (rad) change by no more than this in a step."""
 SOLVED = 1e-9
 SAME = 1e-5
 
@@ -47,59 +49,89 @@ class Squared:
 
 def turned_square(control: MacroControl) -> Squared | None:
     """The nearest rotary positions with the tool along Z of the frame in force; None if it cannot be known."""
-    if control.kinematics is None or control.unknown.keys() & set(control.machine):
+    machine = control.machine
+    if control.kinematics is None or control.unknown.keys() & set(machine) or not {X, Y, Z} <= set(machine):
         return None
-    wanted = np.array([row[2] for row in control.rotation])
-    tool = control.offsets.tool[Z]
-    on, off = TcpState(True, tool), TcpState(False, tool)
-    here = np.array(control.kinematics([control.position[i] for i in control.machine], on, off))
-    turning = [column for column, index in enumerate(control.machine) if control.rotary[index]]
-    ways = solutions(control.kinematics, here, turning, wanted)
-    if not ways:
+    on, off = TcpState(True, control.offsets.tool[Z]), TcpState(False, control.offsets.tool[Z])
+    here = np.array(control.kinematics([control.position[i] for i in machine], on, off))
+    turning = [column for column, index in enumerate(machine) if control.rotary[index]]
+    pointing = Pointing.of(control.kinematics, here, turning, [machine.index(index) for index in (X, Y, Z)])
+    ways = solutions(pointing, np.array([row[2] for row in control.rotation]), here[turning])
+    if not len(ways):
         return None
-    best = min(ways, key=lambda angles: float(np.abs(wrapped(angles - here[turning])).sum()))
+    best = ways[np.argmin(np.abs(wrapped(ways - here[turning])).sum(axis=1))]
     here[turning] += wrapped(best - here[turning])
-    command = control.kinematics(here.tolist(), off, on)
     position = control.position[:]
-    for index, value in zip(control.machine, command, strict=True):
+    for index, value in zip(machine, control.kinematics(here.tolist(), off, on), strict=True):
         position[index] = value
     return Squared(position, tuple(value / DEGREE for value in position), len(ways) > 1)
 
 
-def solutions(kinematics: Kinematics, here: FloatArray, turning: Sequence[int], wanted: FloatArray) -> list[FloatArray]:
-    """All rotary positions (rad, within a turn) that point the tool along `wanted` (3,)."""
-    found: list[FloatArray] = []
-    for start in product(STARTS, repeat=len(turning)):
-        angles = newton(kinematics, here, turning, wanted, np.array(start))
-        if angles is not None and all(np.abs(wrapped(angles - other)).max() > SAME for other in found):
-            found.append(wrapped(angles))
-    return found
+@dataclass(frozen=True, slots=True)
+class Pointing:
+    """The unit vector from the tip towards the spindle in the workpiece, as a function of k rotary positions.
+
+    Each rotary axis turns it about a line, so that it is a polynomial of first degree in cosine and sine of each angle:
+    3^k poses determine it.
+
+    coefficients  (3, ..., 3, 3) by 1, cos, sin of each angle; the last axis is X Y Z
+    """
+
+    coefficients: FloatArray
+
+    @classmethod
+    def of(cls, kinematics: Kinematics, here: FloatArray, turning: Sequence[int], spatial: Sequence[int]) -> Pointing:
+        """From a machine's kinematics; `turning` and `spatial` are the columns of rotary axes and of X Y Z."""
+        count = len(turning)
+        sampled = np.empty((3,) * count + (3,))
+        for place in product(range(3), repeat=count):
+            command = here.copy()
+            command[list(turning)] = THIRDS[list(place)]
+            sampled[place] = direction(kinematics, command, spatial)
+        inverse = np.linalg.inv(basis(THIRDS))
+        for axis in range(count):
+            sampled = np.moveaxis(np.tensordot(inverse, sampled, (1, axis)), 0, axis)
+        return cls(sampled)
+
+    def at(self, angles: FloatArray) -> FloatArray:
+        """The vectors for angles (m, k) in rad, (m, 3)."""
+        terms = np.broadcast_to(self.coefficients, (len(angles), *self.coefficients.shape))
+        for column in angles.T:
+            terms = np.einsum("mb,mb...->m...", basis(column), terms)
+        return np.asarray(terms)
 
 
-def newton(
-    kinematics: Kinematics, here: FloatArray, turning: Sequence[int], wanted: FloatArray, angles: FloatArray
-) -> FloatArray | None:
-    """The rotary positions that a start leads to; None if it leads nowhere."""
-    for _ in range(ITERATIONS):
-        residual = direction(kinematics, here, turning, angles) - wanted
-        if np.abs(residual).max() < SOLVED:
-            return angles
-        slopes = [
-            (direction(kinematics, here, turning, angles + STEP * unit) - wanted - residual) / STEP
-            for unit in np.eye(len(angles))
-        ]
-        step = np.linalg.lstsq(np.stack(slopes, axis=1), -residual, rcond=1e-6)[0]
-        angles = angles + np.clip(step, -0.5, 0.5)
-    return None
+def basis(angles: FloatArray) -> FloatArray:
+    """1, cosine and sine of angles (m,), (m, 3)."""
+    return np.stack((np.ones_like(angles), np.cos(angles), np.sin(angles)), axis=-1)
 
 
-def direction(kinematics: Kinematics, here: FloatArray, turning: Sequence[int], angles: FloatArray) -> FloatArray:
-    """The unit vector from the tip towards the spindle in the workpiece, (3,), with the rotary axes at `angles`."""
-    command = here.copy()
-    command[list(turning)] = angles
+def direction(kinematics: Kinematics, command: FloatArray, spatial: Sequence[int]) -> FloatArray:
+    """The unit vector from the tip towards the spindle at axis positions: by the tips of two tool lengths."""
     values = command.tolist()
     tips = [np.array(kinematics(values, TcpState(False, length), TcpState(True, length))) for length in (LENGTH, 0.0)]
-    return np.asarray((tips[1] - tips[0])[[X, Y, Z]] / LENGTH)
+    return np.asarray((tips[1] - tips[0])[list(spatial)] / LENGTH)
+
+
+def solutions(pointing: Pointing, wanted: FloatArray, here: FloatArray) -> FloatArray:
+    """All rotary positions (rad, within a turn) that point the tool along `wanted` (3,): (m, k).
+
+    Where an axis may stand anywhere (the tool along it), one of them is that nearest to `here` (k,).
+    """
+    count = pointing.coefficients.ndim - 1
+    angles = np.array([tuple(here), *product(STARTS, repeat=count)])
+    for _ in range(ITERATIONS):
+        residual = pointing.at(angles) - wanted
+        slopes = np.stack([pointing.at(angles + quarter) for quarter in np.eye(count) * np.pi / 2], axis=-1)
+        halves = np.stack([pointing.at(angles - quarter) for quarter in np.eye(count) * np.pi / 2], axis=-1)
+        step = np.linalg.pinv((slopes - halves) / 2, rcond=1e-9) @ -residual[..., None]
+        angles = angles + np.clip(step[..., 0], -STRIDE, STRIDE)
+    solved = angles[np.abs(pointing.at(angles) - wanted).max(axis=1) < SOLVED]
+    found: list[FloatArray] = []
+    for each in wrapped(solved):
+        if all(np.abs(wrapped(each - other)).max() > SAME for other in found):
+            found.append(each)
+    return np.array(found).reshape(-1, count)
 
 
 def wrapped(angles: FloatArray) -> FloatArray:
