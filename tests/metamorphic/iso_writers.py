@@ -1,0 +1,162 @@
+"""Routes as programs of the RS274 and Fanuc families."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from metamorphic.harness import LENGTH, SETUP, Route, Step
+from ncfix.compensate.following import placed
+from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.machine import Machine
+
+HEAD = "G21 G17 G40 G49 G80 G90 G94\nG54\n"
+TAIL = "M30\n"
+
+
+def words(step: Step, before: Step, rotary: bool = False, places: int = 3) -> str:
+    """The coordinates of a step."""
+    text = f"X{step.x:.{places}f} Y{step.y:.{places}f} Z{step.z:.{places}f}"
+    if rotary:
+        text += f" A{step.a:.3f} C{step.c:.3f}"
+    if step.code > 1:
+        text += f" I{step.centre[0] - before.x:.{places}f} J{step.centre[1] - before.y:.{places}f}"
+    return text
+
+
+def full(path: Route) -> str:
+    """Every word in every block."""
+    lines = [f"G{path[0].code} {words(path[0], path[0])} F500."]
+    lines += [f"G{step.code} {words(step, before)} F500." for before, step in zip(path, path[1:], strict=False)]
+    return HEAD + "\n".join(lines) + "\n" + TAIL
+
+
+def modal(path: Route) -> str:
+    """Codes and coordinates only where they change."""
+    lines, before, code = [], None, -1
+    for step in path:
+        parts = [f"G{step.code}"] if step.code != code else []
+        for letter in "XYZ":
+            value = getattr(step, letter.lower())
+            if before is None or value != getattr(before, letter.lower()) or (step.code > 1 and letter != "Z"):
+                parts.append(f"{letter}{value:.3f}")
+        if step.code > 1:
+            assert before is not None
+            parts += [f"I{step.centre[0] - before.x:.3f}", f"J{step.centre[1] - before.y:.3f}"]
+        lines.append(" ".join(parts) or "(nothing)")
+        before, code = step, step.code
+    return HEAD + "F500.\n" + "\n".join(lines) + "\n" + TAIL
+
+
+def increments(path: Route) -> str:
+    """G91 after the first motion."""
+    lines = [f"G{path[0].code} {words(path[0], path[0])}", "G91 F500."]
+    for before, step in zip(path, path[1:], strict=False):
+        text = f"X{step.x - before.x:.3f} Y{step.y - before.y:.3f} Z{step.z - before.z:.3f}"
+        if step.code > 1:
+            text += f" I{step.centre[0] - before.x:.3f} J{step.centre[1] - before.y:.3f}"
+        lines.append(f"G{step.code} {text}")
+    return HEAD + "\n".join(lines) + "\n" + TAIL
+
+
+def radii(path: Route) -> str:
+    """Arcs by R."""
+    return re.sub(r"I(-?[\d.]+) J(-?[\d.]+)", lambda m: f"R{np.hypot(float(m[1]), float(m[2])):.3f}", full(path))
+
+
+def inches(path: Route) -> str:
+    """G20."""
+    text = re.sub(r"([XYZIJF])(-?[\d.]+)", lambda m: f"{m[1]}{float(m[2]) / 25.4:.8f}", full(path))
+    return text.replace("G21", "G20")
+
+
+def packed(path: Route) -> str:
+    """Without blanks."""
+    return full(path).replace(" ", "")
+
+
+def lower(path: Route) -> str:
+    """In lower case."""
+    return full(path).lower()
+
+
+def numbered(path: Route) -> str:
+    """With N words."""
+    return "".join(f"N{10 * n} {line}\n" for n, line in enumerate(full(path).splitlines(), 1))
+
+
+def pointless(path: Route) -> str:
+    """Coordinates as whole numbers of least increments (IS-B)."""
+    return re.sub(r"([XYZIJ])(-?[\d.]+)", lambda m: f"{m[1]}{round(float(m[2]) * 1000)}", full(path))
+
+
+def macro(path: Route) -> str:
+    """Coordinates through variables and expressions."""
+    return re.sub(r"([XYZ])(-?[\d.]+)", lambda m: f"{m[1]}[{float(m[2]) - 1:.3f}+1.]", full(path))
+
+
+# -- five axes --------------------------------------------------------------------------------------------------------
+
+
+def positions(path: Route, machine: Machine) -> np.ndarray:
+    """Axis positions of a route in machine axes of the machine, mm and rad; offsets and tool length in them."""
+    letters = {name: name.lower() for name in machine.axis_names}
+    q = np.array([[getattr(step, letters[name]) for name in machine.axis_names] for step in path])
+    q[:, list(machine.axis_names).index("Z")] += 60.0 + LENGTH
+    return np.where(machine.rotary, np.radians(q), q)
+
+
+def in_axes(path: Route) -> str:
+    """Without tool-centre-point control."""
+    lines = [f"G{min(step.code, 1)} {words(step, step, rotary=True, places=4)} F500." for step in path]
+    return HEAD + "G43 H1\n" + "\n".join(lines) + "\n" + TAIL
+
+
+def tip_words(path: Route, machine: Machine) -> list[tuple[np.ndarray, Step]]:
+    """X Y Z of the tip in the workpiece for each step, program coordinates, mm."""
+    q = positions(path, machine)
+    on = np.ones(len(q), dtype=bool)
+    commands = commands_from_joints(placed(machine, SETUP), q, on, np.full(len(q), LENGTH))
+    columns = [list(machine.axis_names).index(letter) for letter in "XYZ"]
+    return list(zip(commands[:, columns] - np.array([0.0, 0.0, 60.0]), path, strict=True))
+
+
+def by_tip(machine: Machine):
+    """With tool-centre-point control (G43.4)."""
+
+    def write(path: Route) -> str:
+        lines = [
+            f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} A{step.a:.3f} C{step.c:.3f} F500."
+            for p, step in tip_words(path, machine)
+        ]
+        return HEAD + "G43.4 H1\n" + "\n".join(lines) + "\n" + TAIL
+
+    return write
+
+
+TURN = (20.0, 30.0, -10.0)
+ORIGIN = np.array([12.0, -7.5, 3.0])
+
+
+def in_plane(machine: Machine):
+    """The same in a tilted plane (G68.2)."""
+
+    def write(path: Route) -> str:
+        rotation = turn("z", TURN[0]) @ turn("x", TURN[1]) @ turn("z", TURN[2])
+        lines = []
+        for point, step in tip_words(path, machine):
+            p = rotation.T @ (point - ORIGIN)
+            lines.append(f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} A{step.a:.3f} C{step.c:.3f} F500.")
+        frame = "G68.2 X{:.3f} Y{:.3f} Z{:.3f} I{:.3f} J{:.3f} K{:.3f}\n".format(*ORIGIN, *TURN)
+        return HEAD + "G43 H1\n" + frame + "\n".join(lines) + "\nG69\n" + TAIL
+
+    return write
+
+
+def turn(axis: str, degrees: float) -> np.ndarray:
+    """The right-handed rotation about X or Z."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    if axis == "x":
+        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
