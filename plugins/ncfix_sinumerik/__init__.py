@@ -20,7 +20,6 @@ SIEMENS = Dialect(
     closure_mm=0.01,
     closure_relative=0.0,
     language="ncfix.program.sinumerik.language:SINUMERIK",
-    feed_of="linear",
 )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ncfix.compensate import arcs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.held import with_rotary_held
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.ragged import slices
@@ -69,7 +70,8 @@ def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correc
     """The correction of ends q (k, n_axes) of motions; where one depends on others, of all of them at once."""
     ones = np.ones(len(rows))
     if strategy.corrects_orientation:
-        return strategy.solve(intent.machine, q, intent.states(rows, ones), along(intent, rows, ones))
+        found = strategy.solve(intent.machine, q, intent.states(rows, ones), along(intent, rows, ones))
+        return with_rotary_held(intent, strategy, rows, ones, q, found)
     if not strategy.follows_path:
         return strategy.solve(intent.machine, q, intent.states(rows, ones))
     parts = []

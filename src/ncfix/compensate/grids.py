@@ -8,6 +8,7 @@ import numpy as np
 
 from ncfix.compensate.ends import as_commands, path_of
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.held import with_rotary_held
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import batches, offsets, owners, places, sums
 from ncfix.compensate.round import RoundGrid
@@ -143,7 +144,8 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     if strategy.corrects_orientation:
         decided = np.where(bounds[:, None], real.at(move, fraction) - programmed, 0.0)
         path = path_of(intent, q, intent.machine.tip(q, intent.lengths(move)), fraction == 0, bounds, decided)
-    result = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
+    found = strategy.solve(intent.machine, q, intent.states(move, fraction), path)
+    result = with_rotary_held(intent, strategy, move, fraction, q, found)
     command = as_commands(intent, move, programmed, q, result.q)
     command[first], command[last] = real.start[rows], real.end[rows]
     use = result.converged | bounds

@@ -21,7 +21,7 @@ from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS, Rendered, Target
 from ncfix.program.tree import Program
-from ncfix.program.turns import UNTIMED, is_dragged, minutes
+from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
 from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
@@ -234,6 +234,9 @@ class _Emitter:
         if np.isinf(target.turn_minutes) and is_dragged(target):
             self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.render(self.program, block, layout, target)
+        slow = target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0
+        if slow and crawls(target, float(self.moves.feed[row]), np.array(rendered.ends)):
+            self.conflicts.setdefault(block, CRAWLS)
         frame = self.frames[self.reading.frame[row]]
         self.end[rows] = frame.command(np.array(rendered.ends))
         if rendered.centre is not None:
@@ -289,6 +292,9 @@ class _Emitter:
             arc_code=modal,
             increments=frame.frame.increments,
             rotary=tuple(moves.rotary.tolist()),
+            pointing=moves.pointing,
+            rotation=frame.frame.rotation,
+            offset=frame.frame.offset,
         )
 
     def _turn_minutes(self, row: int) -> float:

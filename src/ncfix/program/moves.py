@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
+from ncfix.program.pointing import Pointing
 
 
 class Kind(IntEnum):
@@ -113,6 +114,9 @@ class Moves:
     modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
     frames       the frames that occur
     reasons      the reasons that occur
+    held         (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane without
+                 tool-centre-point control); None: nowhere
+    pointing     how rotary axes point the tool, where programs give its direction as a vector
     """
 
     axes: tuple[str, ...]
@@ -139,6 +143,8 @@ class Moves:
     modal: NDArray[np.int16]
     frames: tuple[Frame, ...]
     reasons: tuple[str, ...]
+    held: NDArray[np.bool_] | None = None
+    pointing: Pointing | None = None
 
     def __len__(self) -> int:
         return len(self.block)

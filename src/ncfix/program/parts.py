@@ -23,7 +23,7 @@ from ncfix.program.tree import Flow, Program, Skip, Template
 CALL = 980
 """M98 in tenths."""
 
-TABLES = frozenset({"axes", "rotary", "frames", "reasons"})
+TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing"})
 """The fields of `Moves` that are the same for all rows."""
 
 

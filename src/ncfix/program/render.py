@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
+from ncfix.program.pointing import Pointing
 from ncfix.program.tree import Constant, Literal, Program, Word
 from ncfix.program.turns import is_dragged, number, way
 
@@ -56,6 +57,9 @@ class Target:
     rotary       (n_axes,) which axes turn
     arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
     arc_code     motion code of these, tenths
+    pointing     how rotary positions (rad) point the tool, where the program gives its direction
+    rotation     (3, 3) how the frame is turned
+    offset       (n_axes,) of the frame, mm and rad
     """
 
     letters: tuple[str, ...]
@@ -85,6 +89,9 @@ class Target:
     arc_code: int = 0
     increments: tuple[float, float] = (1.0, 1.0)
     rotary: tuple[bool, ...] = ()
+    pointing: Pointing | None = None
+    rotation: FloatArray | None = None
+    offset: FloatArray | None = None
 
     @property
     def last_code(self) -> int:
@@ -274,12 +281,14 @@ class BlockRenderer:
         words = self._code_of_piece(target.arc_code if arc else LINE)
         in_plane = [target.spatial[index] for index in target.plane[:2]] if arc else []
         for column, letter in self.columns:
-            if not abs(end[column] - position[column]) >= self.half[column] and column not in in_plane:
+            still = not abs(end[column] - position[column]) >= self.half[column] and column not in in_plane
+            if still or not self._has_words(column):
                 continue
             base = position[column] if target.incremental else 0.0
             text = f"{end[column] - base:.{target.decimals[column]}f}"
             words.append(self._cased(letter) + text)
             position[column] = base + float(text)
+        words += self._further_words(position, end)
         if arc:
             words += self._centre_of_piece(piece, begin)
         if self.dragged:
@@ -289,6 +298,14 @@ class BlockRenderer:
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + (self.layout.blank).join(words))
         return position
+
+    def _has_words(self, column: int) -> bool:
+        """Whether an axis is told where to go by a word of its own."""
+        return True
+
+    def _further_words(self, position: FloatArray, end: FloatArray) -> list[str]:
+        """Words of a further piece besides those of axes; what they move is put into `position`."""
+        return []
 
     def _code_of_piece(self, wanted: int) -> list[str]:
         """The motion code of a further piece, where pieces are arcs and lines and the one before was the other."""

@@ -30,6 +30,7 @@ class Style(NamedTuple):
     tool_length: float
     feed_mode: int
     modal: int
+    held: bool = False
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -113,6 +114,11 @@ class Builder:
         """The index of a style."""
         return self._styles.setdefault(style, len(self._styles))
 
+    @property
+    def styles(self) -> tuple[Style, ...]:
+        """The styles by their index."""
+        return tuple(self._styles)
+
     def reason(self, text: str) -> int:
         """The index of a reason."""
         return self._reasons.setdefault(text, len(self._reasons))
@@ -184,6 +190,7 @@ class Builder:
             sweep=sweep,
             frames=self._frame_table(),
             reasons=tuple(self._reasons),
+            pointing=None,
             **self._style_columns(style),
         )
 

@@ -29,4 +29,9 @@ SINUMERIK_CODES: dict[str, Code] = {
         "takes depends on its machine data; here it is the one that the message says.",
         "State the rotary axes in the program if they are others.",
     ),
+    "NCF254": Code(
+        "Impossible direction of the tool",
+        "A3 B3 C3 have no length, or the rotary axes of the machine cannot point the tool that way.",
+        "Check the vector, and that the machine file is that of the machine the program was written for.",
+    ),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ncfix.program.rs274.control import Unknown
@@ -27,13 +27,24 @@ class Words:
     forms    address -> how the word is meant (`ac`, `ic`, `dc`, ...), where it says so
     axes     bit mask of the axis words
     texts    address -> text, as in T="DRILL"
+    refusal  why a motion of the block is refused, if it is
+    whole    the motion must not be split
     """
 
     block: int
     values: dict[str, float | None]
-    forms: Mapping[str, str]
+    forms: dict[str, str]
     axes: int
     texts: dict[str, str] = field(default_factory=dict)
+    refusal: str = ""
+    whole: bool = False
+
+    def refuse(self, reason: str, rotary: Sequence[int]) -> None:
+        """Refuse the motion of the block; where these rotary axes go is not known."""
+        self.refusal = reason
+        for index in rotary:
+            self.values[LETTERS[index]] = None
+            self.forms[LETTERS[index]] = ABSOLUTE
 
     def get(self, address: str, default: float = 0.0) -> float:
         """The number of a word; the default where it is not there, or not known."""

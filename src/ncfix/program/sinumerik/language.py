@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,7 +44,7 @@ def follow(
         raise UsageError.collected(lacking)
     marked = stamp.find(program)
     return Trace(
-        moves=moves,
+        moves=replace(moves, pointing=control.pointing) if control.points else moves,
         messages=(*control.knowledge.assumed.values(), *control.messages.values()),
         assumed=tuple(control.knowledge.assumed),
         stamp="" if marked is None else program.text_of(marked),

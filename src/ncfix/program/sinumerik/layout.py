@@ -16,6 +16,7 @@ from ncfix.program.layout import (
     _separator,
 )
 from ncfix.program.sinumerik.circles import VIA
+from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS
 from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Skip, Tape, Word
 
@@ -32,11 +33,13 @@ class SinumerikLayout(Layout):
     via     I1 J1 K1 by address
     angle   AR
     polar   AP and RP by address
+    vector  A3 B3 C3 by address
     """
 
     via: dict[str, Word]
     angle: Word | None
     polar: dict[str, Word]
+    vector: dict[str, Word]
 
 
 def layout_of(program: Program, block: int) -> SinumerikLayout | None:
@@ -69,6 +72,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         via={address: by_address[address] for address in VIA if address in by_address},
         angle=by_address.get("AR"),
         polar={address: by_address[address] for address in POLAR if address in by_address},
+        vector={address: by_address[address] for address in VECTOR if address in by_address},
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import numpy as np
@@ -9,9 +10,11 @@ from numpy.typing import NDArray
 
 from ncfix.program.layout import CENTRE_LETTERS
 from ncfix.program.number_style import NumberStyle
+from ncfix.program.pointing import Pointing
 from ncfix.program.render import BlockRenderer, Rendered, Target
 from ncfix.program.sinumerik.circles import VIA, circle_through
 from ncfix.program.sinumerik.layout import SinumerikLayout
+from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
 from ncfix.program.tree import Call, Literal, Program, Word
 
@@ -19,6 +22,8 @@ FloatArray = NDArray[np.float64]
 
 FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 CIP = MOTIONS["cip"]
+VECTOR_DECIMALS = 7
+"""Of components of a direction: 1e-7 rad is 6e-6 degrees."""
 
 
 def render(program: Program, block: int, layout: SinumerikLayout, target: Target) -> Rendered:
@@ -39,7 +44,10 @@ class SinumerikRenderer(BlockRenderer):
             return np.where(self._plane_columns(), self.target.nominal, kept)
         for word in self.layout.polar.values():
             self._remove(word)
-        return super()._first_piece(position, end)
+        position = super()._first_piece(position, end)
+        if self.layout.vector:
+            self._turned_tool(position, end)
+        return position
 
     def _polar_stays(self, end: FloatArray) -> bool:
         near = np.abs(end - self.target.nominal) < self.half
@@ -67,6 +75,60 @@ class SinumerikRenderer(BlockRenderer):
             position[column] = base + (written + turns if np.isfinite(written) else value)
             return
         position[column] = base + turns + self._rewrite(word, value - turns, int(self.target.decimals[column]))
+
+    def _has_words(self, column: int) -> bool:
+        """With a vector for the direction of the tool, rotary axes have no words of their own."""
+        return not (self.layout.vector and self.target.rotary[column])
+
+    def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
+        if self._has_words(column):
+            super()._absent_axis(position, column, end)
+
+    # -- the direction of the tool ------------------------------------------------------------------------------------
+
+    def _turned_tool(self, position: FloatArray, end: FloatArray) -> None:
+        """The vector of the first piece, if it is another; where the rotary axes then stand, as the control will."""
+        turning = np.array(self.target.rotary)
+        if len(self.target.ends) == 1 and np.all(np.abs(end - self.target.nominal)[turning] < self.half[turning]):
+            position[turning] = self.target.nominal[turning]
+            return
+        for address, value in zip(VECTOR, self._vector(end), strict=True):
+            word = self.layout.vector.get(address)
+            if word is not None:
+                self._rewrite(word, value, VECTOR_DECIMALS)
+            elif abs(value) >= 0.5 * 10.0**-VECTOR_DECIMALS:
+                self.added.append(f"{self.layout.blank or ' '}{address}={value:.{VECTOR_DECIMALS}f}")
+        self._settle_turn(position, end)
+
+    def _vector(self, end: FloatArray) -> list[float]:
+        """The direction of the tool at an end, in the program's coordinates, as it is written."""
+        pointing, rotation, offset = self._way_of_tool()
+        direction = rotation.T @ pointing.direction(np.radians(end) + offset)
+        return [round(float(part), VECTOR_DECIMALS) for part in direction]
+
+    def _settle_turn(self, position: FloatArray, end: FloatArray) -> None:
+        """Put the rotary axes of `position` where the written vector takes them."""
+        pointing, rotation, offset = self._way_of_tool()
+        vector = np.array(self._vector(end))
+        outer, inner = (math.radians(float(position[column])) + float(offset[column]) for column in pointing.columns)
+        ways = pointing.angles(rotation @ (vector / np.linalg.norm(vector)), (outer, inner))
+        for column, angle in zip(pointing.columns, ways[0], strict=True):
+            position[column] = math.degrees(angle - float(offset[column]))
+
+    def _way_of_tool(self) -> tuple[Pointing, FloatArray, FloatArray]:
+        target = self.target
+        assert target.pointing is not None
+        assert target.rotation is not None
+        assert target.offset is not None
+        return target.pointing, target.rotation, target.offset
+
+    def _further_words(self, position: FloatArray, end: FloatArray) -> list[str]:
+        """The direction of the tool in a further piece."""
+        if not self.layout.vector:
+            return []
+        vector = self._vector(end)
+        self._settle_turn(position, end)
+        return [f"{address}={value:.{VECTOR_DECIMALS}f}" for address, value in zip(VECTOR, vector, strict=True)]
 
     # -- numbers in brackets ------------------------------------------------------------------------------------------
 

@@ -9,10 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.program.dialect import Dialect
-from ncfix.program.moves import Kind, Kinematics
+from ncfix.program.moves import Kind, Kinematics, Rule, TcpState
+from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import AT_START, Control, Unknown
@@ -23,11 +28,15 @@ from ncfix.program.sinumerik.affine import WORLD, Affine, shifted
 from ncfix.program.sinumerik.variables import Variables
 
 if TYPE_CHECKING:
+    from ncfix.program.sinumerik.cycles import Drilling
     from ncfix.program.sinumerik.destination import End, Words
 
 GEOMETRY = (X, Y, Z)
 TURNED = "where the axis {} stands in the turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
+PROBE = 128.0
+"""mm, the length of the tool that shows the direction; a power of two, so that dividing by it rounds nothing."""
+
 NO_SYSTEM = "G500"
 """The name under which the setup may give what is in force while no settable frame is."""
 
@@ -62,8 +71,10 @@ class Modes:
     polar        the last AP and RP
     transformed  TRAORI is on
     swivelled    CYCLE800 has tilted the plane
-    modal_cycle  what MCALL calls after each block with a motion; empty for nothing
+    modal_cycle  what MCALL calls after each block with a motion
     whole_polar  every block with a polar coordinate has both
+    orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
+    orientation_in_machine  ORIMKS
     """
 
     diameter: str = ""
@@ -71,8 +82,10 @@ class Modes:
     polar: tuple[float | None, float | None] = (None, None)
     transformed: bool = False
     swivelled: bool = False
-    modal_cycle: str = ""
+    modal_cycle: Drilling | None = None
     whole_polar: bool = True
+    orientation: str = ""
+    orientation_in_machine: bool = False
 
 
 @dataclass(slots=True)
@@ -96,6 +109,8 @@ class Sinumerik(Control):
     lost  letter index -> why that coordinate of the program's frame is not known
     over  rotary axes that the last motion took past a full turn
     edge  cutting edge in force (D), 0 for none
+    whole  the motion must not be split
+    points  a block gave the direction of the tool as a vector
     """
 
     def __init__(
@@ -111,6 +126,8 @@ class Sinumerik(Control):
         self.lost: Unknown = {}
         self.over: tuple[int, ...] = ()
         self.edge = 0
+        self.points = False
+        self.whole = False
         self.variables = Variables.given(setup.variables)
         self.named = Named()
         super().__init__(setup, axes, rotary, dialect, kinematics)
@@ -258,8 +275,35 @@ class Sinumerik(Control):
         if words.values.keys() & {"AP", "RP"}:
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
         self.lost = end.lost
+        refusal, self.whole = refusal or words.refusal, words.whole
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
+        self.whole = False
         self.forget_settled()
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
+        index = super()._style(kind, rule, reason, code)
+        held = self.modes.swivelled and not self.modes.transformed
+        if not held and not self.whole:
+            return index
+        style = self.builder.styles[index]
+        return self.builder.style(style._replace(held=held, compensated=style.compensated or self.whole))
+
+    @cached_property
+    def pointing(self) -> Pointing | None:
+        """How the machine's two rotary axes point the tool; None if it has others, or nobody knows its kinematics."""
+        turning = [column for column, index in enumerate(self.machine) if self.rotary[index]]
+        kinematics = self.kinematics
+        if kinematics is None or len(turning) != 2:
+            return None
+
+        def ask(first: float, second: float) -> NDArray[np.float64]:
+            command = [0.0] * len(self.machine)
+            command[turning[0]], command[turning[1]] = first, second
+            tips = [kinematics(command, TcpState(False, long), TcpState(True, long)) for long in (PROBE, 0.0)]
+            places = [self.machine.index(index) for index in GEOMETRY]
+            return np.array([(tips[1][place] - tips[0][place]) / PROBE for place in places])
+
+        return Pointing.of((turning[0], turning[1]), ask)
 
     def wrap(self) -> None:
         """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""

@@ -10,10 +10,12 @@ from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.sinumerik import framing, motion
-from ncfix.program.sinumerik.affine import WORLD
+from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import End, Words, set_pole
+from ncfix.program.sinumerik.orientation import OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import Calling, Letting, Plan
 from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.swivel import swivel
 from ncfix.program.sinumerik.unit import Unit
 from ncfix.program.sinumerik.values import Evaluate
 from ncfix.program.sinumerik.vocabulary import (
@@ -26,17 +28,13 @@ from ncfix.program.sinumerik.vocabulary import (
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
 )
-from ncfix.program.tree import Call, Expression, NamedParameter, Text
+from ncfix.program.tree import Call, Expression, NamedParameter
 
 Find = Callable[[str], Unit | None]
 
 CONFLICT = "NCF208"
 UNKNOWN_CYCLE = "NCF252"
-AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
-ORIENTATION = frozenset(
-    {"A2", "B2", "C2", "A3", "B3", "C3", "A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA"}
-)
 _PASSED = """
     G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
     G962 G972 G973 G290 G471 G472
@@ -54,6 +52,9 @@ SETTINGS: dict[int, Handler] = {
 }
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | {"pos"}
 """What with an axis as index lets it move on its own, `POS[X]=100`."""
+
+MOVING = frozenset({"AP", "RP", "AR", "TURN", *VECTOR}) | OTHERS
+"""Words that make a block move even where no axis is named."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
@@ -104,12 +105,16 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         framing.diameter(control, name)
     elif name in UNFOLLOWED:
         control.suspended["coordinates"] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
-    elif name in HARMLESS or name.startswith(("ori", "g_", "msg")):
+    elif name in ("orimks", "oriwks"):
+        control.modes.orientation_in_machine = name == "orimks"
+    elif name.startswith("ori"):
+        control.modes.orientation = name
+    elif name in HARMLESS:
         return
     elif name == "cycle800":
-        swivel(control, turn, step)
+        swivel(control, turn.words.block, step)
     elif name in DRILLING or name in MADE_BY_THE_CONTROL:
-        cycle(control, turn, step)
+        cycle(control, turn.words.block, step, modal=turn.modal)
     else:
         subprogram(control, turn, step, find)
 
@@ -142,7 +147,8 @@ def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
 def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """MCALL: what follows it is called after each motion; alone it ends that."""
     turn.modal = True
-    control.modes.modal_cycle = ""
+    control.modes.modal_cycle = None
+    control.suspended.pop("cycle", None)
 
 
 def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
@@ -179,26 +185,6 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
     "meaw": measure,
     **dict.fromkeys(ENDS - {"trafoof"}, end_unfollowed),
 }
-
-
-def cycle(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """A cycle of the control."""
-    name = step.name.upper()
-    if turn.modal:
-        control.modes.modal_cycle = step.name
-        control.suspended["cycle"] = f"the modal cycle {name} is in force, which ncfix does not follow"
-        return
-    control.lose_all(AFTER_CYCLE)
-
-
-def swivel(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
-    if all(part is None or part == Text("") or part == Text("0") for part in step.written):
-        control.frames.swivel = WORLD
-        control.modes.swivelled = False
-        control.switch_tcp()
-        return
-    control.suspended["coordinates"] = "a tilted plane (CYCLE800) is in force, which ncfix does not follow"
 
 
 def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
@@ -249,8 +235,6 @@ def call_word(turn: Turn, find: Find) -> None:
 def finish_block(control: Sinumerik, turn: Turn) -> None:
     """Codes and words of the block, and its motion."""
     words, plan = turn.words, turn.plan
-    if turn.modal and "mcall" in plan.names and len(plan.names) == 1:
-        control.suspended.pop("cycle", None)
     codes(control, turn)
     if turn.frame:
         framing.programmable(control, turn.frame, words)
@@ -262,10 +246,10 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         turn.special.add("meas")
     if turn.used:
         return
-    if plan.axes or words.values.keys() & {"AP", "RP", "AR", "TURN"} or is_full_circle(control, words):
-        if words.values.keys() & ORIENTATION:
-            control.refusal = control.refusal or "the tool direction is given by a vector or by angles"
+    if plan.axes or words.values.keys() & MOVING or is_full_circle(control, words):
         motion.moved(control, words, frozenset(turn.special))
+        if control.modes.modal_cycle is not None and not turn.special:
+            drill(control, control.modes.modal_cycle)
 
 
 def is_full_circle(control: Sinumerik, words: Words) -> bool:
@@ -320,7 +304,7 @@ def strangers(control: Sinumerik, words: Words) -> None:
     """Axes that the program moves and the machine lacks."""
     for address in words.values:
         extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
-        if address in ORIENTATION or (extended and address[1:] in "234567" and address[0] in "ABC"):
+        if address in MOVING:
             continue
         lacking = address in INDEX and INDEX[address] not in control.machine
         if (lacking or extended) and address not in control.foreign:

@@ -1,0 +1,29 @@
+"""Motions whose rotary axes must stay as programmed, though the strategy would correct them.
+
+In a plane that was swivelled without tool-centre-point control the control moves linear axes as if the rotary axes
+stood still for good: turned by a correction, they would take the tip along.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.steer import Correction
+from ncfix.compensate.strategies import Position, Strategy
+
+
+def with_rotary_held(
+    intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, found: Correction
+) -> Correction:
+    """The corrections `found` for poses q (k, n_axes) of motions `move`, of the tip only where rotary axes are held."""
+    held = intent.moves.held
+    if held is None or not strategy.corrects_orientation or not held[move].any():
+        return found
+    rows = np.flatnonzero(held[move])
+    states = intent.states(move[rows], fraction[rows])
+    tip_only = Position().solve(intent.machine, q[rows], states)
+    corrected, converged, oriented = found.q.copy(), found.converged.copy(), found.oriented.copy()
+    corrected[rows], converged[rows], oriented[rows] = tip_only.q, tip_only.converged, tip_only.oriented
+    return Correction(corrected, converged, oriented)

@@ -1,0 +1,111 @@
+"""The direction of the tool as programs give it under TRAORI, and the plane of CYCLE800: made into rotary positions.
+
+A3 B3 C3 are a vector in the coordinates of the program, of any length; a component that is not written is zero. Which
+of two ways the rotary axes take is for the control's machine data to say: here it is the nearest.
+Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation programming (TRAORI).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.pointing import Pointing
+from ncfix.program.rs274.coordinates import DEGREE, LETTERS
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.state import Sinumerik
+
+FloatArray = NDArray[np.float64]
+
+VECTOR = ("A3", "B3", "C3")
+_OTHERS = "A2 B2 C2 A4 B4 C4 A5 B5 C5 A6 B6 C6 A7 B7 C7 LEAD TILT THETA PSI PHI NUT"
+OTHERS = frozenset(_OTHERS.split())
+"""Other ways to say how the tool stands, which are not followed."""
+
+BAD_VECTOR = "NCF254"
+WAY = "NCF253"
+AT_RUNTIME = "the direction of the tool is known only at run time"
+NO_KINEMATICS = "the direction of the tool (A3 B3 C3) needs the kinematics of a machine with two rotary axes"
+NOT_ON = "a direction of the tool is given while TRAORI is not on"
+NOT_FOLLOWED = "the tool is oriented in another way than by rotary axes or a vector ({})"
+IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS)"
+BY_AXES = "oriaxes"
+
+FAR = math.radians(0.1)
+"""rad. The tool that turns in a plane (ORIVECT) strays from where rotary axes of even speed would point it. The tip is
+not concerned, but pieces of a motion that strays by more would point it elsewhere than the whole: it is not split."""
+
+
+def oriented(control: Sinumerik, words: Words) -> None:
+    """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
+    others = sorted(OTHERS & words.values.keys())
+    if not others and not any(address in words.values for address in VECTOR):
+        return
+    reason = NOT_FOLLOWED.format(others[0]) if others else by_vector(control, words)
+    if reason:
+        words.refuse(reason, [index for index in control.machine if control.rotary[index]])
+
+
+def by_vector(control: Sinumerik, words: Words) -> str:
+    """Take A3 B3 C3; why the motion is refused, if it is."""
+    if not control.modes.transformed:
+        return NOT_ON
+    if words.runtime(*VECTOR):
+        return AT_RUNTIME
+    if control.modes.orientation_in_machine:
+        return IN_MACHINE
+    pointing = control.pointing
+    if pointing is None:
+        return NO_KINEMATICS
+    control.settle_all()
+    columns = [control.machine[column] for column in pointing.columns]
+    if any(index in control.unknown for index in columns):
+        return f"where the axis {LETTERS[columns[0]]} stands before the tool is turned is not known"
+    wanted = direction_of(control, np.array([words.get(address) for address in VECTOR]))
+    here = control.position[columns[0]], control.position[columns[1]]
+    ways = pointing.angles(wanted, here)
+    if not ways:
+        raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
+    note_choice(control, pointing, here, ways)
+    for index, angle in zip(columns, ways[0], strict=True):
+        words.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
+        words.forms[LETTERS[index]] = "ac"
+        words.axes |= 1 << index
+    control.points = True
+    even = control.modes.orientation == BY_AXES or control.modal.motion == 0
+    words.whole = not even and stray(pointing, here, ways[0]) > FAR
+    return ""
+
+
+def direction_of(control: Sinumerik, vector: FloatArray) -> FloatArray:
+    """A vector of the program as a unit vector in the workpiece."""
+    size = float(np.linalg.norm(vector))
+    if size < 1e-9:
+        raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
+    return np.asarray(np.array(control.rotation) @ (vector / size))
+
+
+def note_choice(
+    control: Sinumerik, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
+) -> None:
+    """Say which way was taken where the tool stood along the outer axis, so that either would have been as near."""
+    if len(ways) < 2 or not pointing.at_pole(pointing.at(*here)) or pointing.at_pole(pointing.at(*ways[0])):
+        return
+    names = [LETTERS[control.machine[column]] for column in pointing.columns]
+    angles = " ".join(f"{name}{angle / DEGREE:.3f}" for name, angle in zip(names, ways[0], strict=True))
+    control.warn(
+        WAY,
+        f"the tool is taken to turn to {angles}, the nearest of several ways",
+        "state the rotary axes in the program if the control turns them otherwise",
+    )
+
+
+def stray(pointing: Pointing, start: tuple[float, float], stop: tuple[float, float]) -> float:
+    """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
+    middle = pointing.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
+    half = pointing.at(*start) + pointing.at(*stop)
+    size = float(np.linalg.norm(half))
+    return math.pi if size < 1e-9 else float(np.linalg.norm(middle - half / size))
