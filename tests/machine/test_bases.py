@@ -9,6 +9,7 @@ from scipy.interpolate import BSpline
 from ncfix.machine.basis import Basis, kinds
 from ncfix.machine.piecewise import Spline, Step, Table
 from ncfix.machine.smooth import Backlash, Constant, Fourier, Periodic, Polynomial
+from ncfix.machine.truncated import Truncated
 
 KNOTS = (0.0, 0.0, 0.0, 0.0, 20.0, 50.0, 60.0, 60.0, 60.0, 60.0)
 EXAMPLES = [
@@ -24,6 +25,8 @@ EXAMPLES = [
     Spline((0.0, 0.0, 10.0, 60.0, 60.0), 1),
     Step((10.0, 30.0)),
     Step((10.0, 30.0), "positive"),
+    Truncated((10.0, 20.0, 45.0)),
+    Truncated((10.0, 30.5), 3, (2,), (0.0, 60.0)),
 ]
 U = np.array([-7.0, 0.5, 9.9, 12.0, 29.0, 44.0, 59.0, 71.0])
 UP = np.ones_like(U)
@@ -156,3 +159,29 @@ def test_what_cannot_be_is_complained_of(basis: Basis, key: str, part: str) -> N
     complaints = basis.complaints()
     assert [name for name, _ in complaints] == [key]
     assert part in complaints[0][1]
+
+
+def test_truncated_powers_are_once_smooth_with_one_coefficient_a_knot() -> None:
+    basis = Truncated((10.0, 20.0), 2, (1, 2))
+    np.testing.assert_allclose(basis.design(25.0), [25, 625, 225, 25])
+    near = basis.derivative(np.array([20 - 1e-9, 20 + 1e-9]))
+    np.testing.assert_allclose(near[0], near[1], atol=1e-6)
+    assert basis.without_knots(np.array([True, False, True, False])) == Truncated((10.0,), 2, (1,))
+
+
+def test_detrended_functions_have_neither_mean_nor_slope() -> None:
+    """Soons, Eq. 3.8: the integrals of p and of p u over the travel vanish."""
+    basis = Truncated((10.0, 30.0, 55.0), 2, (2, 3), (-20.0, 60.0))
+    place, weight = np.polynomial.legendre.leggauss(400)
+    u = 20 + 40 * place
+    values = basis.design(u)
+    scale = np.abs(values).max(axis=0)
+    assert (np.abs(40 * weight @ values) < 1e-5 * scale * 80).all()
+    assert (np.abs(40 * (weight * u) @ values) < 1e-5 * scale * 80 * 60).all()
+
+
+def test_truncated_powers_say_what_is_wrong() -> None:
+    assert Truncated((3.0, 1.0)).complaints()[0][0] == "knots"
+    assert Truncated((3.0,), detrended=(5.0, 1.0)).complaints()[0][0] == "detrended"
+    assert Truncated((9.0,), detrended=(0.0, 5.0)).complaints()[0][0] == "knots"
+    assert Truncated((9.0,), degree=0).complaints()[0][0] == "degree"

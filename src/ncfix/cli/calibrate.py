@@ -35,6 +35,14 @@ LOSSES = ("auto", "none", "huber", "tukey")
     metavar="LEVEL",
     help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
 )
+@click.option(
+    "--knots",
+    type=click.IntRange(min=0),
+    default=0,
+    metavar="N",
+    help="New error motions of linear axes are parabolas that join at N knots, not cubics; see --prune.",
+)
+@click.option("--time-constants", is_flag=True, help="Estimate the time constants of effects that lag, too.")
 @force_option
 @json_option
 def calibrate(
@@ -44,6 +52,8 @@ def calibrate(
     effects: str | None,
     loss: str,
     prune: float | None,
+    knots: int,
+    time_constants: bool,
     force: bool,
     as_json: bool,
 ) -> int:
@@ -59,7 +69,7 @@ def calibrate(
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):
-        found = calibrated(data, machine, effects, loss, prune)
+        found = calibrated(data, machine, effects, loss, prune, knots, time_constants)
     console.tell(*found.remarks)
     target.write(dumps(found.machine).encode())
     if as_json:

@@ -2,43 +2,110 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from ncfix.cli import console
-from ncfix.cli.options import json_option
+from ncfix.cli.options import json_option, load_machine
+
+if TYPE_CHECKING:
+    from ncfix.machine import Machine
+
+Row = dict[str, str]
+
+GENERIC = """
+ncfix = 1
+topology = "w C B F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0], range = [-250, 250], pitch = 10 }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [-250, 250], pitch = 10 }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [-250, 250], pitch = 10 }
+axis.B = { type = "rotary", direction = [0, -1, 0] }
+axis.C = { type = "rotary", direction = [0, 0, -1] }
+"""
+"""The machine whose effects are listed if none is given."""
 
 
 @click.command()
+@click.option("-m", "--machine", "path", metavar="FILE", help="List the effects that this machine can have.")
 @click.option("--bases", is_flag=True, help="List the bases for `basis = ...` with their keys instead.")
 @json_option
-def effects(bases: bool, as_json: bool) -> None:
-    """List the error effects (ISO 230-1 names) that a machine file may have."""
-    rows = _bases() if bases else _effects()
+def effects(path: str | None, bases: bool, as_json: bool) -> None:
+    """List the error effects that a machine file may have: ISO 230-1 components, then physical effects by name.
+
+    Without a machine, those of one with X Y Z and a table with B and C.
+    """
+    rows = _bases() if bases else _effects(path)
     if as_json:
         console.put_json(**{"bases" if bases else "effects": rows})
     elif rows:
         console.table(tuple(rows[0]), [tuple(row.values()) for row in rows])
 
 
-def _effects() -> list[dict[str, str]]:
+def _effects(path: str | None) -> list[Row]:
+    from ncfix.machine import loads
+
+    machine = load_machine(path) if path else loads(GENERIC)
+    return [*_components(machine, with_all=path is None), *_physical(machine), *_nameless(machine)]
+
+
+def _components(machine: Machine, with_all: bool) -> list[Row]:
     from ncfix.machine import catalogue
-    from ncfix.machine.effect import Effect
+    from ncfix.machine.effect import SPINDLE, Effect
+
+    letters = "XYZABC" if with_all else "".join(machine.axis_names)
+    axes = {axis.name: axis for axis in machine.axes}
+    rows = []
+    for name in catalogue.names(letters + SPINDLE):
+        effect = Effect(name, ())
+        seen = catalogue.instruments(name)
+        title = catalogue.title(name, axes.get(name[-1]))
+        unit = "rad" if effect.rotational else "mm"
+        square = catalogue.squareness(name)
+        rows.append(_row(name, unit, title, catalogue.usual_basis(name), catalogue.much(name), seen, "", square))
+    return rows
+
+
+def _physical(machine: Machine) -> list[Row]:
+    from ncfix.machine.library import library
+
+    rows = []
+    for named in library(machine).values():
+        parts = dict.fromkeys(f"{each.name} {each.basis.name}" for each in named.effects)
+        unit = " ".join(dict.fromkeys("rad" if each.rotational else "mm" for each in named.effects))
+        much = "" if named.largest != named.largest else f"{named.largest:g}"
+        needs = " ".join(named.needs)
+        rows.append(_row(named.name, unit, named.title, ", ".join(parts), much, " ".join(named.instruments), needs, ""))
+    return rows
+
+
+def _nameless(machine: Machine) -> list[Row]:
+    """Effects of plugins that this machine cannot have, or that only diagnosis knows."""
+    from ncfix.machine.library import library
     from ncfix.plugins import registry
 
-    iso = [
-        {
-            "name": name,
-            "unit": "rad" if Effect(name, ()).rotational else "mm",
-            "title": catalogue.title(name),
-            "squareness": catalogue.squareness(name),
-        }
-        for name in catalogue.names()
+    there = library(machine)
+    return [
+        _row(name, "", getattr(each, "title", ""), "", "", "", "", "")
+        for name, each in registry("effects").items()
+        if name not in there
     ]
-    others = registry("effects").items()
-    return iso + [{"name": name, "unit": "", "title": each.title, "squareness": ""} for name, each in others]
 
 
-def _bases() -> list[dict[str, str]]:
+def _row(name: str, unit: str, title: str, basis: str, much: str, seen: str, needs: str, squareness: str) -> Row:
+    return {
+        "name": name,
+        "unit": unit,
+        "title": title,
+        "basis": basis,
+        "much": much,
+        "seen by": seen,
+        "needs": needs,
+        "squareness": squareness,
+    }
+
+
+def _bases() -> list[Row]:
     from dataclasses import fields
 
     from ncfix.machine.basis import kinds

@@ -107,8 +107,8 @@ class Basis(ABC):
 @lru_cache(maxsize=1)
 def kinds() -> dict[str, type[Basis]]:
     """Every basis by its name: the built-in ones and those of plugins."""
-    from ncfix.machine import piecewise, smooth
+    from ncfix.machine import piecewise, smooth, truncated
     from ncfix.plugins import registry
 
-    builtin = (*smooth.BASES, *piecewise.BASES)
+    builtin = (*smooth.BASES, *piecewise.BASES, *truncated.BASES)
     return registry("bases", {basis.name: basis for basis in builtin})

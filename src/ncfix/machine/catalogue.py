@@ -101,3 +101,37 @@ def _spindle(component: str, location: bool) -> str:
     if component in LINEAR:
         return f"{what} of the spindle in {component}"
     return f"{'tilt' if location else 'tilt motion'} of the spindle about {TURNS_ABOUT[component]}"
+
+
+def instruments(name: str) -> str:
+    """The kinds of measurement that see a component, docs/formats.md."""
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} is not the name of an ISO 230-1 component")
+    component, zero, joint = match.groups()
+    if joint == SPINDLE:
+        return "tcp tcp6 probe points" if component in LINEAR else "tcp6 points; others with two tool lengths"
+    return "tcp tcp6 probe points length" + ("" if zero else " axis")
+
+
+def usual_basis(name: str) -> str:
+    """The basis that suits a component: what identifiability leaves to it."""
+    match = NAME.fullmatch(name)
+    if match is None or match[2] or match[3] == SPINDLE:
+        return "constant"
+    component, _, joint = match.groups()
+    if joint not in "XYZUVW":
+        along = component in (joint, TURNS_ABOUT.get(joint))
+        return f"fourier order {1 if along else 2} up"
+    return "polynomial degree 2 up" if component in LINEAR and component != joint else "polynomial degree 1 up"
+
+
+def much(name: str) -> str:
+    """A size, mm or rad over the travel, that is large for a machine tool in use."""
+    match = NAME.fullmatch(name)
+    if match is None:
+        return ""
+    component, zero, _ = match.groups()
+    if component in LINEAR:
+        return "0.1" if zero else "0.03"
+    return "0.0002" if zero else "0.0001"

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import Field, fields
+from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,30 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.basis import Basis, kinds
 from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE, Effect, Matrix
 from ncfix.machine.fields import Section, did_you_mean
+from ncfix.machine.library import Named
+from ncfix.machine.named_effect import read_named
 
 INPUT = re.compile(r"[a-z][a-z0-9_]*")
+
+
+def read_effects(
+    section: Section,
+    letters: tuple[str, ...],
+    axes: Mapping[str, Axis],
+    physical: Callable[[], Mapping[str, Named]],
+) -> tuple[Effect, ...]:
+    """The effects that a table stands for: one of an ISO 230-1 component, those of a physical effect by its name."""
+    name = section.values.get("name")
+    if isinstance(name, str) and not NAME.fullmatch(name):
+        named = physical()
+        if name in named:
+            return read_named(section, named[name])
+        if near := get_close_matches(name, named, 1):
+            text = f"{name!r} is not an effect of this machine"
+            section.note("NCF309", "name", text, f"did you mean {near[0]!r}? `ncfix effects -m FILE` lists them")
+            return ()
+    found = read_effect(section, letters, axes)
+    return () if found is None else (found,)
 
 
 def read_effect(section: Section, letters: tuple[str, ...], axes: Mapping[str, Axis]) -> Effect | None:

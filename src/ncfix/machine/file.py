@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.machine import topology
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad, Vector
-from ncfix.machine.effect_file import read_effect
+from ncfix.machine.effect_file import read_effects
 from ncfix.machine.fields import Report, Section, did_you_mean
+from ncfix.machine.library import Named, library
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
 from ncfix.machine.toml_lines import key_lines
 from ncfix.machine.topology import Topology
@@ -61,8 +63,9 @@ def _machine(root: Section) -> Machine | None:
     axes = _axes(root, order)
     tool = _tool(root)
     known = order.axes if order else tuple(axes)
-    found = [read_effect(section, known, axes) for section in root.tables("effect")]
-    effects = tuple(effect for effect in found if effect is not None)
+    physical = _physical(order, axes, tool)
+    found = [read_effects(section, known, axes, physical) for section in root.tables("effect")]
+    effects = tuple(effect for each in found for effect in each)
     control = root.text("control")
     increment = _pair(root, "least_increment", DEFAULT_INCREMENT)
     correction = _pair(root, "max_correction", DEFAULT_CORRECTION)
@@ -74,6 +77,17 @@ def _machine(root: Section) -> Machine | None:
     columns = tuple(axes[letter] for letter in order.axes)
     notes = dict(provenance.values) if provenance else {}
     return Machine(name, str(order), columns, tool, effects, control, increment, correction, offset, notes)
+
+
+def _physical(order: Topology | None, axes: dict[str, Axis], tool: Tool) -> Callable[[], Mapping[str, Named]]:
+    """The physical effects that this machine can have, once somebody asks; none if it cannot be built yet."""
+
+    def found() -> Mapping[str, Named]:
+        if order is None or any(letter not in axes for letter in order.axes):
+            return {}
+        return library(Machine("", str(order), tuple(axes[letter] for letter in order.axes), tool))
+
+    return found
 
 
 def _schema(root: Section) -> None:

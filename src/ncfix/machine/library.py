@@ -8,27 +8,44 @@ section 2.5, rule 1).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import nan
+from typing import Protocol
 
 import numpy as np
 
-from ncfix.machine import Effect, Machine
 from ncfix.machine.axis import Axis
-from ncfix.machine.effect import SPINDLE
+from ncfix.machine.effect import SPINDLE, Effect
+from ncfix.machine.machine import Machine
 from ncfix.machine.smooth import Backlash, Periodic, Polynomial
+from ncfix.plugins import registry
 
 WARM = 20.0
 """Degree C at which thermal effects are zero."""
 HOUR = 3600.0
+LEVER = 100.0
+"""mm: an angle is much if it moves what is this far away by what is much."""
+STATES_S = (900.0, 7200.0)
+"""Time constants of thermal states, s: where their estimation begins."""
 LINEAR = Polynomial(degree=(1,))
+
+
+class PluginEffect(Protocol):
+    """What a plugin registers with `register_effects`: a name, a title, and the effects of a machine, with zeros."""
+
+    name: str
+    title: str
+
+    def effects(self, machine: Machine) -> Sequence[Effect]:
+        """The effects that it is made of on this machine; none if the machine cannot have it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Named:
     """A physical effect of one machine.
 
-    largest      (mm or rad, over the travel) what would be much
+    largest      (mm or rad, over the travel) what would be much; NaN if nobody says
     instruments  kinds of measurement that see it
     needs        state columns without which it cannot be seen
     """
@@ -45,10 +62,18 @@ SEEN = ("tcp", "tcp6", "probe", "length")
 
 
 def library(machine: Machine) -> dict[str, Named]:
-    """Every physical effect that this machine can have, by name."""
+    """Every physical effect that this machine can have, by name; those of plugins too."""
     found = [each for axis in machine.axes for each in _of_axis(axis)]
     found += [each for pair in _carried(machine) for each in _dead_weight(*pair)]
-    return {each.name: each for each in (*found, *_of_spindle(machine))}
+    found += _of_spindle(machine)
+    return {each.name: each for each in (*found, *_of_plugins(machine, {each.name for each in found}))}
+
+
+def _of_plugins(machine: Machine, taken: set[str]) -> Iterator[Named]:
+    for name, plugin in registry("effects").items():
+        effects = tuple(plugin.effects(machine)) if hasattr(plugin, "effects") else ()
+        if effects and name not in taken:
+            yield Named(name, plugin.title, effects, nan, (), tuple(getattr(plugin, "needs", ())))
 
 
 def _of_axis(axis: Axis) -> Iterator[Named]:
@@ -57,23 +82,33 @@ def _of_axis(axis: Axis) -> Iterator[Named]:
         return
     name, q = f"E{component}{axis.name}", axis.name
     center, scale = _span(axis)
-    sides = (f"dir_{q}",)
+    sides, lever = (f"dir_{q}",), 1 / LEVER if axis.rotary else 1.0
     play = Effect(name, (0.0,), Backlash())
-    yield Named(f"backlash-{q}", f"play of {q} when it reverses", (play,), 0.01, (*SEEN, "axis"), sides)
+    yield Named(f"backlash-{q}", f"play of {q} when it reverses", (play,), 0.01 * lever, (*SEEN, "axis"), sides)
+    worn = Effect(name, (0.0,) * 3, Backlash(degree=(0, 1, 2)), center=center, scale=scale)
+    yield Named(f"worn-{q}", f"play of {q} that differs along it", (worn,), 0.01 * lever, (*SEEN, "axis"), sides)
     wound = Effect(name, (0.0,), Backlash(degree=(1,)), center=center, scale=scale)
-    yield Named(f"wind-up-{q}", f"play of {q} that grows along it", (wound,), 0.005, (*SEEN, "axis"), sides)
+    yield Named(
+        f"wind-up-{q}", f"play of {q} that grows along its screw", (wound,), 0.005 * lever, (*SEEN, "axis"), sides
+    )
     if axis.pitch is not None:
         screw = Effect(name, (0.0,) * 4, Periodic(order=(1, 2), period=axis.pitch))
-        yield Named(f"screw-{q}", f"screw of {q}, once and twice a turn", (screw,), 0.003, (*SEEN, "axis"))
+        yield Named(f"screw-{q}", f"screw of {q}, once and twice a turn", (screw,), 0.003 * lever, (*SEEN, "axis"))
     if not axis.rotary:
         sensor = f"temp_{q.lower()}"
         warm = Effect(name, (0.0,), LINEAR, center, scale, times=sensor, times_center=WARM, times_scale=1.0)
         yield Named(f"expansion-{q}", f"scale of {q} that grows with {sensor}", (warm,), 0.02, SEEN, (sensor,))
     if axis.workpiece_side and not axis.rotary:
-        basis = Polynomial(degree=(0, 1))
-        loaded = {"times": "load_kg", "times_center": 0.0, "times_scale": 1.0}
-        tilts = tuple(Effect(f"E{turn}{q}", (0.0, 0.0), basis, center, scale, **loaded) for turn in "ABC")  # type: ignore[arg-type]
-        yield Named(f"load-{q}", f"guide of {q} that tilts under the workpiece", tilts, 1e-4, SEEN, ("load_kg",))
+        for load, what in ("load_kg", "the workpiece"), ("load_kgm", "the workpiece's moment, mass times height"):
+            tilts = tuple(_loaded(f"E{turn}{q}", center, scale, load) for turn in "ABC")
+            kind = "load" if load == "load_kg" else "moment"
+            yield Named(f"{kind}-{q}", f"guide of {q} that tilts under {what}", tilts, 1e-4, SEEN, (load,))
+
+
+def _loaded(name: str, center: float, scale: float, load: str) -> Effect:
+    """Linear in the load and along the axis (Soons, section 2.6)."""
+    basis = Polynomial(degree=(0, 1))
+    return Effect(name, (0.0, 0.0), basis, center, scale, times=load, times_center=0.0, times_scale=1.0)
 
 
 def _dead_weight(own: Axis, carried: Axis) -> Iterator[Named]:
@@ -109,6 +144,17 @@ def _of_spindle(machine: Machine) -> Iterator[Named]:
         yield Named(
             f"drift-{axis}", f"structure that drifts in {axis}, per hour", (moved,), 0.03, SEEN[:3], ("time_s",)
         )
+        states = tuple(
+            Effect(f"E{axis}{SPINDLE}", (0.0,), LINEAR, center=WARM, input="temp_structure", time_constant_s=constant)
+            for constant in STATES_S
+        )
+        hours = " and ".join(map(_hours, STATES_S))
+        title = f"structure that moves in {axis} after temp_structure, two thermal states, {hours}"
+        yield Named(f"warming-{axis}", title, states, 0.03, SEEN[:3], ("temp_structure", "time_s"))
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / HOUR:g} h"
 
 
 def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:

@@ -9,7 +9,7 @@ errors and does not change where the iteration ends).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
@@ -169,23 +169,32 @@ def calibrate(
     effects: str | Selection | None = None,
     loss: str = weights.AUTO,
     prune: float | None = None,
+    knots: int = 0,
+    time_constants: bool = False,
 ) -> Calibration:
     """Estimate the errors of a machine.
 
     effects  names, patterns, `all` or a model, see `ncfix.measure.selection`; None: those that the machine has
     loss     auto (gross outliers get no weight), none, huber or tukey
     prune    significance, e.g. 0.99, that a coefficient must have to stay; None keeps all
+    knots    of new error motions of linear axes, which are cubics without; those that do not matter go with `prune`
+    time_constants  estimate those of effects that lag, too
 
-    Raises `UsageError` NCF630, NCF635, NCF637.
+    Raises `UsageError` NCF630, NCF635, NCF637, NCF639.
     """
-    from ncfix.measure import pruning, results
+    from ncfix.measure import lags, pruning, results
 
-    selection = effects if isinstance(effects, Selection) else select(machine, effects, _point(measurements))
+    selection = effects if isinstance(effects, Selection) else select(machine, effects, _point(measurements), knots)
+    remarks: tuple[Message, ...] = ()
+    if time_constants:
+        late = lags.found(measurements, machine, selection)
+        selection, remarks = late.selection, late.remarks
     problem = Problem.of(measurements, machine, selection)
     estimate = settle(problem, loss)
     if prune is not None:
         problem, estimate = pruning.pruned(problem, estimate, prune, loss)
-    return results.result(problem, estimate, loss)
+    found = results.result(problem, estimate, loss)
+    return replace(found, remarks=(*found.remarks, *remarks))
 
 
 def _point(measurements: Sequence[Measurement]) -> list[float] | None:

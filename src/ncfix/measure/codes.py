@@ -126,4 +126,15 @@ CODES = {
         "The condition number of the scaled problem is large: small errors of measurement become large errors of some "
         "coefficients, though not of the predicted error where it was measured.",
     ),
+    "NCF639": Code(
+        "a time constant that cannot be told",
+        "An effect that follows its input after a time needs a clock, and measurements over several time constants in "
+        "which the input changes.",
+        "Measure while it warms up and while it cools down, with a column time_s.",
+    ),
+    "NCF640": Code(
+        "an estimated time constant",
+        "How long after its input an effect follows, with its standard deviation. That of the coefficients holds for "
+        "this constant.",
+    ),
 }

@@ -8,19 +8,19 @@ tell is left out beforehand. To separate two effects, the variances of their coe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.diagnostics import UsageError
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Machine
 from ncfix.machine.library import library
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.exchange import Pool, choose, variances
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
-from ncfix.measure.selection import Selection, select
+from ncfix.measure.selection import Selection, form, select
 from ncfix.measure.solve import NUISANCE_RANK, solve
 
 CANDIDATES = 800
@@ -179,15 +179,10 @@ def _targets(
 def _columns(machine: Machine, selection: Selection, name: str) -> list[int]:
     """The coefficients of an effect by its name: of a physical effect exactly those that it is made of."""
     physical = library(machine).get(name)
-    forms = {_form(effect) for effect in physical.effects} if physical else set()
+    forms = {form(effect) for effect in physical.effects} if physical else set()
     owners = [effect for effect in selection.estimated for _ in range(effect.basis.size)]
-    found = [k for k, effect in enumerate(owners) if effect.name == name or _form(effect) in forms]
+    found = [k for k, effect in enumerate(owners) if effect.name == name or form(effect) in forms]
     if not found:
         text = f"{name} is none of the effects that are estimated"
         raise UsageError.of("NCF636", text, hint="name it in --effects too")
     return found
-
-
-def _form(effect: Effect) -> Effect:
-    """An effect without its numbers."""
-    return replace(effect, coefficients=(), covariance=None)

@@ -14,6 +14,7 @@ from scipy import stats
 
 from ncfix.machine import Effect
 from ncfix.machine.smooth import Polynomial
+from ncfix.machine.truncated import Truncated
 from ncfix.measure import calibrate
 from ncfix.measure.measurement import Array
 from ncfix.measure.selection import Selection
@@ -106,11 +107,20 @@ def _without(problem: Problem, chosen: np.ndarray[tuple[int], np.dtype[np.bool_]
 
 
 def _reduced(effect: Effect, keep: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Effect | None:
-    """The effect with fewer powers; None if nothing is left of it. Other bases stay whole if any part of them does."""
+    """The effect with fewer powers or knots; None if nothing is left of it. Other bases stay whole if any part does."""
     if not keep.any():
         return None
-    if keep.all() or not isinstance(effect.basis, Polynomial):
+    if keep.all() or not isinstance(effect.basis, Polynomial | Truncated):
         return effect
-    basis = replace(effect.basis, degree=tuple(d for d, k in zip(effect.basis.degree, keep, strict=True) if k))
+    basis = _with_functions(effect.basis, keep)
     values = tuple(c for c, k in zip(effect.coefficients, keep, strict=True) if k)
     return replace(effect, basis=basis, coefficients=values, covariance=None)
+
+
+def _with_functions(
+    basis: Polynomial | Truncated, keep: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> Polynomial | Truncated:
+    """The basis with some of its functions only."""
+    if isinstance(basis, Truncated):
+        return basis.without_knots(keep)
+    return replace(basis, degree=tuple(d for d, k in zip(basis.degree, keep, strict=True) if k))

@@ -20,6 +20,7 @@ from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE
 from ncfix.machine.fields import did_you_mean
 from ncfix.machine.library import library
 from ncfix.machine.smooth import Constant, Fourier, Polynomial
+from ncfix.machine.truncated import Truncated
 
 ALL = "all"
 
@@ -74,12 +75,15 @@ def labels_of(effect: Effect, among: Sequence[Effect]) -> list[str]:
     return [f"{head} {label}" for label in effect.basis.labels]
 
 
-def select(machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None) -> Selection:
+def select(
+    machine: Machine, wanted: str | None = None, reference: Sequence[float] | None = None, knots: int = 0
+) -> Selection:
     """The effects that are meant by a list such as `EC0Y,E?X,EZZ`, by `all`, or by the name of a model;
     names of physical effects (`ncfix.machine.library`) may stand in the list.
 
     Nothing given means those of the machine; a machine without effects gets all of them. `reference` is the point to
-    which new effects refer. Raises `UsageError` NCF635.
+    which new effects refer; with `knots` the new error motions of linear axes are piecewise, with so many knots.
+    Raises `UsageError` NCF635.
     """
     from ncfix.measure.models import MODELS
 
@@ -91,11 +95,14 @@ def select(machine: Machine, wanted: str | None = None, reference: Sequence[floa
         return Selection(machine.effects, (True,) * len(machine.effects))
     names = [name.strip() for name in (wanted or ALL).split(",") if name.strip()]
     physical = library(machine)
-    found = [effect for name in names if name in physical for effect in physical[name].effects]
+    named = [effect for name in names if name in physical for effect in physical[name].effects]
     names = [name for name in names if name not in physical]
-    free = [any(_matches(effect.name, name) for name in names) for effect in machine.effects]
+    forms = {form(effect) for effect in named}
+    free = [any(_matches(each.name, name) for name in names) or form(each) in forms for each in machine.effects]
     present = {effect.name for effect in machine.effects}
-    new = found + [effect for name in names for effect in _new(machine, name, present, point)]
+    there = {form(effect) for effect in machine.effects}
+    new = [effect for effect in named if form(effect) not in there]
+    new += [effect for name in names for effect in _new(machine, name, present, point, knots)]
     return Selection((*machine.effects, *dict.fromkeys(new)), (*free, *(True for _ in dict.fromkeys(new))))
 
 
@@ -107,15 +114,22 @@ def _matches(name: str, pattern: str) -> bool:
     return pattern == ALL or fnmatchcase(name, pattern)
 
 
-def _new(machine: Machine, name: str, present: set[str], point: tuple[float, float, float] | None) -> list[Effect]:
+def form(effect: Effect) -> Effect:
+    """An effect without its numbers."""
+    return replace(effect, coefficients=(), covariance=None)
+
+
+def _new(
+    machine: Machine, name: str, present: set[str], point: tuple[float, float, float] | None, knots: int
+) -> list[Effect]:
     """Effects of this name or pattern that the machine does not have yet."""
-    possible = [each for each in candidates(machine) if _matches(each.name, name)]
+    possible = [each for each in candidates(machine, knots) if _matches(each.name, name)]
     fresh = [each for each in possible if each.name not in present]
     if fresh or any(_matches(each, name) for each in present):
         return fresh if point is None else [each if each.location else replace(each, reference=point) for each in fresh]
     match = NAME.fullmatch(name)
     if match and match[3] in (*machine.axis_names, SPINDLE):
-        return [default(machine, name)]
+        return [default(machine, name, knots)]
     from ncfix.measure.models import MODELS
 
     known = [*MODELS, *library(machine), *present, *(each.name for each in candidates(machine))]
@@ -123,13 +137,13 @@ def _new(machine: Machine, name: str, present: set[str], point: tuple[float, flo
     raise UsageError.of("NCF635", f"there is no effect {name!r} of this machine", hint=hint)
 
 
-def candidates(machine: Machine) -> list[Effect]:
+def candidates(machine: Machine, knots: int = 0) -> list[Effect]:
     """Every location error and error motion that can matter for this machine, zero, with its default basis."""
     found = []
     for axis in machine.axes:
         names = [f"E{component}0{axis.name}" for component in _located(axis)]
         names += [f"E{component}{axis.name}" for component in COMPONENTS]
-        found += [default(machine, name) for name in names]
+        found += [default(machine, name, knots) for name in names]
     return found + [default(machine, f"E{component}0{SPINDLE}") for component in "XYAB"]
 
 
@@ -141,7 +155,7 @@ def _located(axis: Axis) -> list[str]:
     return across + turns if axis.rotary else turns
 
 
-def default(machine: Machine, name: str) -> Effect:
+def default(machine: Machine, name: str, knots: int = 0) -> Effect:
     """A zero effect of this name with the basis that suits its axis."""
     axis = next((axis for axis in machine.axes if axis.name == name[-1]), None)
     if axis is None or len(name) == 4:
@@ -150,6 +164,8 @@ def default(machine: Machine, name: str) -> Effect:
     bounded = bool(np.isfinite([low, high]).all())
     full = axis.rotary and (not bounded or high - low >= 330)
     basis = _turning(axis, name) if full else _straight(axis, name)
+    if knots and bounded and not axis.rotary:
+        basis = _piecewise(axis, name, knots)
     center, scale = ((low + high) / 2, (high - low) / 2) if bounded and not full else (0.0, 1.0)
     return Effect(name, (0.0,) * basis.size, basis, center=center, scale=scale)
 
@@ -165,6 +181,13 @@ def _straight(axis: Axis, name: str) -> Basis:
     shift = name[1] in "XYZ"
     first = 2 if not axis.rotary and shift and not _along(axis, name) else 1
     return Polynomial(degree=tuple(range(first, 4)))
+
+
+def _piecewise(axis: Axis, name: str, knots: int) -> Basis:
+    """Parabolas that join smoothly at evenly spaced knots; of straightness without mean and slope (Soons, 2.1, 2.2)."""
+    inside = tuple(float(place) for place in np.linspace(-1, 1, knots + 2)[1:-1])
+    straight = name[1] in "XYZ" and not _along(axis, name)
+    return Truncated(inside, 2, (2,), (-1.0, 1.0)) if straight else Truncated(inside, 2, (1, 2))
 
 
 def _along(axis: Axis, name: str) -> bool:
