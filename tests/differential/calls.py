@@ -18,6 +18,7 @@ OFFSETS = {"SET_G92_OFFSET", "SET_G5X_OFFSET"}
 FEED_SLACK = 1e-3
 """Relative, of the time of a block: what the design allows an F of inverse time with few digits."""
 PRINTED = 1e-4  # of a feed
+LARGEST = 0.1  # mm: more than any correction here; an offset may be older than the position, whose ends are judged
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def _same_arguments(one: Call, two: Call, original: Canon, fixed: Canon) -> bool
         return True
     if one.name not in OFFSETS or one.after == 0 or two.after == 0:
         return False
-    moved = np.abs(fixed.end[two.after - 1] - original.end[one.after - 1]).max() * np.sqrt(2)
+    moved = np.abs(fixed.end[two.after - 1] - original.end[one.after - 1]).max() * np.sqrt(2) + LARGEST
     first, second = (np.array([float(value) for value in call.arguments.split(",")]) for call in (one, two))
     return bool(np.all(np.abs(first - second) <= moved + 3e-3))
 

@@ -14,7 +14,7 @@ from ncfix.program.reader import read
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.program.turns import UNTIMED
+from ncfix.program.turns import CRAWLS, UNTIMED
 from ncfix.program.writer import apply
 
 AXES = ("X", "Y", "Z", "A")
@@ -96,3 +96,10 @@ def test_a_turn_of_unknown_time_is_not_written(text: str) -> None:
 
 def test_a_turn_in_inverse_time_keeps_its_time_by_itself() -> None:
     assert corrected("G93 G1 A90 F5\n", "iso") == ("G93 G1 A90 Y0.020 F5\nM2\n", {})
+
+
+def test_a_turn_in_inverse_time_that_linuxcnc_would_hurry_is_not_written() -> None:
+    """0.02 mm in half a minute is 0.04 mm a minute; LinuxCNC makes that 0.1, and the turn would be over too soon."""
+    _, conflicts = corrected("G93 G1 A90 F2\n", "linuxcnc")
+    assert list(conflicts.values()) == [CRAWLS]
+    assert not corrected("G93 G1 A90 F6\n", "linuxcnc")[1]

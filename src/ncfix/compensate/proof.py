@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.compensate.arcs import across
 from ncfix.compensate.findings import Array, Mask
 from ncfix.compensate.settle import Settled
 from ncfix.diagnostics import NcfixError
@@ -82,9 +83,10 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
         return None
     differs: Mask = _differs(again.end, emission.end[rows])
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
-    in_plane = np.where(np.abs(again.normal[arcs]) < 0.5, 1.0, np.nan)
-    centres_differ = _differs(again.centre[arcs] * in_plane, emission.centre[rows[arcs]] * in_plane)
-    differs[arcs[centres_differ]] = True
+    off = again.centre[arcs] - emission.centre[rows[arcs]]
+    off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
+    off = across(off, again.normal[arcs])  # the height of a centre means nothing
+    differs[arcs[_differs(off, np.zeros_like(off))]] = True
     return differs
 
 

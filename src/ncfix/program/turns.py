@@ -8,6 +8,7 @@ long; else in inverse time (G93), which means the same everywhere. What was in f
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,10 +22,33 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 UNTIMED = "rotary axes turn alone, and the time that takes is not known: their feed is not a plain number per minute"
+CRAWLS = "in inverse time LinuxCNC moves linear axes at 0.1 units per minute or faster: a turn so slow would be hurried"
+LEAST_PACE = 0.1
+"""Units per minute; what LinuxCNC makes of slower motions in inverse time (`inverse_time_rate_straight`)."""
 FEED_GROUPS = ("XYZ", "UVW", "ABC")
 """The axes whose way F is the speed of: the first group that moves (LinuxCNC, "Machining Center Overview", feed)."""
 DIGITS = 6
 """Significant digits of an F word of ours."""
+
+
+def turn_alone(moves: Moves, row: int) -> float:
+    """The angle of a motion at feed that turns rotary axes alone, in degrees; 0 for others."""
+    way = moves.end[row] - moves.start[row]
+    if moves.kind[row] != Kind.FEED or not np.all(way[~moves.rotary] == 0):
+        return 0.0
+    return float(np.rad2deg(np.linalg.norm(way[moves.rotary])))
+
+
+def crawls(target: Target, feed: float, ends: FloatArray) -> bool:
+    """Whether a turn in inverse time `feed` (1/min) comes out so slow that LinuxCNC would hurry it.
+
+    ends  (k, n_axes) of its pieces, as written
+    """
+    path = np.vstack((target.start, ends))
+    linear = [letter not in FEED_GROUPS[-1] for letter in target.letters]
+    steps = np.linalg.norm(np.diff(path, axis=0)[:, linear], axis=1)
+    ways = np.array([way(target.letters, *pair, target.diameter) for pair in pairwise(path)])
+    return bool(np.any((steps > 0) & (ways * feed / target.shares < LEAST_PACE)))
 
 
 def minutes(moves: Moves, row: int, own_feed: bool) -> float:
@@ -33,12 +57,8 @@ def minutes(moves: Moves, row: int, own_feed: bool) -> float:
     An F that stood before a change between inch and mm keeps its degrees, but no longer shows them: with two units in
     a program, only an F of the motion's own block is known (`own_feed`).
     """
-    mode = moves.feed_mode[row]
-    if moves.kind[row] != Kind.FEED or mode == FeedMode.INVERSE_TIME:
-        return float("nan")
-    way = moves.end[row] - moves.start[row]
-    turn = np.rad2deg(np.linalg.norm(way[moves.rotary]))
-    if not turn > 0 or np.any(np.abs(way[~moves.rotary]) > 0):
+    mode, turn = moves.feed_mode[row], turn_alone(moves, row)
+    if mode == FeedMode.INVERSE_TIME or not turn:
         return float("nan")
     if not own_feed and len({frame.unit for frame in moves.frames}) > 1:
         return float("inf")
