@@ -44,12 +44,12 @@ def assert_same_as_the_grammar(program: Program, block: int) -> None:
 
 
 def assert_every_byte_is_accounted_for(program: Program, block: int) -> None:
-    """The items stand in order, do not overlap, and leave nothing but blanks between them."""
+    """The items stand in order, do not overlap, and leave nothing but blanks, and what joins lines, between them."""
     text = program.source[slice(*program.blocks[block])]
     done = 0
     for item in program.items_of(block):
         start, stop = (place - int(program.blocks[block, 0]) for place in program.span(block, item.span))
         assert done <= start < stop <= len(text) or (isinstance(item, Opaque) and start == stop == done)
-        assert not text[done:start].strip(b" \t\r")
+        assert not text[done:start].strip(b" \t\r\n~")
         done = stop
-    assert not text[done:].strip(b" \t\r")
+    assert not text[done:].strip(b" \t\r\n~")

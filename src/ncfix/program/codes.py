@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ncfix.diagnostics import Code
 from ncfix.program.sinumerik.codes import SINUMERIK_CODES
+from ncfix.program.klartext.messages import KLARTEXT_CODES
 from ncfix.program.trace_codes import TRACE_CODES
 
 CODES: dict[str, Code] = {
@@ -82,5 +83,5 @@ CODES: dict[str, Code] = {
         "After an O-word stands no keyword that the control knows, or more than belongs to it.",
         "One of sub, endsub, call, return, if, elseif, else, endif, while, do, repeat, break, continue.",
     ),
-} | TRACE_CODES
+} | TRACE_CODES | KLARTEXT_CODES
 CODES.update(SINUMERIK_CODES)

@@ -1,0 +1,60 @@
+"""M codes that matter to where the tool goes. Others, also those of the machine's builder, move nothing.
+
+Source: TNC 640, "Miscellaneous functions". M128 acts from the start of its block, M129 from its end.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.program.klartext.control import RETRACTED, Control
+from ncfix.program.klartext.paths import Step
+from ncfix.program.klartext.targets import Words
+
+SUSPENDING = {
+    114: "M114: the control works the geometry of the machine into positions",
+    144: "M144: the control works the geometry of the machine into positions",
+}
+ENDING = {115: 114, 145: 144}
+UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
+RETRACT = "retract along the tool axis (M140)"
+COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
+
+
+def before_motion(control: Control, step: Step) -> None:
+    """What acts from the start of the block."""
+    for flag, side in COMPENSATION.items():
+        if flag in step.flags:
+            control.modal.compensated = side
+    for code in step.codes:
+        if code in SUSPENDING:
+            control.suspended[f"M{code}"] = SUSPENDING[code]
+        elif code in ENDING:
+            control.suspended.pop(f"M{ENDING[code]}", None)
+    control.suspended.pop("M130", None)
+    if 130 in step.codes and control.transformations.tilted:
+        control.suspended["M130"] = UNTILTED
+    if step.codes & {126, 127}:
+        control.shortest = 126 in step.codes
+    if 136 in step.codes or 137 in step.codes:
+        control.modal.feed_mode = 95 if 136 in step.codes else 94
+    if 128 in step.codes:
+        tip_control(control, on=True)
+
+
+def tip_control(control: Control, *, on: bool) -> None:
+    """M128 and M129, FUNCTION TCPM."""
+    control.m128 = on
+    control.switch_tip()
+
+
+def after_motion(control: Control, code: int, own: Words, flags: frozenset[str]) -> None:
+    """What acts at the end of the block."""
+    if code == 129:
+        tip_control(control, on=False)
+    elif code == 94:
+        for index in control.machine:
+            if control.rotary[index]:
+                control.position[index] %= 2 * math.pi
+    elif code == 140:
+        control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")

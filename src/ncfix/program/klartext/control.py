@@ -1,0 +1,188 @@
+"""The TNC while it follows a program: what a block changes and later blocks rely on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ncfix.program.dialect import Dialect
+from ncfix.program.klartext.calculate import Parameters, Scope
+from ncfix.program.klartext.transformations import Transformations
+from ncfix.program.moves import Kind, Kinematics
+from ncfix.program.rs274 import control as base
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.builder import Arc
+from ncfix.program.rs274.control import Unknown
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Plane, Vector, Z, rotated, zeros
+from ncfix.program.rs274.knowledge import WORK_OFFSET
+from ncfix.program.setup import Setup, Tool
+
+START = "PRESET"
+"""The name in the setup of the preset that is active when the program starts; G54 is taken for it."""
+
+TILTED, DOUBTFUL, TOOL = "tilt", "doubt", "tool"
+"""The keys under which motions are suspended."""
+
+
+RETRACTED = "where the axis {} stands after M140 is not followed"
+"""Rapids at such a height are passed: the tool is off the workpiece, and the next block that names the axis is not."""
+
+
+@dataclass(slots=True)
+class Path:
+    """What the next path function may need of the ones before.
+
+    pole     the pole, mm along the axes of its plane in the program's frame; None where not known
+    plane    the plane of the pole
+    tangent  the direction in which the last path element ended, commands; None where there is none
+    corner   the block before was a corner (RND, CHF)
+    ahead    the block that follows is one
+    """
+
+    pole: tuple[float, float] | None = None
+    plane: Plane = PLANES[170]
+    tangent: tuple[float, float, float] | None = None
+    corner: bool = False
+    ahead: bool = False
+
+
+@dataclass(slots=True)
+class CycleInForce:
+    """The cycle that CYCL CALL, M99 and M89 execute.
+
+    number  0: none was defined
+    steps   of the old cycles, what 1.1, 1.2, ... say: address or word -> value
+    modal   M89: every positioning block executes it
+    """
+
+    number: int = 0
+    steps: dict[str, float] = field(default_factory=dict)
+    modal: bool = False
+
+
+class Control(base.Control):
+    """A TNC. Positions, motions and frames are kept as for the RS274 family."""
+
+    def __init__(
+        self,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        dialect: Dialect,
+        kinematics: Kinematics | None = None,
+    ) -> None:
+        super().__init__(setup, axes, rotary, dialect, kinematics)
+        self.transformations = Transformations()
+        self.scope = Scope(parameters=Parameters(dict(q_parameters(setup))))
+        self.path = Path()
+        self.cycle = CycleInForce()
+        self.unit = 1.0
+        self.m128 = setup.tcp
+        self.shortest = False
+        self.auto_feed = math.nan
+        self.preset = ""
+        self.preset_checked = False
+        self.tool_called = False
+        self.defined_tools: dict[int, Tool] = {}
+        self.load_preset(START if START in setup.work_offsets else "G54")
+
+    # -- coordinates --------------------------------------------------------------------------------------------------
+
+    def load_preset(self, name: str) -> None:
+        """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
+        given = self.setup.work_offsets.get(name)
+        self.preset, self.preset_checked = name, given is not None
+        self.transformations.preset = zeros()
+        for letter, value in (given or {}).items():
+            index = INDEX[letter]
+            self.transformations.preset[index] = value * (DEGREE if self.rotary[index] else 1.0)
+        self.recompose()
+
+    def recompose(self) -> None:
+        """Make the frame of the transformations; to be called after any of them has changed."""
+        trans = self.transformations
+        self.offsets.origin = trans.preset
+        self.offsets.shift = trans.whole_shift
+        self.offsets.rotation = trans.rotation
+        self.modal.unit = self.unit * trans.scale
+        if trans.doubtful:
+            self.suspended[DOUBTFUL] = trans.doubtful
+        else:
+            self.suspended.pop(DOUBTFUL, None)
+        self.refresh()
+
+    def switch_tip(self) -> None:
+        """Whether X Y Z are tool-tip coordinates may have changed."""
+        on = self.m128 or self.transformations.tilted
+        if on != self.tcp:
+            self.ask_for_tool()
+            tcp.switch(self, self.offsets.tool, on)
+        self.refresh()
+
+    def use(self) -> None:
+        """A motion in workpiece coordinates: preset and tool length matter."""
+        if not self.preset_checked:
+            self.preset_checked = True
+            name = "the active preset" if self.preset in (START, "G54") else f"preset {self.preset[6:]}"
+            option = START if self.preset in (START, "G54") else self.preset
+            self.knowledge.lack(WORK_OFFSET, name, "is used", f"--offset {option}=x,y,z")
+        self.ask_for_tool()
+
+    def ask_for_tool(self) -> None:
+        """Before the first TOOL CALL it matters which tool is in the spindle."""
+        if not self.tool_called:
+            self.tool_called = True
+            self.offsets.tool[Z] = self.knowledge.tool_length(0)
+            self.refresh()
+
+    def inner(self) -> Vector:
+        """Where the control stands along the axes of the program's frame, mm and rad."""
+        return self.program_position()
+
+    def outer(self, inner: Vector) -> Vector:
+        """The command of a position along the axes of the program's frame."""
+        turned = rotated(self.rotation, inner) if self.is_rotated else inner
+        return [a + b for a, b in zip(turned, self.offset, strict=True)]
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def move(
+        self,
+        kind: Kind,
+        axes: int,
+        target: Vector,
+        unknown: Unknown,
+        code: int,
+        *,
+        refusal: str = "",
+        passing: str = "",
+        arc: Arc | None = None,
+    ) -> None:
+        """As for the RS274 family; elements at a corner that the control makes (RND, CHF) must not be split."""
+        before = self.modal.compensated
+        if self.path.corner or self.path.ahead:
+            self.modal.compensated = before or 41
+        super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc)
+        self.modal.compensated = before
+
+    def lost_to(self, reason: str, unknown: Unknown) -> bool:
+        """All that is not known is lost to one reason."""
+        return bool(unknown) and all(why == reason for why in unknown.values())
+
+    def refuse_here(self, reason: str) -> None:
+        """A motion that is not followed: none of the axes is known afterwards."""
+        unknown = dict.fromkeys(self.machine, reason)
+        super().move(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason)
+        self.path.tangent = None
+
+    def pass_here(self, reason: str, lost: str, letters: str) -> None:
+        """A motion of the control's own; these axes are not known afterwards."""
+        unknown = dict(self.unknown)
+        unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
+        super().move(Kind.RAPID, 0, self.position[:], unknown, 0, passing=reason)
+        self.path.tangent = None
+
+
+def q_parameters(setup: Setup) -> dict[str, float]:
+    """The Q parameters that the setup gives."""
+    return {name.upper(): value for name, value in setup.variables.items() if name[:1] in "Qq"}

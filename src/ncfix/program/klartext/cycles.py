@@ -1,0 +1,207 @@
+"""CYCL DEF and what executes cycles: CYCL CALL, M99, M89.
+
+Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom; the depths stand in the
+cycle's parameters and are left as they are, the position over the hole is corrected for its bottom. Cycles that make a
+path of their own are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.paths import Step, refuse
+from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
+from ncfix.program.klartext.tilting import cycle_19
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, Z
+from ncfix.program.rs274.faults import Fault
+
+NO_CYCLE = "NCF272"
+DEPTHS = "NCF274"
+DRILLING = frozenset({200, 201, 202, 203, 204, 205, 206, 207, 208, 209, 240, 241})
+OLD_DRILLING = frozenset({1, 2, 17, 18})
+GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
+DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
+HARMLESS = frozenset({9, 13, 32, 239, 392})
+"""Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
+
+BY_DEPTH, FROM_START = 2000, 1000
+"""Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
+
+AT_ONCE = frozenset({7, 8, 10, 11, 19, 26, 247})
+"""Cycles that take effect where they are defined."""
+
+TABLE = "the datum of the axis {} comes from a table that is not given"
+NO_PRESET = "the number of the preset is known only at run time"
+OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
+AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
+DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
+IN_PLACE = "a cycle is executed where the axes stand; the block has no position to correct"
+LEFT = "the depths of cycles are left as they are; only the position of a hole is corrected"
+
+
+# -- definition -------------------------------------------------------------------------------------------------------
+
+
+def define(control: Control, name: str, words: Words, text: str) -> None:
+    """A CYCL DEF block: `name` is `200`, or `7.1`."""
+    number, _, part = name.partition(".")
+    cycle = int(number)
+    if cycle in AT_ONCE:
+        define_at_once(control, cycle, part, words, text)
+        return
+    if cycle in HARMLESS:
+        return
+    if part in ("", "0"):
+        control.cycle.number, control.cycle.steps = cycle, {}
+    words_of_step = {**words.values}
+    if words.runtime:
+        words_of_step["?"] = 1.0
+    control.cycle.steps |= {f"{part}:{key}": value for key, value in words_of_step.items()}
+
+
+def define_at_once(control: Control, cycle: int, part: str, words: Words, text: str) -> None:
+    """Coordinate transformations."""
+    trans = control.transformations
+    if cycle == 7:
+        shift(control, words, text)
+    elif cycle == 8 and part == "1":
+        trans.mirror_axes(frozenset(text.upper()) & frozenset("XYZABC"))
+    elif cycle == 10 and part == "1":
+        rotation = words.values.get("ROT", words.values.get("IROT"))
+        suspend(control, words, "rotation")
+        trans.rotate(rotation or 0.0, incremental="IROT" in words.values)
+    elif cycle == 11 and part == "1":
+        suspend(control, words, "scale")
+        trans.scale_by(words.values.get("SCL", 1.0))
+    elif cycle == 26 and part not in ("", "0"):
+        factors = {key: value for key, value in words.values.items() if key in "XYZ"}
+        control.suspended.pop("scales", None)
+        if any(factor != 1.0 for factor in factors.values()):
+            control.suspended["scales"] = "a scale of single axes (cycle 26)"
+    elif cycle == 19 and part == "1":
+        cycle_19(control, words)
+    elif cycle == 247:
+        preset(control)
+    control.recompose()
+
+
+def suspend(control: Control, words: Words, what: str) -> None:
+    """Nothing is corrected while a transformation depends on what is known only at run time."""
+    control.suspended.pop(what, None)
+    if words.runtime:
+        control.suspended[what] = f"the {what} of the coordinates is known only at run time"
+
+
+def shift(control: Control, words: Words, text: str) -> None:
+    """Cycle 7: `7.1 X+10`, `7.2 IY5`, `7.1 #5` for a row of the datum table."""
+    if "#" in text:
+        for letter in "XYZABCUVW":
+            control.shaky[INDEX[letter]] = TABLE
+        return
+    for address, value in words.values.items():
+        letter = address.removeprefix("I")
+        if letter not in INDEX:
+            continue
+        index = INDEX[letter]
+        scale = DEGREE if control.rotary[index] else control.unit
+        control.transformations.shift_axis(letter, scale * value, incremental=address[0] == "I")
+        control.shaky.pop(index, None)
+        if address in words.runtime:
+            control.shaky[index] = "the datum of the axis {} is known only at run time"
+
+
+def preset(control: Control) -> None:
+    """Cycle 247: the preset of the row Q339."""
+    parameters = control.scope.parameters
+    parameters.touched = False
+    number = parameters.get("Q339")
+    control.suspended.pop("preset", None)
+    if parameters.touched:
+        control.suspended["preset"] = NO_PRESET
+        return
+    control.load_preset(f"PRESET{number:g}")
+
+
+# -- execution --------------------------------------------------------------------------------------------------------
+
+
+def executes(control: Control, step: Step) -> bool:
+    """Whether a positioning block executes the cycle in force: M99, or M89 before or in it. M99 ends M89."""
+    if 89 in step.codes:
+        control.cycle.modal = True
+    once, modal = 99 in step.codes, control.cycle.modal
+    if once:
+        control.cycle.modal = False
+    return once or modal
+
+
+def call(control: Control, step: Step) -> None:
+    """Execute the cycle in force at the position of a block, or where the axes stand."""
+    cycle = control.cycle
+    if cycle.number == 0:
+        raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
+    control.use()
+    if cycle.number not in DRILLING | OLD_DRILLING:
+        own_path(control, step)
+        return
+    control.settle(tuple(control.unknown))
+    is_polar = step.name == "lp"
+    where = polar(control, step.words)[0] if is_polar else led(control, step.words)
+    axes = polar_axes(control, step.words) if is_polar else step.words.axes
+    height = where.inner[Z]
+    bottom, clear, refusal = levels(control, height)
+    drill(control, step, where, axes, (bottom, clear, refusal))
+
+
+def drill(control: Control, step: Step, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
+    """One hole."""
+    bottom, clear, refusal = heights
+    over = Where(where.inner[:], dict(where.unknown))
+    where.inner[Z] = bottom
+    if not refusal:
+        where.unknown.pop(Z, None)
+    target, unknown = command_of(control, where, axes | 1 << Z)
+    passing = "" if axes & ~(1 << Z) else IN_PLACE
+    programmed = axes & ~(1 << Z)
+    control.warn(DEPTHS, LEFT, "the error along the tool axis stays, at most that of the first hole to the last")
+    code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
+    control.move(Kind.CYCLE, programmed, target, unknown, code, refusal="" if passing else refusal, passing=passing)
+    over.inner[Z] = clear
+    if not refusal:
+        over.unknown.pop(Z, None)
+    control.position, control.unknown = command_of(control, over, axes | 1 << Z)
+    control.path.tangent = None
+
+
+def levels(control: Control, height: float) -> tuple[float, float, str]:
+    """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
+    cycle, unit = control.cycle, control.modal.unit
+    if cycle.number in OLD_DRILLING:
+        depth, gap = said(cycle.steps, DEPTH_WORDS), said(cycle.steps, GAP_WORDS)
+        if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
+            return height, height, DEPTH_AT_RUN_TIME
+        sign = -1.0 if depth < 0 else 1.0
+        return height + sign * unit * (abs(gap) + abs(depth)), height, ""
+    parameters = control.scope.parameters
+    parameters.touched = False
+    gap, depth, surface, second = (parameters.get(name) for name in ("Q200", "Q201", "Q203", "Q204"))
+    by_diameter = cycle.number == 240 and parameters.get("Q343") != 0.0
+    if parameters.touched or by_diameter:
+        return height, height, DEPTH_AT_RUN_TIME
+    clear = surface + max(gap, second)
+    return unit * (surface + depth), unit * clear, ""
+
+
+def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
+    """What an old cycle says under one of several names."""
+    return next((value for key, value in steps.items() if "".join(key.partition(":")[2].split()) in names), None)
+
+
+def own_path(control: Control, step: Step) -> None:
+    """A cycle that is not followed: the position is, and then nothing is known."""
+    number = control.cycle.number
+    refuse(control, OWN_PATH.format(number))
+    lost = AFTER_CYCLE.replace("{number}", str(number))
+    control.lose(range(3), lost)

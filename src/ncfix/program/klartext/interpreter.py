@@ -1,0 +1,282 @@
+"""The walk through a Klartext program: block after block, as labels and calls lead."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from ncfix.diagnostics import Place, SourceError
+from ncfix.program.klartext import cycles, paths, tilting
+from ncfix.program.klartext.calculate import Evaluate
+from ncfix.program.klartext.codes import after_motion, before_motion
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.flow import FlowControl
+from ncfix.program.klartext.paths import Step
+from ncfix.program.klartext.plans import Plan
+from ncfix.program.klartext.statements import statement
+from ncfix.program.klartext.targets import Words, axis_letters, set_pole
+from ncfix.program.klartext.tools import call_tool, define_tool
+from ncfix.program.klartext.units import Unit
+from ncfix.program.language import Resolve
+from ncfix.program.reach import UNREAD
+from ncfix.program.reader import read
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.tree import Opaque, Program, Span
+
+ENDLESS = "NCF233"
+NO_END = "NCF234"
+SKIPPED_BLOCKS = "NCF235"
+UNREADABLE = "NCF236"
+AT_RUN_TIME = "NCF277"
+NOT_KLARTEXT = "this line is not Klartext; the control stops at it"
+SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
+NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
+"""Addresses in motion blocks that lead nowhere."""
+
+CORNERS = frozenset({"rnd", "chf"})
+
+
+class Interpreter:
+    """Follows one program."""
+
+    def __init__(self, control: Control, program: Program, resolve: Resolve | None, max_blocks: int) -> None:
+        self.control = control
+        self.resolve = resolve
+        self.budget = max_blocks
+        self.files: dict[str, Unit | None] = {}
+        self.program = program
+        self.flow: FlowControl | None = None
+        self.span: Span | None = None
+        control.locate = self.place
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        if self.flow is None or self.flow.block == 0:
+            return Place(self.program.path, 1)
+        return self.flow.unit.program.place(self.flow.block - 1, self.span)
+
+    def find(self, name: str) -> Unit | None:
+        """The program of a call: beside this one, by its name without folders."""
+        if name not in self.files:
+            base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
+            tries = (base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper())
+            found = ((each, self.resolve(each)) for each in tries if self.resolve)
+            units = (Unit(read(text, each, self.program.dialect), each) for each, text in found if text)
+            self.files[name] = next(units, None)
+        return self.files[name]
+
+    def run(self) -> None:
+        """Follow the program to its end; raises SourceError where the control would stop."""
+        try:
+            main = Unit(self.program)
+            self.flow = FlowControl(main, self.find, main.begin)
+            self.control.unit = main.mm
+            self.control.recompose()
+            self.walk(self.flow)
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def walk(self, flow: FlowControl) -> None:
+        """Block after block."""
+        control = self.control
+        while flow.block < len(flow.unit):
+            unit, block = flow.unit, flow.block
+            plan = unit.plans[block]
+            flow.block += 1
+            if plan.empty:
+                continue
+            self.budget -= 1
+            if self.budget < 0:
+                raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+            control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
+            control.external = unit.name
+            if not unit.name:
+                control.row_block = block
+            if plan.skip and self.is_skipped():
+                continue
+            if self.execute(plan, flow):
+                return
+        control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+
+    def is_skipped(self) -> bool:
+        """Whether blocks with `/` are passed over."""
+        if self.control.setup.block_skip:
+            return True
+        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "block_skip = true in the setup file")
+        return False
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan, flow: FlowControl) -> bool:
+        """Execute a block; True if the program ends there."""
+        control = self.control
+        if plan.statement is not None:
+            return self.state(plan, flow)
+        if plan.flow is not None:
+            self.branch(plan, flow)
+            return False
+        self.assign(plan)
+        words = self.evaluated(plan.words)
+        name = plan.name
+        if name.startswith("tool "):
+            (call_tool if name == "tool call" else define_tool)(control, self.tool_of(plan), words, plan.flags)
+        elif name.startswith("cycl def "):
+            cycles.define(control, name.removeprefix("cycl def "), words, self.names(plan, flow))
+        elif name.startswith("plane "):
+            tilting.plane(control, name.removeprefix("plane "), words, plan.flags)
+        elif name.startswith("trans datum"):
+            self.shift_datum(name, words)
+        else:
+            return self.motion(plan, words, flow)
+        return False
+
+    def state(self, plan: Plan, flow: FlowControl) -> bool:
+        """A statement that is not taken apart."""
+        assert plan.statement is not None
+        kind, span = plan.statement
+        text = flow.unit.program.slice(flow.block - 1, span)
+        if kind == UNREAD:
+            self.control.warn(UNREADABLE, NOT_KLARTEXT, "correct the line, or name the dialect with --dialect")
+            self.control.refuse_here(NOT_KLARTEXT)
+        elif kind == "program":
+            return text.upper().startswith("END") and flow.end_of_program()
+        else:
+            statement(self.control, flow, text)
+        return False
+
+    def branch(self, plan: Plan, flow: FlowControl) -> None:
+        """A label, a call or a condition."""
+        assert plan.flow is not None
+        label = str(plan.flow.label)
+        match plan.flow.keyword:
+            case "label" if label == "0":
+                flow.end_of_subprogram()
+            case "call":
+                times = plan.flow.arguments
+                flow.call(label, int(times[0].value) if times else None)  # type: ignore[union-attr]
+            case "if" if self.holds(plan):
+                flow.jump(label)
+
+    def holds(self, plan: Plan) -> bool:
+        """Whether a condition is met; raises `Fault` if that is known only at run time."""
+        assert plan.test is not None
+        parameters = self.control.scope.parameters
+        parameters.touched = False
+        met = plan.test(self.control.scope) != 0.0
+        if parameters.touched:
+            text = f"where the program goes on depends on {parameters.lacking}, which is known only at run time"
+            raise Fault(AT_RUN_TIME, text, f'variables."{parameters.lacking}" in the setup file gives it a value')
+        return met
+
+    def assign(self, plan: Plan) -> None:
+        """Set Q parameters."""
+        parameters = self.control.scope.parameters
+        for name, value in plan.assignments:
+            parameters.touched = False
+            found = value(self.control.scope)
+            parameters.assign(name, found, parameters.touched)
+
+    def evaluated(self, words: Mapping[str, Evaluate]) -> Words:
+        """The words of a block as numbers."""
+        parameters = self.control.scope.parameters
+        values, runtime = {}, []
+        for address, value in words.items():
+            parameters.touched = False
+            values[address] = value(self.control.scope)
+            if parameters.touched:
+                runtime.append(address)
+        return Words(values, frozenset(runtime))
+
+    def tool_of(self, plan: Plan) -> str | float | None:
+        """The number or name of a tool; a name for a number that is known only at run time."""
+        if plan.tool is None or isinstance(plan.tool, str):
+            return plan.tool
+        parameters = self.control.scope.parameters
+        parameters.touched = False
+        number = plan.tool(self.control.scope)
+        return parameters.lacking if parameters.touched else number
+
+    def names(self, plan: Plan, flow: FlowControl) -> str:
+        """The words of a cycle definition that have no value."""
+        program, block = flow.unit.program, flow.block - 1
+        items = program.items_of(block)
+        return " ".join(program.slice(block, item.span) for item in items if isinstance(item, Opaque))
+
+    def shift_datum(self, name: str, words: Words) -> None:
+        """TRANS DATUM."""
+        if name.endswith("reset"):
+            self.control.transformations.reset_shift()
+        cycles.shift(self.control, words, "")
+        self.control.recompose()
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def motion(self, plan: Plan, words: Words, flow: FlowControl) -> bool:
+        """A block of path words and M codes; True if it ends the program."""
+        control = self.control
+        codes = frozenset(code for code, _ in plan.codes)
+        self.feed(words, plan)
+        values = {address: value for address, value in words.values.items() if address not in NOT_OF_MOTION}
+        step = Step(plan.name, Words(values, words.runtime & values.keys()), plan.flags, codes)
+        self.note_foreign(plan, step)
+        before_motion(control, step)
+        control.path.ahead = self.corner_ahead(flow)
+        self.move(plan, step)
+        for code, own in plan.codes:
+            after_motion(control, code, self.evaluated(own), plan.flags)
+        return bool(codes & {2, 30}) and not control.external
+
+    def note_foreign(self, plan: Plan, step: Step) -> None:
+        """Note axes that the program moves and the machine lacks."""
+        control = self.control
+        for letter in axis_letters(step.words):
+            if INDEX[letter] not in control.machine and letter not in control.foreign:
+                self.span = plan.spans.get(letter) or plan.spans.get("I" + letter)
+                control.note_foreign(letter)
+                self.span = None
+
+    def feed(self, words: Words, plan: Plan) -> None:
+        """F, in mm or inches per minute; FU per revolution; FAUTO as TOOL CALL has it."""
+        modal = self.control.modal
+        for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
+            if address in words.values:
+                known = address not in words.runtime and address in ("F", "FU")
+                modal.feed = words.values[address] * self.control.unit if known else math.nan
+                modal.feed_mode = mode
+        if "fauto" in plan.flags:
+            modal.feed = self.control.auto_feed
+
+    def corner_ahead(self, flow: FlowControl) -> bool:
+        """Whether the next block makes a corner of the end of this one."""
+        plans = flow.unit.plans
+        following = (plans[block] for block in range(flow.block, len(plans)) if not plans[block].empty)
+        return next((plan.name in CORNERS for plan in following), False)
+
+    def move(self, plan: Plan, step: Step) -> None:
+        """What moves in a block, if anything does."""
+        control = self.control
+        if step.name == "cc":
+            set_pole(control, step.words)
+            return
+        if step.name in CORNERS:
+            control.path.corner = True
+            return
+        calls = step.name.startswith("cycl call")
+        if calls and step.name.endswith("pat"):
+            control.refuse_here("a pattern of holes (CYCL CALL PAT)")
+        elif plan.moves and step.codes & {91, 92}:
+            paths.at_machine(control, step)
+        elif calls or (cycles.executes(control, step) and (plan.moves or 99 in step.codes)):
+            cycles.call(control, step)
+        elif step.name.startswith("appr "):
+            paths.approach(control, step)
+        elif step.name.startswith("dep "):
+            paths.departure(control, step)
+        elif plan.moves or step.name in ("ln",):
+            paths.PATHS[step.name](control, step)
+        else:
+            return
+        control.path.corner = False

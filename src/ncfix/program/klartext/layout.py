@@ -1,0 +1,127 @@
+"""Where things stand in a Klartext motion block: what may be rewritten, and where missing words go."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ncfix.program.klartext.plans import FUNCTIONS, OPENING
+from ncfix.program.layout import AXIS_LETTERS
+from ncfix.program.tree import Anchor, Command, Constant, Literal, Program, Skip, Span, Word
+
+POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
+LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
+"""M codes that act at the end of their block: they belong on its last piece."""
+
+FALLBACK = Word("L", Constant(10.0), Span(Anchor(-1, 0), Anchor(-1, 0)), Span(Anchor(-1, 0), Anchor(-1, 0)))
+"""Every Klartext block says itself how it moves; blocks of words alone are straight."""
+
+RELATIVE_POLE = re.compile(rb"(?im)^[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n;]*I[XYZ]|[ \t]*(?:;|\r?$))")
+"""A pole that counts from where the tool stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The writable parts of a motion block.
+
+    name      its path function, as in `Plan.name`
+    function  where that is written, None in a block of words alone
+    axes      axis -> its word, absolute or incremental
+    polar     PR, PA, IPR, IPA words
+    radius    the R word of CR
+    sense     DR+ or DR-
+    late      M codes that act at the end of the block
+    words_at  where missing words go: after the last word that leads somewhere
+    starts_at where the function stands, or the first word
+    blank     what separates words in this block
+    comma     numbers have a decimal comma
+    rapid     FMAX
+    """
+
+    name: str
+    function: Span | None
+    axes: dict[str, Word]
+    polar: tuple[Word, ...]
+    radius: Word | None
+    sense: Span | None
+    late: tuple[Word, ...]
+    words_at: Anchor
+    starts_at: Anchor
+    blank: str
+    comma: bool
+    rapid: bool
+
+    @property
+    def motion(self) -> Word | None:
+        """The block says itself which kind of motion it is."""
+        return FALLBACK
+
+    def turn(self, program: Program, block: int) -> float | None:
+        """The angle of a CP in rad, if it is given by IPA."""
+        word = next((word for word in self.polar if word.address == "IPA"), None)
+        if word is None or not isinstance(word.value, Literal):
+            return None
+        return math.radians(float(program.values_of(block)[word.value.slot]))
+
+
+def layout_of(program: Program, block: int) -> Layout | None:
+    """The layout of a block; None for an angle from a Q parameter, which may be several turns."""
+    items = program.items_of(block)
+    commands = [item for item in items if isinstance(item, Command)]
+    words = [item for item in items if isinstance(item, Word) and item.address != "N"]
+    functions = [c for c in commands if c.name in FUNCTIONS or c.name.startswith(OPENING)]
+    function = functions[0] if functions else None
+    axes = {w.address.removeprefix("I"): w for w in words if w.address.removeprefix("I") in AXIS_LETTERS}
+    polar = tuple(word for word in words if word.address in POLAR)
+    if any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar):
+        return None
+    leading = [*axes.values(), *polar]
+    begins = [item.span.start for item in items if not isinstance(item, Skip) and item not in numbers_of(items)]
+    last = max(leading, key=lambda word: program.position(block, word.span.stop), default=None)
+    return Layout(
+        name=function.name if function else "",
+        function=function.span if function else None,
+        axes=axes,
+        polar=polar,
+        radius=next((word for word in words if word.address == "R"), None),
+        sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
+        late=tuple(
+            w for w in words if w.address == "M" and isinstance(w.value, Constant) and int(w.value.value) in LATE
+        ),
+        words_at=last.span.stop if last else function.span.stop if function else Anchor(-1, 0),
+        starts_at=begins[0] if begins else Anchor(-1, 0),
+        blank=separator(program, block, last),
+        comma=uses_comma(program.source),
+        rapid=any(command.name == "fmax" for command in commands),
+    )
+
+
+def numbers_of(items: tuple[object, ...]) -> list[object]:
+    """The block number, as an item."""
+    return [item for item in items if isinstance(item, Word) and item.address == "N"]
+
+
+def separator(program: Program, block: int, word: Word | None) -> str:
+    """The blanks before the last word."""
+    if word is None:
+        return " "
+    at = program.position(block, word.span.start)
+    start = int(program.blocks[block, 0])
+    before = program.source[start:at].decode("latin-1")
+    blanks = before[len(before.rstrip(" \t")) :]
+    return blanks or " "
+
+
+@lru_cache(maxsize=4)
+def uses_comma(source: bytes) -> bool:
+    """Whether a program writes decimal commas and no points in its motion blocks."""
+    commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source))
+    return commas > len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source))
+
+
+@lru_cache(maxsize=4)
+def poles_move(source: bytes) -> bool:
+    """Whether some pole counts from where the tool stands, and so moves with its correction."""
+    return RELATIVE_POLE.search(source) is not None

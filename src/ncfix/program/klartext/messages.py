@@ -1,0 +1,50 @@
+"""The codes of following Klartext programs."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+KLARTEXT_CODES: dict[str, Code] = {
+    "NCF271": Code(
+        "No pole",
+        "An arc or a polar coordinate counts from the pole, and no CC has set one that is known.",
+        "Put CC with both coordinates before it.",
+    ),
+    "NCF272": Code(
+        "No cycle",
+        "CYCL CALL, M99 or M89 executes the cycle that was defined last, and none was.",
+        "Put its CYCL DEF before it.",
+    ),
+    "NCF273": Code(
+        "No plane",
+        "The vectors or points of a PLANE block lie in one line, or its angles give no plane.",
+        "Check its words.",
+    ),
+    "NCF274": Code(
+        "Depths of cycles stay",
+        "The depths of a hole stand in its cycle, which many holes share. They are left as they are; the position of "
+        "each hole is corrected for its bottom, the error along the tool axis stays.",
+        "Write the holes out where their depth matters.",
+    ),
+    "NCF275": Code(
+        "No beginning",
+        "A Klartext program begins with BEGIN PGM, its name, and MM or INCH.",
+        "Check that it is Klartext, and that it was transferred completely.",
+    ),
+    "NCF276": Code(
+        "No such label",
+        "A call or a jump names a label that is not in the program.",
+        "Check its LBL.",
+    ),
+    "NCF277": Code(
+        "Decided at run time",
+        "Where the program goes on depends on a Q parameter that it does not set itself: a result of the control, or "
+        "what an earlier program left.",
+        'Give its value: variables."Q1" in the setup file.',
+    ),
+    "NCF278": Code(
+        "Stopped by the program",
+        "The program checks its parameters, and stops with an error of its own (FN 14).",
+        "Check the parameters with which it is called.",
+    ),
+}

@@ -1,0 +1,80 @@
+"""How the machine stands to the workpiece, asked of its kinematics: for tilted planes.
+
+The kinematics say where the tip of a tool of any length is in the workpiece. The tip of a longer tool less that of a
+shorter one is the direction of the tool; the tip with an axis moved less the tip without is the direction of that axis.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.transformations import Triple, minus, unit
+from ncfix.program.moves import TcpState
+from ncfix.program.rs274.coordinates import Rotation, Vector, X, Y, Z, as_rotation
+
+PROBE = 128.0
+"""mm; a power of two, so that dividing by it rounds nothing."""
+
+SAME = 2e-4
+"""Directions closer than this, rad, are one: rotary words have three decimals of a degree, 9e-6 rad each."""
+
+NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
+
+
+@dataclass(frozen=True, slots=True)
+class Posture:
+    """Directions in the workpiece.
+
+    tool   from the tip to the spindle
+    axes   of the machine's X, Y and Z, as columns of a rotation
+    """
+
+    tool: Triple
+    axes: Rotation
+
+
+def tip(control: Control, position: Vector, length: float) -> Triple:
+    """The tip in the workpiece, mm."""
+    assert control.kinematics is not None
+    command = [position[index] for index in control.machine]
+    found = control.kinematics(command, TcpState(False, 0.0), TcpState(True, length))
+    x, y, z = (found[control.machine.index(index)] for index in (X, Y, Z))
+    return x, y, z
+
+
+def posture(control: Control, position: Vector) -> Posture | None:
+    """How the machine stands with its rotary axes at these positions; None if nobody knows its kinematics."""
+    if control.kinematics is None or not {X, Y, Z} <= set(control.machine):
+        return None
+    still = [value if control.rotary[index] else 0.0 for index, value in enumerate(position)]
+    origin = tip(control, still, 0.0)
+    tool = unit(minus(origin, tip(control, still, PROBE)))
+    columns = []
+    for index in (X, Y, Z):
+        moved = still[:]
+        moved[index] = PROBE
+        columns.append(unit(minus(tip(control, moved, 0.0), origin)))
+    if tool is None or any(column is None for column in columns):
+        return None
+    return Posture(tool, as_rotation(list(zip(*columns, strict=True))))
+
+
+def apart(a: Triple, b: Triple) -> float:
+    """The angle between two unit vectors, rad."""
+    cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return math.hypot(*minus(a, b)) if cosine > 0 else math.pi - math.hypot(a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def normal_of(tilt: Rotation) -> Triple:
+    """The Z axis of a tilted plane."""
+    return tilt[0][2], tilt[1][2], tilt[2][2]
+
+
+def stands_normal(control: Control, tilt: Rotation) -> bool | None:
+    """Whether the tool stands normal to a plane; None if that is not known."""
+    if any(control.rotary[index] and index in control.unknown for index in control.machine):
+        return None
+    found = posture(control, control.position)
+    return None if found is None else apart(found.tool, normal_of(tilt)) < SAME

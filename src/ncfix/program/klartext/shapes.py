@@ -1,0 +1,73 @@
+"""Blocks, numbers and shapes of Klartext: lines joined by `~`, decimal points or commas."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.numbers import NUMERIC, find_numbers, table
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, odd_blocks, shape_keys, split_blocks
+
+COMMENT = re.compile(rb";[^\r\n]*")
+JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
+"""The mark at the end of a line that the next line continues."""
+
+FIXED = table(b"QqRrMmNn")
+"""A number after these belongs to the shape, or may: `Q5`, `R0`, `M3`; the grammar is asked for each such shape."""
+
+COMMAS = bytes.maketrans(b",\n", b".\x0b")
+"""Decimal commas as points, and line ends within a block as blanks: for the scan only, which counts bytes."""
+
+
+def split(source: bytes) -> NDArray[np.int64]:
+    """Start and stop byte of each block, shape (n, 2): lines, with those that `~` continues joined."""
+    lines = split_blocks(source)
+    marks = np.array([match.start() for match in JOINED.finditer(source)], dtype=np.int64)
+    if not len(marks):
+        return lines
+    continued = np.zeros(len(lines), dtype=np.bool_)
+    continued[block_of(lines, marks)] = True
+    continued[-1] = False
+    starts = np.append(True, ~continued[:-1])
+    return np.stack((lines[starts, 0], lines[~continued, 1]), axis=1)
+
+
+def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
+    """No block ends the text for the reader: labels may stand behind the program's end."""
+    return len(blocks)
+
+
+def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
+    text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
+    comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
+    comments = comments[inside(blocks, comments[:, 0])]
+    numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), comments[:, 0], comments[:, 1]), FIXED)
+    block_of_number = block_of(blocks, numbers.spans[:, 0])
+    comment = np.full(len(blocks), -1, dtype=np.int64)
+    comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
+    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
+    shapes = shape_keys(text, blocks, numbers.spans, comments, marks)
+    for block in {
+        *block_of_number[numbers.broken].tolist(),
+        *odd_blocks(text, blocks),
+        *of_several_lines(text, blocks),
+    }:
+        shapes[block] = None
+    first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
+    return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+
+
+def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which places stand inside a block."""
+    found: NDArray[np.bool_] = places < blocks[block_of(blocks, places), 1]
+    return found
+
+
+def of_several_lines(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
+    """The blocks with a line end in them."""
+    places = np.flatnonzero(text == COMMAS[ord("\n")])
+    owner = block_of(blocks, places)
+    return list(map(int, owner[places < blocks[owner, 1]]))

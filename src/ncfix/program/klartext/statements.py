@@ -1,0 +1,67 @@
+"""Statements that are known by their first words: they move nothing, or are refused."""
+
+from __future__ import annotations
+
+import re
+
+from ncfix.program.klartext.codes import tip_control
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.flow import FlowControl
+from ncfix.program.rs274.faults import Fault
+
+PROBING = "probing"
+AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
+FREE_CONTOUR = "free contour programming (FK)"
+ERROR = "NCF278"
+PROBED = range(100, 200)
+"""The Q parameters in which probing cycles and the control itself leave results."""
+
+TARGET = re.compile(r"Q[LRS]?\d+(?=\s*(?:=|,|\s|\Z))", re.IGNORECASE)
+READING = re.compile(r"FN\s*(18|2[0348])\b", re.IGNORECASE)
+PROGRAM_NAME = re.compile(r"CALL\s+PGM\s*(?P<name>.*)", re.IGNORECASE | re.DOTALL)
+FREE = re.compile(r"F(LT|L|CT|C|POL|SELECT)\b", re.IGNORECASE)
+TCPM = re.compile(r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
+STOPPING = re.compile(r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", re.IGNORECASE)
+TRANSFORMATION = re.compile(r"TRANS\s+(MIRROR|ROTATION|SCALE)", re.IGNORECASE)
+CHOSEN = re.compile(r"(SEL\s+(PGM|CYCLE|TABLE)|CALL\s+SELECTED|POLARKIN)", re.IGNORECASE)
+
+
+def statement(control: Control, flow: FlowControl, text: str) -> None:
+    """Do what a statement says."""
+    if found := PROGRAM_NAME.match(text):
+        flow.call_program(found["name"].strip())
+    elif found := TCPM.match(text):
+        tcpm(control, found)
+    elif found := STOPPING.match(text):
+        raise Fault(ERROR, f"the program stops with error {found['number']}", "its own checks refuse its parameters")
+    elif FREE.match(text):
+        control.refuse_here(FREE_CONTOUR)
+    elif re.match(r"TCH\s*PROBE", text, re.IGNORECASE):
+        probe(control)
+    elif TRANSFORMATION.match(text) or CHOSEN.match(text):
+        name = " ".join(text.split()[:2]).upper()
+        control.refusal = control.refusal or f"{name} is not followed"
+    elif READING.match(text):
+        for name in TARGET.findall(text):
+            control.scope.parameters.assign(name.upper(), 0.0, runtime=True)
+
+
+def tcpm(control: Control, found: re.Match[str]) -> None:
+    """FUNCTION TCPM and FUNCTION RESET TCPM."""
+    control.suspended.pop("tcpm", None)
+    if found["reset"]:
+        tip_control(control, on=False)
+        return
+    words = found["rest"].upper()
+    if "AXIS SPAT" in words:
+        control.suspended["tcpm"] = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
+    if "REFPNT" in words and "TIP-TIP" not in words:
+        control.suspended["tcpm"] = "FUNCTION TCPM with a reference point other than the tip"
+    tip_control(control, on=True)
+
+
+def probe(control: Control) -> None:
+    """TCH PROBE: the control moves on its own, and leaves results in Q parameters."""
+    control.pass_here(PROBING, AFTER_PROBING, "XYZ")
+    for number in PROBED:
+        control.scope.parameters.assign(f"Q{number}", 0.0, runtime=True)

@@ -1,0 +1,202 @@
+"""Where the words of a block lead: absolute and incremental words, Cartesian and polar, and what is known of it.
+
+A position along the axes of the program's frame is called inner (mm and rad), a command outer. An axis of the frame is
+known if all axes of the machine that it is made of are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ncfix.program.klartext.control import Control
+from ncfix.program.rs274.control import AT_START, Unknown
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Vector, X, Y, Z
+from ncfix.program.rs274.faults import Fault
+
+BAD_POLE = "NCF271"
+RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
+PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
+"""Planes by their axes; the angle is counted from the first axis (X, Z, Y) towards the second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """The words of one motion as numbers.
+
+    values   address -> value, in program units
+    runtime  addresses whose value is known only at run time
+    """
+
+    values: Mapping[str, float]
+    runtime: frozenset[str]
+
+    @property
+    def axes(self) -> int:
+        """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar`)."""
+        letters = {address.removeprefix("I") for address in self.values if address not in ("PA", "PR", "IPA", "IPR")}
+        return sum(1 << INDEX[letter] for letter in letters if letter in INDEX)
+
+    @property
+    def incremental(self) -> bool:
+        """Some word counts from where the axis stands."""
+        return any(address[0] == "I" for address in self.values)
+
+
+def axis_letters(words: Words) -> list[str]:
+    """The axes that have a word."""
+    letters = (address.removeprefix("I") for address in words.values)
+    return [letter for letter in letters if letter in INDEX]
+
+
+@dataclass(slots=True)
+class Where:
+    """A position along the axes of the frame, and why some of it is not known."""
+
+    inner: Vector
+    unknown: Unknown
+
+
+def here(control: Control) -> Where:
+    """Where the control stands."""
+    return Where(control.inner(), inner_unknown(control, control.unknown))
+
+
+def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
+    """What is not known along the axes of the frame."""
+    if not unknown or not control.is_rotated:
+        return dict(unknown)
+    return mixed(control.inverse, unknown)
+
+
+def mixed(rotation: tuple[tuple[float, float, float], ...], unknown: Unknown) -> Unknown:
+    """What is not known of turned X Y Z: an axis is not if anything that it is made of is not."""
+    found = {index: why for index, why in unknown.items() if index > Z}
+    for index in (X, Y, Z):
+        parts = [k for k in (X, Y, Z) if k in unknown and rotation[index][k] != 0.0]
+        if parts:
+            found[index] = unknown[parts[0]]
+    return found
+
+
+def destination(control: Control, words: Words) -> tuple[Vector, Unknown]:
+    """The command at which the motion of a block ends, and what is not known of it."""
+    return command_of(control, led(control, words), words.axes)
+
+
+def led(control: Control, words: Words) -> Where:
+    """The position to which the words of axes lead."""
+    if words.incremental:
+        settle(control, words)
+    where = here(control)
+    for address, value in words.values.items():
+        letter = address.removeprefix("I")
+        index = INDEX.get(letter)
+        if index is None:
+            continue
+        if address[0] != "I":
+            where.inner[index] = 0.0
+            where.unknown.pop(index, None)
+            if index in control.shaky:
+                where.unknown[index] = control.shaky[index]
+        where.inner[index] += control.scale[index] * value
+        if address in words.runtime:
+            where.unknown[index] = RUNTIME
+    return where
+
+
+def settle(control: Control, words: Words) -> None:
+    """Increments count from where axes stand: start positions that matter are asked for."""
+    wanted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
+    if control.is_rotated:
+        wanted = list(control.machine)
+    control.settle(wanted)
+
+
+def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unknown]:
+    """A position as a command; axes without a word stay exactly where they are."""
+    target = control.outer(where.inner)
+    turned = control.is_rotated and axes & 7
+    for index, position in enumerate(control.position):
+        spatial = turned and index < 3 and any(control.rotation[index][k] and axes >> k & 1 for k in range(3))
+        if not spatial and not axes >> index & 1:
+            target[index] = position
+    unknown = mixed(control.rotation, where.unknown) if control.is_rotated and where.unknown else where.unknown
+    return target, {index: why for index, why in unknown.items() if index in control.machine}
+
+
+def in_machine(control: Control, words: Words) -> tuple[Vector, Unknown]:
+    """The command of words in machine coordinates (M91)."""
+    target, unknown = control.position[:], dict(control.unknown)
+    for address, value in words.values.items():
+        index = INDEX.get(address)
+        if index is not None:
+            target[index] = value * (DEGREE if control.rotary[index] else control.unit)
+            unknown.pop(index, None)
+            if address in words.runtime:
+                unknown[index] = RUNTIME
+    return target, unknown
+
+
+# -- poles ------------------------------------------------------------------------------------------------------------
+
+
+def set_pole(control: Control, words: Words) -> None:
+    """CC: the pole, absolute or from where the tool stands; a coordinate that is left out stays, none takes both."""
+    path = control.path
+    named = frozenset(
+        INDEX[address.removeprefix("I")] for address in words.values if address.removeprefix("I") in "XYZ"
+    )
+    plane = PLANE_OF.get(named, path.plane) if len(named) == 2 else path.plane
+    if any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
+        raise Fault(BAD_POLE, "CC needs the two axes of one plane")
+    where = led(control, words)
+    old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
+    keep = {} if not named else old
+    values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
+    lost = [i for i in (plane.first, plane.second) if i in where.unknown and (i in named or i not in keep)]
+    path.plane, path.pole = plane, None if lost else (values[0], values[1])
+
+
+def polar(control: Control, words: Words) -> tuple[Where, float | None]:
+    """The position that polar words lead to, and by which angle it was reached from the present one (IPA), rad."""
+    path = control.path
+    if path.pole is None:
+        raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
+    plane, (first, second) = path.plane, path.pole
+    control.settle((plane.first, plane.second))
+    start = here(control)
+    where = led(control, words)
+    away = start.inner[plane.first] - first, start.inner[plane.second] - second
+    radius, angle = math.hypot(*away), math.atan2(away[1], away[0])
+    relative = {"PR", "PA"} - words.values.keys()
+    if "PR" in words.values or "IPR" in words.values:
+        length = control.modal.unit * words.values.get("PR", words.values.get("IPR", 0.0))
+        radius = length if "PR" in words.values else radius + length
+    step = words.values.get("IPA")
+    if step is not None:
+        angle += step * DEGREE
+    elif "PA" in words.values:
+        angle = words.values["PA"] * DEGREE
+    where.inner[plane.first] = first + radius * math.cos(angle)
+    where.inner[plane.second] = second + radius * math.sin(angle)
+    reasons = [start.unknown[i] for i in (plane.first, plane.second) if relative and i in start.unknown]
+    if words.runtime & {"PR", "PA", "IPR", "IPA"}:
+        reasons.append(RUNTIME)
+    for index in (plane.first, plane.second):
+        where.unknown.pop(index, None)
+        if reasons:
+            where.unknown[index] = reasons[0]
+    return where, None if step is None else step * DEGREE
+
+
+def polar_axes(control: Control, words: Words) -> int:
+    """The axes that a motion in polar coordinates moves."""
+    return words.axes | 1 << control.path.plane.first | 1 << control.path.plane.second
+
+
+def starts_unknown(control: Control) -> bool:
+    """Where the motion begins is not known in X Y Z."""
+    control.settle([index for index, why in control.unknown.items() if why is AT_START])
+    return any(index in control.unknown for index in (X, Y, Z) if index in control.machine)

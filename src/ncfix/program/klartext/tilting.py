@@ -1,0 +1,141 @@
+"""PLANE, and cycle 19: from angles, vectors or points to a tilted plane.
+
+Source: TNC 640, "The PLANE function: tilting the working plane", and "Cycle 19". Tilting moves no axis by itself as far
+as it is followed here: after TURN and MOVE the control has positioned the rotary axes, and where is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ncfix.program.klartext.control import TILTED, Control
+from ncfix.program.klartext.posture import NOT_NORMAL, apart, normal_of, posture, stands_normal
+from ncfix.program.klartext.targets import Words
+from ncfix.program.klartext.transformations import euler, from_points, from_vectors, projected, spatial
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, Rotation, product
+from ncfix.program.rs274.faults import Fault
+
+BAD_PLANE = "NCF273"
+POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
+RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
+NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
+CALCULATED = ("Q120", "Q121", "Q122")
+"""Where the control leaves the positions of A, B and C that it has worked out."""
+
+Values = Mapping[str, float]
+
+
+def by_vectors(values: Values) -> Rotation | None:
+    """PLANE VECTOR: base vector and normal."""
+    base, normal = ([values.get(f"{kind}{axis}", 0.0) for axis in "XYZ"] for kind in "BN")
+    return from_vectors((base[0], base[1], base[2]), (normal[0], normal[1], normal[2]))
+
+
+def by_points(values: Values) -> Rotation | None:
+    """PLANE POINTS."""
+    first, second, third = ([values.get(f"P{number}{axis}", 0.0) for axis in "XYZ"] for number in "123")
+    return from_points(
+        (first[0], first[1], first[2]), (second[0], second[1], second[2]), (third[0], third[1], third[2])
+    )
+
+
+def by_angles(values: Values) -> Rotation:
+    """PLANE SPATIAL."""
+    return spatial(values.get("SPA", 0.0), values.get("SPB", 0.0), values.get("SPC", 0.0))
+
+
+FORMS: Mapping[str, Callable[[Values], Rotation | None]] = {
+    "spatial": by_angles,
+    "projected": lambda v: projected(v.get("PROPR", 0.0), v.get("PROMIN", 0.0), v.get("ROT", 0.0)),
+    "euler": lambda v: euler(v.get("EULPR", 0.0), v.get("EULNU", 0.0), v.get("EULROT", 0.0)),
+    "vector": by_vectors,
+    "points": by_points,
+}
+
+
+def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> None:
+    """A PLANE block."""
+    control.use()
+    values = words.values
+    if form == "reset":
+        tilt_to(control, None, flags)
+        return
+    if words.runtime:
+        tilt_to(control, control.transformations.tilt, flags, RUNTIME)
+    elif form.startswith("relativ"):
+        turn = spatial(values.get("SPA", 0.0), values.get("SPB", 0.0), values.get("SPC", 0.0))
+        tilt_to(control, product(control.transformations.tilt, turn), flags)
+    elif form == "axial":
+        by_axes(control, values, flags)
+    else:
+        found = FORMS[form](values)
+        if found is None:
+            raise Fault(BAD_PLANE, f"PLANE {form.upper()} gives no plane: its vectors or points are in one line")
+        tilt_to(control, found, flags)
+
+
+def by_axes(control: Control, values: Values, flags: frozenset[str]) -> None:
+    """PLANE AXIAL: the plane to which rotary axes at these positions make the tool normal."""
+    turned = control.position[:]
+    for letter in "ABC":
+        if letter in values:
+            turned[INDEX[letter]] = values[letter] * DEGREE
+    found = posture(control, turned)
+    if found is None or apart(found.tool, normal_of(found.axes)) > 1e-6:
+        tilt_to(control, control.transformations.tilt, flags, NO_KINEMATICS)
+        return
+    tilt_to(control, found.axes, flags)
+
+
+def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refusal: str = "") -> None:
+    """Make a tilted plane the frame; None: none."""
+    control.transformations.tilt_to(tilt)
+    control.suspended.pop(TILTED, None)
+    if refusal:
+        control.suspended[TILTED] = refusal
+    if flags & {"turn", "move"}:
+        control.pass_here("the control positions the rotary axes (PLANE)", POSITIONED, rotary_letters(control))
+    for name in CALCULATED:
+        control.scope.parameters.assign(name, 0.0, runtime=True)
+    control.recompose()
+    control.switch_tip()
+    control.path.tangent = None
+
+
+def rotary_letters(control: Control) -> str:
+    """The machine's rotary axes."""
+    return "".join("XYZABCUVW"[index] for index in control.machine if control.rotary[index])
+
+
+def cycle_19(control: Control, words: Words) -> None:
+    """Cycle 19: spatial angles, or positions of rotary axes, as a machine parameter says; none ends the tilt.
+
+    Where the axes stand tells which of the two is meant.
+    """
+    control.use()
+    values = {letter: words.values[letter] for letter in "ABC" if letter in words.values}
+    if not values:
+        tilt_to(control, None, frozenset())
+        return
+    if words.runtime:
+        tilt_to(control, control.transformations.tilt, frozenset(), RUNTIME)
+        return
+    meant = spatial(values.get("A", 0.0), values.get("B", 0.0), values.get("C", 0.0))
+    standing = all(
+        INDEX[letter] in control.machine
+        and INDEX[letter] not in control.unknown
+        and abs(control.position[INDEX[letter]] - value * DEGREE) < 1e-6
+        for letter, value in values.items()
+    )
+    if stands_normal(control, meant) is False and standing:
+        by_axes(control, values, frozenset())
+        return
+    tilt_to(control, meant, frozenset())
+
+
+def check_normal(control: Control) -> str:
+    """Why a motion in the tilted plane is refused: the tool does not stand normal to it."""
+    trans = control.transformations
+    if not trans.tilted or control.m128 or TILTED in control.suspended:
+        return ""
+    return NOT_NORMAL if stands_normal(control, trans.tilt) is False else ""
