@@ -118,5 +118,3 @@ def worst(relation: Relation, dialect: str, machine: Machine, pairs: int = PAIRS
         assert left.shape == right.shape, (relation.left(path), relation.right(path))
         found = max(found, float(np.abs(left - right).max()))
     return found
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 
 import numpy as np
@@ -28,7 +29,7 @@ def words(step: Step, before: Step, rotary: bool = False, places: int = 3) -> st
 def full(path: Route) -> str:
     """Every word in every block."""
     lines = [f"G{path[0].code} {words(path[0], path[0])} F500."]
-    lines += [f"G{step.code} {words(step, before)} F500." for before, step in zip(path, path[1:], strict=False)]
+    lines += [f"G{step.code} {words(step, before)} F500." for before, step in itertools.pairwise(path)]
     return HEAD + "\n".join(lines) + "\n" + TAIL
 
 
@@ -52,7 +53,7 @@ def modal(path: Route) -> str:
 def increments(path: Route) -> str:
     """G91 after the first motion."""
     lines = [f"G{path[0].code} {words(path[0], path[0])}", "G91 F500."]
-    for before, step in zip(path, path[1:], strict=False):
+    for before, step in itertools.pairwise(path):
         text = f"X{step.x - before.x:.3f} Y{step.y - before.y:.3f} Z{step.z - before.z:.3f}"
         if step.code > 1:
             text += f" I{step.centre[0] - before.x:.3f} J{step.centre[1] - before.y:.3f}"

@@ -17,7 +17,7 @@ PIECE = re.compile(r"\([^()]*(?:\([^()]*\)[^()]*)*\)|;.*|[^ \t]", re.DOTALL)
 """What squeezing keeps: comments whole, parentheses inside them included, and characters that are not blank."""
 
 CALLS = frozenset({650, 660, 661})
-"""G65, G66 and G66.1: I, J and K may stand there several times."""
+"""G65, G66 and G66.1: I, J and K may stand there several times, and E is an argument like any other."""
 
 
 def squeeze(text: str) -> Squeezed:
@@ -38,8 +38,8 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
         place = squeezed.places[error.position]
         raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
     check_numbers(parsed)
-    check_exponents(parsed, text)
     if CALLS.isdisjoint(parsed.template.g_codes):
+        check_exponents(parsed, text)
         check_repeats(parsed)
     return parsed
 

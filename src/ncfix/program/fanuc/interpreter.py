@@ -15,12 +15,14 @@ from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
+from ncfix.program.rs274.coordinates import INCH
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Template, Word
 
+G15, G16, G20, G21 = 150, 160, 200, 210
 G65, G66, G66_1, G67 = 650, 660, 661, 670
 DRILLING = frozenset("KLQ")
 SCALED = frozenset("XYZABCUVWIJKRQ")
@@ -123,12 +125,18 @@ class MacroInterpreter(Interpreter):
     def evaluate(self, plan: Plan, index: int) -> Block:
         """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
         block = super().evaluate(plan, index)
+        codes = set() if plan.codes is None else set(plan.codes.g.values())
+        if codes & {G20, G21}:
+            self.control.modal.unit = INCH if G20 in codes else 1.0
+            self.control.refresh()
         for letter in plan.pointless:
             if self.is_scaled(letter, plan.codes):
                 self.span = next(word.span for word in plan.template.words if word.address == letter)
                 block.values[letter] = self.control.without_point(letter, block.values[letter])
         self.span = None
-        if self.control.polar is not None and plan.codes is not None and not plan.codes.takes:
+        if G16 in codes:
+            polar.switch(self.control, block, G16)
+        if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
             block = polar.cartesian(self.control, block)
         return block
 

@@ -20,10 +20,10 @@ ON = 160
 
 def switch(control: MacroControl, block: Block, code: int) -> None:
     """G16 and G15."""
-    if code == ON:
+    if code == ON and control.polar is None:
         control.suspended["polar"] = REASON
         control.polar = here(control)
-    else:
+    elif code != ON:
         control.suspended.pop("polar", None)
         control.polar = None
 

@@ -1,0 +1,310 @@
+"""What Fanuc's codes and numbers mean, where they differ from LinuxCNC's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import kinematics_of
+from ncfix.diagnostics import SourceError, UsageError
+from ncfix.machine import load, loads
+from ncfix.program import dialects
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup, Tool
+from ncfix.program.trace import trace
+from ncfix.program.tree import Opaque
+from program.lanes import assert_read_right
+from program.tracing import KNOWN, ends, follow, last, reasons
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "%O1234(PART)",
+        "O1234(A(NESTED)COMMENT)",
+        ":77",
+        "<PART.NC>",
+        "/2N10G0X5",
+        "N10/G0X5.",
+        "G0G90X53.839Y129.142C0.0",
+        "X - [ #21 + #4 ]",
+        "g1 x#1 y-#2 f[#9*2]",
+        "IF[[#1EQ1]AND[#2NE3]]GOTO100",
+        "IF [#1 GT 2] THEN #3=4",
+        "#[#1+2]=ROUND[#5*2]MOD3-[#3+1]/2",
+        "G65P9010A1.B-2.I1.J2.K3.I4.",
+        "G1X5.,R2.",
+        "DPRNT[X#1[43]Y#2[43]]",
+        "POPEN",
+        "M98<NAME>",
+        "X1.5;",
+        "G68.2X1.Y2.Z3.I0J30.K0",
+        "CALL OO88",
+    ],
+)
+def test_blocks_of_the_family_can_be_read(text: str) -> None:
+    assert_read_right(read(f"{text}\n".encode(), dialect="fanuc"))
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("G0X", "NCF114"),
+        ("G0X1.Y2", ""),
+        ("X1.5.2", "NCF115"),
+        ("#1=[2+3", "NCF113"),
+        ("(OPEN", "NCF111"),
+        ("X1.X2.", "NCF117"),
+        ("0 BEGIN PGM 1 MM", "NCF103"),
+        ("DEF REAL A", "NCF103"),
+        ("o100 sub", "NCF103"),
+        ('CGTECH_MACRO "A" "B"', "NCF103"),
+    ],
+)
+def test_what_is_not_of_the_family_is_refused_by_line(text: str, code: str) -> None:
+    if not code:
+        read(f"{text}\n".encode(), dialect="fanuc")
+        return
+    with pytest.raises(SourceError) as caught:
+        read(f"G0Z5.\n{text}\n".encode(), dialect="fanuc")
+    assert caught.value.messages[0].code == code
+    assert caught.value.messages[0].place is not None
+    assert caught.value.messages[0].place.line == 2
+
+
+def test_numbers_with_and_without_a_point_have_templates_of_their_own() -> None:
+    program = read(b"G0X1.\nG0X1\nG0X2\n", dialect="fanuc")
+    assert program.template.tolist() == [0, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("source", "expected"),
+    [
+        (b"N10IF[#1EQ2]GOTO5\n", "fanuc"),
+        (b"N5G65P9010A1.\n", "fanuc"),
+        (b"G43.4H1X0.\n", "fanuc"),
+        (b"G68.2X0Y0Z0I0J0K0\n", "fanuc"),
+        (b"G187P1\n", "haas"),
+        (b"G154 P3\nG0X1.\n", "haas"),
+        (b"O100 IF [#1 GT 2]\nO100 ENDIF\n", "linuxcnc"),
+        (b"(IF [1] GOTO 5)\nG0X1\n", "iso"),
+    ],
+)
+def test_detection(source: bytes, expected: str) -> None:
+    assert dialects.detect(source, "part.nc").name == expected
+
+
+def test_a_command_that_is_not_known_is_kept_and_refuses_what_follows() -> None:
+    program = read(b"G0X1.\nCALL OO88\nG0X2.\nM30\n", dialect="fanuc")
+    assert isinstance(program.items_of(1)[0], Opaque)
+    found = trace(program, KNOWN, ("X", "Y", "Z"), frozenset())
+    assert reasons(found) == ["", "the command CALL is not known, and may move axes or change coordinates"]
+
+
+# -- the decimal point ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "no_point", "expected"),
+    [
+        ("G0X50Y50.", "IS-B", [0.05, 50, 0]),
+        ("G0X50Y50.", "IS-A", [0.5, 50, 0]),
+        ("G0X50Y50.", "IS-C", [0.005, 50, 0]),
+        ("G0X50Y50.", "calculator", [50, 50, 0]),
+        ("G20G0X50Y1.", "IS-B", [0.127, 25.4, 0]),
+        ("G0X[50]Y#1", "IS-B", [50, 0, 0]),
+        ("#1=50\nG0X#1", "IS-B", [50, 0, 0]),
+        ("G91G0X500\nX500", "IS-B", [1, 0, 0]),
+        ("F100.G2X10.Y0I5000J0", "IS-B", [10, 0, 0]),
+        ("F100G81X1.Y1.Z-1000R2000K1", "IS-B", [1, 1, -1]),
+        ("G52X1000\nG0X0.", "IS-B", [1, 0, 0]),
+        ("G65P1A5\nM30\nO1\nG0X#1\nM99", "IS-B", [0.005, 0, 0]),
+        ("G65P1D5\nM30\nO1\nG0X#7\nM99", "IS-B", [5, 0, 0]),
+    ],
+)
+def test_numbers_without_a_point(text: str, no_point: str, expected: list[float]) -> None:
+    found = follow(text, dialect="fanuc", no_point=no_point)
+    assert last(found) == [pytest.approx(value, abs=1e-9) for value in expected]
+
+
+def test_rotary_words_count_their_own_increments() -> None:
+    assert last(follow("G0A90500X1000", "XYZA", dialect="fanuc", no_point="IS-B")) == pytest.approx([1, 0, 0, 90.5])
+
+
+def test_it_is_asked_what_they_mean() -> None:
+    with pytest.raises(UsageError) as caught:
+        follow("G0X0Y0\nG0X50", dialect="fanuc")
+    message = caught.value.messages[0]
+    assert (message.code, message.place.line if message.place else 0) == ("NCF240", 2)
+    assert "--no-point" in message.hint
+    follow("G0X0Y0\nG28Z0\nG4P500\nT5M6\nS1000M3\nG1X1.F100\nG54.1P2", dialect="fanuc", assume_zero=True)
+
+
+SHIFTED = """
+name = "m"
+topology = "w F X Y Z t"
+[axis.X]
+type = "linear"
+direction = [1, 0, 0]
+[axis.Y]
+type = "linear"
+direction = [0, 1, 0]
+[axis.Z]
+type = "linear"
+direction = [0, 0, 1]
+[tool]
+direction = [0, 0, 1]
+point = [0, 0, 0]
+[[effect]]
+name = "EXX"
+basis = "constant"
+coefficients = [0.0124]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "no_point", "expected"),
+    [
+        ("G0X50.Y5.Z5.", "IS-B", "G0X49.988Y5.Z5."),
+        ("G0X50000Y5.Z5.", "IS-B", "G0X49988Y5.Z5."),
+        ("G0X50Y5.Z5.", "calculator", "G0X49.988Y5.Z5."),
+        ("G0X50.Y5.Z5.", "", "G0X49.988Y5.Z5."),
+        ("G20G0X500000Y1.Z1.", "IS-B", "G20G0X499995Y1.Z1."),
+        ("G0Y5.Z5.X+0050.", "", "G0Y5.Z5.X+0049.988"),
+    ],
+)
+def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str) -> None:
+    program = read(f"{text}\nM30\n".encode(), "part", "fanuc")
+    setup = Setup(no_point=no_point, assume_zero=True)
+    fixed = fix_program(program, loads(SHIFTED), setup, FixOptions())
+    assert expected in fixed.text.decode()
+
+
+# -- codes ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G90G81X1.Y1.Z-5.R2.F50.\nG91X10.K3", [[1, 1, -5], [11, 1, -5], [21, 1, -5], [31, 1, -5]]),
+        ("G0Z10.\nG91G81X1.Z-5.R-8.L2F50.", [[0, 0, 10], [1, 0, -3], [2, 0, -3]]),
+        ("G81X1.Z-5.R2.K0F50.\nX3.", [[3, 0, -5]]),
+        ("G99G81X1.Z-5.R2.F50.\nX3.\nG80\nG0X0.", [[1, 0, -5], [3, 0, -5], [0, 0, 2]]),
+        ("G0Z9.\nG98G76X1.Z-5.R2.Q.1F50.\nG80\nG0X0.", [[0, 0, 9], [1, 0, -5], [0, 0, 9]]),
+        ("G10L2P1X5.\nG0X1.", [[6, 0, 0]]),
+        ("G10L2P1X5.\nG91G10L2P1X1.\nG90G0X1.", [[7, 0, 0]]),
+        ("G10L20P3X5.\nG54.1P3\nG0X1.", [[6, 0, 0]]),
+        ("G10L10P4R80.\nG43H4\nG0Z0.", [[0, 0, 80]]),
+        ("G4X1.\nG0X2.", [[0, 0, 0], [2, 0, 0]]),
+        ("G0X5.\nG92X0.\nX1.", [[5, 0, 0], [6, 0, 0]]),
+        ("G68X0Y0R90.\nG0X1.\nG69\nX2.", [[0, 1, 0], [2, 1, 0]]),
+        ("G17G16\nG0X10.Y90.\nY180.\nX20.\nG15\nX1.", [[0, 10, 0], [-10, 0, 0], [-20, 0, 0], [1, 0, 0]]),
+        ("G0X10.\nG16Y90.\nG15", [[10, 0, 0], [0, 10, 0]]),
+        ("G5.1Q1\nG8P1\nG0X1.\nG5.1Q0", [[1, 0, 0]]),
+    ],
+)
+def test_codes(text: str, expected: list[list[float]]) -> None:
+    found = follow(text, dialect="fanuc", no_point="calculator", assume_zero=True)
+    assert ends(found) == [[pytest.approx(value, abs=1e-9) for value in row] for row in expected]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("G16\nG0X10.Y0.", "polar coordinates (G16)"),
+        ("G51X0Y0P2.\nG0X1.", "scaling (G51)"),
+        ("G68.3\nG0X1.", "tilted plane (G68.3)"),
+        ("G68.2P2Q1X1.\nG0X1.", "tilted plane (G68.2)"),
+        ("G68X0Y0Z0I0J0K1.R30.\nG0X1.", "tilted plane"),
+        ("G43.5H1\nG0X1.", "tool direction is given by I J K"),
+        ("G1X5.F100.,R2.", "the corner"),
+        ("G10L50\nG0X1.", "parameters of the control"),
+        ("G10L2P0X1.\nG0X1.", "external work offset"),
+        ("G66.1P1\nM30\nO1\nM99", ""),
+        ("G12.1\nG0X1.", "G12.1"),
+        ("G107\nG0X1.", "G107"),
+    ],
+)
+def test_what_is_not_followed_is_refused(text: str, reason: str) -> None:
+    found = follow(text, dialect="fanuc", no_point="calculator", assume_zero=True)
+    assert all(reason in why for why in reasons(found)[-1:])
+
+
+def test_g53_in_increments_is_passed_and_loses_its_axes() -> None:
+    found = follow("G91\nG53G0Z0.\nG90G0X1.Y1.\nZ5.", dialect="fanuc")
+    assert reasons(found)[0] == "machine coordinates (G53)"
+    assert "G53 in incremental coordinates" in reasons(found)[1]
+    assert reasons(found)[2] == ""
+
+
+def test_additional_work_offsets_of_haas() -> None:
+    setup = Setup(work_offsets={"G54.1P3": {"X": 5.0, "Y": 0.0, "Z": 0.0}}, initial=dict.fromkeys("XYZ", 0.0))
+    assert last(follow("G154P3\nG0X1.", setup=setup, dialect="haas")) == [6, 0, 0]
+    assert last(follow("M97P50L2\nM30\nN50G91G0X1.\nM99", dialect="haas")) == [2, 0, 0]
+
+
+# -- tilted planes ----------------------------------------------------------------------------------------------------
+
+
+def test_a_tilted_plane_is_a_frame_in_the_workpiece() -> None:
+    found = follow(
+        "G68.2X10.Y0.Z5.I0.J90.K0.\nG0X1.Y2.Z3.\nG69\nG0X0.Y0.Z0.", "XYZAC", dialect="fanuc", no_point="IS-B"
+    )
+    assert ends(found)[0][:3] == pytest.approx([11, -3, 7])
+    assert found.moves.tcp.tolist() == [True, False]
+    assert ends(found)[1][:3] == pytest.approx([0, 0, 0])
+
+
+def test_roll_pitch_and_yaw() -> None:
+    found = follow("G68.2P1X0.Y0.Z0.I90.J0.K90.\nG0X1.Y2.Z3.", "XYZAC", dialect="fanuc", no_point="IS-B")
+    assert ends(found)[0][:3] == pytest.approx([3, 1, 2])
+
+
+@pytest.mark.parametrize("name", ["wCAYFXZSt", "wCBXFZYSt", "dmu50"])
+@pytest.mark.parametrize("angles", [(0.0, 30.0, 0.0), (40.0, 20.0, 0.0), (10.0, 0.0, 0.0)])
+def test_g53_1_turns_the_tool_square_to_the_plane(root: Path, name: str, angles: tuple[float, float, float]) -> None:
+    """The tool axis of the machine, by its own kinematics, is Z of the frame after G53.1."""
+    machine = load(str(root / f"examples/machines/{name}.toml"))
+    first, second, third = angles
+    text = f"G54G0X0.Y0.Z0.\nG68.2X1.Y2.Z3.I{first}J{second}K{third}\nG53.1\nG0X0.Y0.Z9.\nM30\n"
+    setup = Setup(assume_zero=True, no_point="IS-B")
+    rotary = frozenset(axis.name for axis in machine.axes if axis.rotary)
+    program = read(text.encode(), "part", "fanuc")
+    moves = trace(program, setup, machine.axis_names, rotary, kinematics=kinematics_of(machine)).moves
+    turned, plane = moves.end[1], moves.frames[moves.frame[2]].rotation
+    assert moves.reasons[moves.reason[1]] == "tool axis alignment (G53.1)"
+    pose = machine.nominal(np.where(machine.rotary, turned, 0.0))
+    zero = machine.nominal(np.zeros(len(turned)))
+    axis = pose[:3, :3] @ zero[:3, :3].T @ np.array([0.0, 0.0, 1.0])
+    assert axis == pytest.approx(plane[:, 2], abs=1e-8)
+    assert math.isclose(float(np.linalg.det(plane)), 1.0)
+
+
+# -- the corpus -------------------------------------------------------------------------------------------------------
+
+
+def test_programs_of_the_world(shared: Callable[[str], Path], figures: Callable[[str], None]) -> None:
+    """Every block means what the grammar says; what cannot be read is of another family, but for one file."""
+    readable, foreign, unreadable = 0, 0, []
+    for path in sorted((shared("corpus") / "fanuc").iterdir()):
+        try:
+            assert_read_right(read(path.read_bytes(), path.name, "fanuc"))
+            readable += 1
+        except SourceError as error:
+            foreign += error.messages[0].code == "NCF103"
+            unreadable += [str(error)] if error.messages[0].code != "NCF103" else []
+    figures(f"corpus, fanuc: {readable} read, {foreign} of another family, {len(unreadable)} unreadable")
+    assert len(unreadable) <= 1
+    assert readable > 20
+
+
+def test_tools_named_by_h() -> None:
+    setup = Setup(tools={3: Tool(50.0)}, initial=dict.fromkeys("XYZ", 0.0), work_offsets=KNOWN.work_offsets)
+    assert last(follow("G0G43H3Z10.", setup=setup, dialect="fanuc")) == [0, 0, 60]
