@@ -16,6 +16,7 @@ import numpy as np
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import State
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.poses import random_poses
 from ncfix.tables.scheme import Job, Scheme, automatic
@@ -34,7 +35,7 @@ CEC = "NC_CEC.INI"
 ROOM = 1.5
 """MD32720 as a multiple of the largest correction."""
 WORTH = 0.9
-"""Rotary axes keep their values if that leaves less than this share of what correcting them leaves at the tip."""
+"""Rotary axes keep their values if less than this share of what correcting them leaves at the tip is left then."""
 CHECKS = 1000
 
 
@@ -55,7 +56,7 @@ class Siemens(Control):
         settings = checked(self.settings(request.settings), request.machine.axis_names)
         scheme = _scheme(request, settings)
         own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
-        others = [term for term in scheme.tables.terms if term not in own]
+        others = [term for term in scheme.tables.terms if not (settings.eec and _own(term))]
         reading = _reading(settings, others)
         cec = tables_of(others, reading)
         if len(cec) > settings.limits.tables:
@@ -100,12 +101,20 @@ def _scheme(request: Request, settings: Settings) -> Scheme:
         return fixed(job, settings.scheme)
     if settings.rotary != "auto" or not request.machine.rotary.any():
         return automatic(job, settings.rotary != "keep")
-    turning, keeping = automatic(job, True), automatic(job, False)
-    return keeping if _left(keeping) < WORTH * _left(turning) else turning
+    keeping, turning = automatic(job, False), automatic(job, True)
+    allowed = _largest(request, turning)[request.machine.rotary].max() <= request.machine.max_correction[1]
+    return turning if allowed and WORTH * _left(turning) <= _left(keeping) else keeping
 
 
 def _left(scheme: Scheme) -> float:
     return float(np.hypot(scheme.rest, scheme.dropped))
+
+
+def _largest(request: Request, scheme: Scheme) -> Array:
+    """The largest correction of each axis at random poses, mm and rad."""
+    q = random_poses(request.space, CHECKS, seed=9)
+    largest: Array = np.abs(scheme.tables.at(request.machine.axis_names, q)).max(axis=0)
+    return largest
 
 
 def _own(term: Term) -> bool:
@@ -174,10 +183,8 @@ def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
 
 def _sums(request: Request, settings: Settings, scheme: Scheme) -> Iterator[str]:
     """Limits of the total correction, in case that an assumption is wrong."""
-    q = random_poses(request.space, CHECKS, seed=9)
-    largest = np.abs(scheme.tables.at(request.machine.axis_names, q)).max(axis=0)
     parts = []
-    for axis, value in zip(request.machine.axes, (ROOM * largest).tolist(), strict=True):
+    for axis, value in zip(request.machine.axes, (ROOM * _largest(request, scheme)).tolist(), strict=True):
         if value:
             parts.append(f"{settings.axes[axis.name]} {value / axis.unit:.4f} {'degree' if axis.rotary else 'mm'}")
     if parts:

@@ -152,22 +152,20 @@ def _rotary(machine: Machine, name: str) -> list[int]:
 
 def _made(job: Job, form: Form) -> Scheme:
     """Rotary axes first; the linear ones then correct what is left where that leads."""
-    done, rest = _fitted(job, np.flatnonzero(job.machine.rotary).tolist(), form, turning(job), LEVER)
-    moved, rest = _fitted(job, linear_axes(job.machine), form, moving(job, done), 1.0)
-    tables = Compensation((*done.terms, *moved.terms))
+    done = _fitted(job, np.flatnonzero(job.machine.rotary).tolist(), form, turning(job), LEVER)
+    moved = _fitted(job, linear_axes(job.machine), form, moving(job, done.tables), 1.0)
+    tables = Compensation((*done.tables.terms, *moved.tables.terms))
     count = len({id(grid) for grid in tables.grids})
     if count > job.limits.tables:
         text = f"this scheme takes {count} tables, and the control has {job.limits.tables}"
         raise RefusedError.of("NCF484", text, hint="scheme=auto makes do with what there is")
-    return Scheme(tables, 0.0, rest, 0.0)
+    return Scheme(tables, moved.missed, moved.rest, 0.0)
 
 
-def _fitted(
-    job: Job, outputs: Sequence[int], form: Form, correct: Corrections, scale: float
-) -> tuple[Compensation, float]:
-    """The tables of some axes, and what the form cannot say of them, rms (mm)."""
+def _fitted(job: Job, outputs: Sequence[int], form: Form, correct: Corrections, scale: float) -> Scheme:
+    """The tables of some axes."""
     if not outputs:
-        return Compensation(()), 0.0
+        return Scheme(Compensation(()), 0.0, 0.0, 0.0)
     q = random_poses(job.space, POSES, seed=21)
     values, lines = correct(q, np.zeros(q.shape[1])), lines_of(job)
     layouts, missed = {}, 0.0
@@ -180,8 +178,8 @@ def _fitted(
         parts = np.split(shares, np.cumsum([column.shape[1] for column in columns])[:-1])
         layouts[output] = [_layout(pieces, parts, [line.fine for line in lines])]
     rest = scale * float(np.sqrt(missed))
-    stage = Stage(lines, layouts, correct, scale)
-    return stage.settled(max(job.target, rest), job.limits.points)[0], rest
+    tables, left = Stage(lines, layouts, correct, scale).settled(max(job.target, rest), job.limits.points)
+    return Scheme(tables, left, rest, 0.0)
 
 
 def _layout(pieces: Sequence[Piece], shares: Sequence[Array], fine: Sequence[Array]) -> Layout:

@@ -7,7 +7,7 @@ import numpy as np
 from ncfix.machine import Machine, State
 from ncfix.tables.grid import Array
 
-PASSES = 3
+PASSES = 2
 
 
 def rotary_correction(machine: Machine, q: Array, state: State) -> Array:
