@@ -19,6 +19,7 @@ from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe
 from ncfix.measure.synthetic import Faults, simulate
+from validation import laspas
 
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml")).replace(effects=())
 ARCSEC = np.pi / 180 / 3600
@@ -62,3 +63,16 @@ def test_the_reversal_of_z_is_missed_without_its_effect_and_found_with_it():
     found = calibrate([data], empty)
     assert abs(found.estimate.coefficients[0] - 15.553e-3) < 4.5 * found.sigma[0]
     assert "NCF634" not in {message.code for message in found.remarks}
+
+
+def test_table_10_as_a_magnitude(figures):
+    """Printed for path 1: 8.5, 24.3, 26.7 um. Random curves of the printed sizes: they lie within 90 % of draws."""
+    found = np.array([laspas.largest_um(laspas.drawn(seed, 13.757)) for seed in range(100)])
+    low, middle, high = np.percentile(found, [5, 50, 95], axis=0)
+    spans = zip(low, middle, high, strict=True)
+    figures("Laspas, Table 10: " + ", ".join(f"{a:.1f} to {c:.1f}, median {b:.1f} um" for a, b, c in spans))
+    assert (low < laspas.PRINTED).all()
+    assert (high > laspas.PRINTED).all()
+    # with the number that arc seconds would make of it, Z would be far off in most draws
+    other = np.array([laspas.largest_um(laspas.drawn(seed, 66.697)) for seed in range(100)])
+    assert np.median(other[:, 2]) > np.median(found[:, 2]) + 5
