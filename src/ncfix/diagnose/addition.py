@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -48,23 +49,22 @@ def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:
     """The most probable coefficients of constants and members together, and the residuals."""
     view, free = court.background.view, court.background.view.base
     covariance = court.background.covariance(share)
-    base, widths = free / _lengths(free), [court.groups[m.group].columns.shape[1] for m in members]
-    columns = np.concatenate([base, *(court.groups[m.group].columns for m in members)], axis=1)
-    prior = np.concatenate(
-        [np.full(base.shape[1], WIDE**-2), *(np.full(w, m.size**-2) for m, w in zip(members, widths, strict=True))]
-    )
+    base, parts_of = free / _lengths(free), [court.groups[m.group].columns for m in members]
+    columns = np.concatenate([base, *parts_of], axis=1)
+    widths = [part.shape[1] for part in parts_of]
+    own = [np.full(width, m.size**-2) for m, width in zip(members, widths, strict=True)]
+    prior = np.concatenate([np.full(base.shape[1], WIDE**-2), *own])
     factor = cho_factor(covariance)
     z, spread = _solved(columns, view.y, factor, prior)
     alone, _ = _solved(base, view.y, factor, prior[: base.shape[1]])
     ends = base.shape[1] + np.cumsum([0, *widths])
-    parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    parts = [slice(a, b) for a, b in pairwise(ends)]
     numbers = tuple(z[part] for part in parts)
-    shown = tuple(court.groups[m.group].columns @ n for m, n in zip(members, numbers, strict=True))
+    shown = tuple(part @ own_numbers for part, own_numbers in zip(parts_of, numbers, strict=True))
     k = view.problem.design.shape[1]
     constants = (z[: base.shape[1]] / _lengths(free))[base.shape[1] - k :]
-    return Joint(
-        constants, numbers, tuple(spread[p, p] for p in parts), shown, view.y - base @ alone, view.y - columns @ z
-    )
+    covariances = tuple(spread[part, part] for part in parts)
+    return Joint(constants, numbers, covariances, shown, view.y - base @ alone, view.y - columns @ z)
 
 
 def _lengths(columns: Array) -> Array:
@@ -87,7 +87,7 @@ def likeliest_share(null: Array) -> float:
 def machine_with(court: Court, members: Sequence[Member], joint: Joint) -> tuple[Machine, list[tuple[Effect, ...]]]:
     """The machine with constants changed and effects added; and the effects that each member brought."""
     view = court.background.view
-    coefficients = view.estimate.coefficients + joint.constants
+    coefficients = view.coefficients + joint.constants
     machine = view.problem.selection.machine(view.machine, coefficients.tolist())
     added = [
         effects(court.groups[m.group], numbers, spread)
@@ -98,7 +98,9 @@ def machine_with(court: Court, members: Sequence[Member], joint: Joint) -> tuple
 
 
 def effects(group: Group, numbers: Array, spread: Array) -> tuple[Effect, ...]:
-    """The effects of a form with their coefficients, without those that are zero."""
+    """The effects of a form with their coefficients, without those that are zero; none for what is no error."""
+    if group.owner.grows:
+        return ()
     values = group.loading @ numbers
     covariance = group.loading @ spread @ group.loading.T
     found, start = [], 0

@@ -21,9 +21,9 @@ LASTING = 900.0
 """s: how long an instrument's wandering lasts."""
 WANDER = (0.0, 0.15, 0.35, 0.7)
 """Its size against the noise."""
-SHARES = (0.03, 0.1, 0.2, 0.35, 0.7, 1.5, 4.0)
+SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
-PRIOR = (0.2, 0.2, 0.25, 0.2, 0.1, 0.04, 0.01)
+PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
 NONE = 1e-9
 WEAK = 1.0

@@ -24,7 +24,10 @@ MATERIAL_UM = 0.8
 """An effect that moves the tool tip by less is not worth a name."""
 MOSTLY = 0.5
 """Share of the largest named effect from which on an unknown one decides the verdict."""
-LACKING = 0.01
+LACKING = 1e-3
+"""Probability of what is left by chance, below which something is missing that has no name."""
+EXCESS_UM = 2.0
+"""And this much more than the noise, rms: machines have a little of everything."""
 
 
 @dataclass(frozen=True)
@@ -177,11 +180,15 @@ def _concluded(
     known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
     parameters = float(np.linalg.matrix_rank(seen.base))
     after = joint.after + unknown
+    p_left = noise.lack_of_fit(floor, after[keep], parameters + sum(len(joint.numbers[k]) for _, k in named) / 2)
+    excess = np.sqrt(max(seen.rms(after, keep) ** 2 - _length(seen, keep, floor.sigma_um) ** 2, 0.0))
+    if p_left is not None and p_left < LACKING and excess > EXCESS_UM:
+        unknown_um = max(unknown_um, float(excess))
     return Diagnosis(
         verdict=_verdict(findings, unknown_um),
         findings=findings,
         unknown_um=unknown_um,
-        unknown_kind=" and ".join(court.groups[members[k].group].owner.title for k in rest),
+        unknown_kind=_kind([court.groups[members[k].group].owner.title for k in rest], unknown_um),
         gap=Gap(
             seen.rms(joint.before, keep), seen.rms(after, keep), _length(seen, keep, floor.sigma_um),
             seen.rms(held.without, known), seen.rms(_with_unknown_left(held, joint, unknown), known),
@@ -192,10 +199,14 @@ def _concluded(
         clustering=tuple(gapmap.clustering(ground, each, scaled(seen)) for each in (joint.before, after)),  # type: ignore[arg-type]
         outlying=outlying,
         p_lack=noise.lack_of_fit(floor, joint.before[keep], parameters),
-        p_left=noise.lack_of_fit(floor, joint.after[keep], parameters + sum(len(n) for n in joint.numbers) / 2),
+        p_left=p_left,
         view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
         before=joint.before, after=after, court=court,
     )  # fmt: skip
+
+
+def _kind(titles: Sequence[str], unknown_um: float) -> str:
+    return " and ".join(titles) or ("something that follows no pattern that was looked for" if unknown_um else "")
 
 
 def _with_unknown_left(held: holdout.HeldOut, joint: addition.Joint, unknown: Array) -> Array:

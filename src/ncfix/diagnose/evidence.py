@@ -20,6 +20,7 @@ from ncfix.measure.measurement import Array
 
 SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 """um: sizes of an effect at the tool tip that are considered."""
+TINY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -84,12 +85,12 @@ class Court:
         """Where a group's columns are."""
         return slice(int(self.bounds[index]), int(self.bounds[index + 1]))
 
-    def heard(self, members: Sequence[Member]) -> Evidence:
-        """The evidence for every group beside these members."""
-        odds = np.empty((len(self.groups), len(SHARES), len(SIZES)))
-        null = np.empty(len(SHARES))
-        for index, share in enumerate(SHARES):
-            odds[:, index], null[index] = self._at(share, members)
+    def heard(self, members: Sequence[Member], only: Sequence[int] | None = None) -> Evidence:
+        """The evidence for every group beside these members; `only` some of the shares of the background."""
+        odds = np.zeros((len(self.groups), len(SHARES), len(SIZES)))
+        null = np.full(len(SHARES), -np.inf)
+        for index in range(len(SHARES)) if only is None else only:
+            odds[:, index], null[index] = self._at(SHARES[index], members)
             null[index] += np.log(PRIOR[index])
         return Evidence(odds, null)
 
@@ -99,12 +100,11 @@ class Court:
         null = marginal(squares, determinant, len(y), freedom)
         odds = np.empty((len(self.groups), len(SIZES)))
         projected = columns.T @ y
-        for count, members_of in self._by_width().items():
+        for members_of in self._by_width().values():
             stack = np.stack([columns[:, self.part(k)] for k in members_of])
             eigen, vectors = np.linalg.eigh(np.swapaxes(stack, 1, 2) @ stack)
             a = np.einsum("gpk,gp->gk", vectors, np.stack([projected[self.part(k)] for k in members_of]))
             odds[members_of] = log_odds(np.maximum(eigen, 0.0), a**2, squares + freedom, len(y) + freedom)
-            del count
         return odds, null
 
     def whitened(self, share: float, members: Sequence[Member]) -> tuple[Array, Array, float]:
@@ -115,11 +115,13 @@ class Court:
         determinant = float(np.log(variance).sum())
         if members:
             known = np.concatenate([columns[:, self.part(m.group)] * m.size for m in members], axis=1)
-            left, values, _ = np.linalg.svd(known, full_matrices=False)
-            shrink = 1 - 1 / np.sqrt(1 + values**2)
+            squares, turned = np.linalg.eigh(known.T @ known)
+            squares, turned = squares[squares > TINY], turned[:, squares > TINY]
+            left = known @ (turned / np.sqrt(squares))
+            shrink = 1 - 1 / np.sqrt(1 + squares)
             y = y - left @ (shrink * (left.T @ y))
             columns = columns - left @ (shrink[:, None] * (left.T @ columns))
-            determinant += float(np.log1p(values**2).sum())
+            determinant += float(np.log1p(squares).sum())
         return y, columns, determinant
 
     def _by_width(self) -> dict[int, list[int]]:

@@ -18,7 +18,7 @@ from ncfix.measure.solve import orthonormal, without
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 3e-3
 """Share of a form's squares that may be dropped."""
 UNSEEN_UM = 1e-9
 
@@ -70,10 +70,15 @@ def _form(view: View, candidate: Candidate, loading: Array, design: Array) -> Gr
     size = view.rms(np.linalg.norm(columns, axis=1))
     if size < UNSEEN_UM:
         return None
-    left, values, right = np.linalg.svd(columns / size, full_matrices=False)
-    energy = np.cumsum(values[::-1] ** 2)[::-1] / np.sum(values**2)
-    kept = energy > NEGLIGIBLE
-    return Group(candidate, loading @ right[kept].T / size, left[:, kept] * values[kept])
+    turned = fewer(columns / size)
+    return Group(candidate, loading @ turned / size, columns @ turned / size)
+
+
+def fewer(columns: Array) -> Array:
+    """The rotation (p, r) to as few columns as carry nearly all of their squares."""
+    squares, turned = np.linalg.eigh(columns.T @ columns)
+    kept: Array = turned[:, np.cumsum(squares) > NEGLIGIBLE * squares.sum()]
+    return kept
 
 
 def _left(basis: Array, columns: Array) -> float:

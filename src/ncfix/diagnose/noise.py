@@ -77,7 +77,7 @@ def states(view: View) -> list[int]:
 
 
 def lack_of_fit(floor: Floor, residual: Array, parameters: float) -> float | None:
-    """The probability that residuals are no larger than repeats by chance alone; None without repeats or a given noise."""
+    """How likely residuals so much larger than the noise are by chance; None without repeats or a given noise."""
     n = len(residual)
     squares = float((residual**2).sum())
     if floor.source == "repeats":
@@ -87,3 +87,8 @@ def lack_of_fit(floor: Floor, residual: Array, parameters: float) -> float | Non
     if floor.source == "given":
         return float(stats.chi2.sf(squares / floor.sigma_um**2, max(n - parameters, 1)))
     return None
+
+
+def varying(name: str) -> bool:
+    """Whether a column may change between repeats."""
+    return name.startswith("temp_") or name in ("time_s", "run")

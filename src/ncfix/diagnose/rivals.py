@@ -1,7 +1,7 @@
 """Effects without a name, as rivals of those with one: any smooth field of the pose, any smooth course of time.
 
-They are random Fourier features of Gaussian processes (Rahimi and Recht 2007), three independent components at the tool
-tip. Where such a rival explains the data better than every named effect does, the effect is not in the catalogue.
+They are random Fourier features of Gaussian processes (Rahimi and Recht 2007), over time regular ones (Solin and
+Sarkka 2020), three independent components at the tool tip. Where such a rival explains the data better than every named effect does, the effect is not in the catalogue.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnose.catalogue import Candidate
-from ncfix.diagnose.groups import Group
+from ncfix.diagnose.groups import Group, fewer
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
 from ncfix.machine.effect import SPINDLE
@@ -23,7 +23,7 @@ RIVALS = (POSE, TIME)
 FEATURES = 40
 POSE_LENGTHS = (0.8, 1.6)
 """Of half the travel of every axis at once."""
-TIME_LENGTHS = (300.0, 1800.0)
+TIME_LENGTHS = (300.0, 1500.0)
 """s"""
 
 
@@ -42,10 +42,19 @@ def _features(view: View) -> Iterator[tuple[Candidate, Array]]:
     u = scaled(view)
     for length in POSE_LENGTHS:
         yield POSE, _waves(u, length, random)
-    time = view.column("time_s")[:, None]
+    time = view.column("time_s")
     if np.ptp(time) > 0:
         for length in TIME_LENGTHS:
-            yield TIME, _waves(time, length, random)
+            yield TIME, _harmonics(time, length)
+
+
+def _harmonics(time: Array, length: float) -> Array:
+    """Sines over the whole time, their sizes those of a smooth course with bends of this length, (n, k)."""
+    rate = np.pi / (1.2 * np.ptp(time))
+    orders = np.arange(1, 2 + int(2.5 / (rate * length)))
+    phase = (time - time.min() + 0.1 * np.ptp(time))[:, None] * rate * orders
+    waves: Array = np.sin(phase) * np.exp(-0.25 * (rate * length * orders) ** 2)
+    return waves
 
 
 def scaled(view: View) -> Array:
@@ -76,6 +85,5 @@ def _group(view: View, owner: Candidate, tip: Array, features: Array) -> Group |
     size = view.rms(np.linalg.norm(columns, axis=1))
     if size == 0:
         return None
-    left, values, _ = np.linalg.svd(columns / size, full_matrices=False)
-    kept = values**2 > 1e-4 * values[0] ** 2
-    return Group(owner, np.zeros((0, int(kept.sum()))), left[:, kept] * values[kept])
+    seen = columns / size @ fewer(columns / size)
+    return Group(owner, np.zeros((0, seen.shape[1])), seen)

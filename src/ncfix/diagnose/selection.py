@@ -10,7 +10,7 @@ from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import Court, Evidence, Member, log_odds
 from ncfix.diagnose.rivals import RIVALS
 
-MOST = 6
+MOST = 5
 """Effects that are named at most."""
 TRIALS = 300
 FALSE_ALARM = 0.01
@@ -86,26 +86,25 @@ def select(court: Court) -> Selected:
             break
         steps.append((name, odds[name]))
         members[name] = evidence.best(court.forms[name])
-        members = _exchanged(court, members)
+        if len(members) > 1:
+            members = _exchanged(court, members, int(evidence.null.argmax()))
+        if UNNAMED & set(members):
+            break
         evidence = court.heard(list(members.values()))
         odds = {each: evidence.of(forms) for each, forms in court.forms.items()}
     return _judged(court, members, first, null, steps)
 
 
-def _exchanged(court: Court, members: dict[str, Member]) -> dict[str, Member]:
-    """Every member replaced by whatever explains its part better, sizes and forms anew; until nothing changes."""
-    for _ in range(3):
-        before = list(members)
-        for name in before:
-            others = {key: value for key, value in members.items() if key != name}
-            evidence = court.heard(list(others.values()))
-            odds = {key: evidence.of(forms) for key, forms in court.forms.items() if key not in others}
-            best = max(odds, key=lambda key: odds[key])
-            chosen = best if odds[best] > odds[name] + 1.0 else name
-            members = {key if key != name else chosen: value for key, value in members.items()}
-            members[chosen] = evidence.best(court.forms[chosen])
-        if list(members) == before:
-            break
+def _exchanged(court: Court, members: dict[str, Member], share: int) -> dict[str, Member]:
+    """Every member replaced by whatever explains its part better, sizes and forms anew."""
+    for name in list(members):
+        others = {key: value for key, value in members.items() if key != name}
+        evidence = court.heard(list(others.values()), [share])
+        odds = {key: evidence.of(forms) for key, forms in court.forms.items() if key not in others}
+        best = max(odds, key=lambda key: odds[key])
+        chosen = best if odds[best] > odds[name] + 1.0 else name
+        members = {key if key != name else chosen: value for key, value in members.items()}
+        members[chosen] = evidence.best(court.forms[chosen])
     return members
 
 

@@ -14,13 +14,17 @@ import numpy as np
 
 from ncfix.diagnose.catalogue.candidate import Reach
 from ncfix.machine import Effect, Machine
+from ncfix.machine.effect import SPINDLE
 from ncfix.machine.smooth import Constant, Polynomial
-from ncfix.measure import weights
-from ncfix.measure.calibrate import Estimate, Problem, settle
+from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
 
 UM = 1e3
+STEPS = 6
+SETTLED_UM = 1e-3
+HARDLY = 1e-5
+"""Singular values below this, of the largest, are taken for what cannot be told."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class View:
     """One entry per value.
 
     problem   the stacked observations with the free constants as unknown effects
-    estimate  least squares of those, at which everything is taken to first order
+    coefficients, unknowns  least squares of those and of the set-up, at which everything is taken to first order
     y         (m,) values minus what the machine file and the fitted set-up say, um
     base      (m, k) columns of what is free
     row       (m,) number of the row among the rows of all files; -1 for calibrated distances
@@ -36,7 +40,8 @@ class View:
     """
 
     problem: Problem
-    estimate: Estimate
+    coefficients: Array
+    unknowns: Array
     y: Array
     base: Array
     row: Index
@@ -60,6 +65,24 @@ class View:
     def design(self, effects: Sequence[Effect]) -> Array:
         """The derivative of all values by the coefficients of effects, um, (m, k)."""
         return UM * np.concatenate([each.design(effects) for each in self.problem.observations])
+
+    def expansion(self, drive: Sequence[Effect]) -> Array:
+        """What is seen when things on the table move away from the middle of what was measured, um, (m, k).
+
+        The effects say with what they expand, one column per coefficient, for an expansion by the tip's distance.
+        """
+        parts = []
+        for each in self.problem.observations:
+            nominal = each.machine.nominal(each.q, each.state.tool_length)
+            arm = nominal[:, :3, 3] - nominal[:, :3, 3].mean(axis=0)
+            turned = np.einsum("nji,nj->ni", nominal[:, :3, :3], arm)[np.maximum(each.rows, 0)]
+            tip = each.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"])
+            seen = np.einsum("mk,mk->m", tip, turned) * (each.rows >= 0)
+            driven = each.machine.design(each.q, each.state, drive)[:, :3]
+            along = each.machine.design(each.q, each.state, [Effect(drive[0].name, (0.0,))])[:, :3]
+            course = np.einsum("nik,ni->nk", driven, along[:, :, 0]) / (along[:, :, 0] ** 2).sum(axis=1)[:, None]
+            parts.append(-seen[:, None] * course[np.maximum(each.rows, 0)])
+        return UM * np.concatenate(parts)
 
     @cached_property
     def q(self) -> Array:
@@ -126,13 +149,30 @@ class View:
 
 
 def view(measurements: Sequence[Measurement], machine: Machine) -> View:
-    """Fit what is free and take everything else to first order about it. Raises `UsageError` NCF630, NCF637."""
+    """Fit what is free, and take everything else to first order about it."""
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
-    estimate = settle(problem, weights.NONE)
-    base = np.concatenate([problem.nuisance(estimate.unknowns), problem.design], axis=1)
-    sigma = problem.sigma / np.median(problem.sigma)
-    return View(problem, estimate, UM * estimate.residual, UM * base, _rows(problem), sigma)
+    relative = problem.sigma / np.median(problem.sigma)
+    coefficients, unknowns = selection.start.copy(), problem.start
+    for _ in range(STEPS):
+        base = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1)
+        change = damped(base / relative[:, None], UM * problem.residual(coefficients, unknowns) / relative)
+        unknowns = unknowns + change[: len(unknowns)]
+        coefficients = coefficients + change[len(unknowns) :]
+        if np.abs(base @ change).max(initial=0.0) < SETTLED_UM:
+            break
+    residual = problem.residual(coefficients, unknowns)
+    return View(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
+
+
+def damped(columns: Array, y: Array) -> Array:
+    """Least squares in which what the data hardly tell stays as it is."""
+    size = np.sqrt((columns**2).mean(axis=0))
+    size = np.where(size > 0, size, 1.0)
+    left, values, right = np.linalg.svd(columns / size, full_matrices=False)
+    kept = values > HARDLY * values.max(initial=1e-300)
+    found: Array = right[kept].T @ ((left[:, kept].T @ y) / values[kept]) / size
+    return found
 
 
 def is_free(effect: Effect) -> bool:

@@ -33,11 +33,10 @@ def text(found: Diagnosis) -> str:
 
 def why(found: Diagnosis, finding: Finding) -> str:
     """One sentence on why this name."""
-    total = len(found.considered)
-    best = (
-        max(found.selected.runners[finding.candidate.name].items(), key=lambda item: item[1])
-        if found.selected
-        else None
-    )
-    rival = f"; next best {best[0]}, e^{finding.odds - best[1]:.0f} times less likely" if best else ""
-    return f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g}) among {total} effects{rival}"
+    name = finding.candidate.name
+    said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g})"
+    runners = found.selected.runners.get(name, {}) if found.selected else {}
+    if not runners:
+        return said
+    best = max(runners, key=lambda each: runners[each])
+    return f"{said}; next best of {len(found.considered)}: {best}, {finding.odds - runners[best]:.0f} less"

@@ -29,10 +29,11 @@ class Candidate:
     name      as it is reported; `kind` is its first words, `axis` the letter of the axis it belongs to, or ""
     title     in words
     family    effects of one family are next of kin: one may stand for another
-    effects   what it adds to a machine file, zero until estimated; empty for what belongs to the measurement
+    effects   what it adds to a machine file, zero until estimated
     loadings  each (k, p) for the k coefficients of all effects: forms of the effect
     needs     state columns without which it cannot be seen
     remedy    what can be done about it besides compensation, in words
+    grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
     """
 
     name: str
@@ -43,6 +44,7 @@ class Candidate:
     loadings: tuple[Array, ...]
     needs: tuple[str, ...] = ()
     remedy: str = ""
+    grows: bool = False
 
 
 @dataclass(frozen=True)

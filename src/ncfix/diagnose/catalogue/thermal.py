@@ -29,7 +29,7 @@ SLOW = 0.5
 FREE = 0.4
 """Variance of the course of time beside that of the temperatures."""
 AMBIENT = ("ambient", "air", "hall", "room")
-SLIPS = 24
+SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
 WARM = 20.0
 WARM_UP = "warm up before measuring and cutting"
@@ -63,6 +63,8 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
         lines: Parts = [(f"E{LETTERS[k]}0{axis.name}", {}) for k in across(axis)]
         title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
         yield _of(reach, f"rotary centre drift {axis.name}", title, axis.name, [lines], inside, clocked)
+    if reach.sensors or clocked:
+        yield _artefact(reach, reach.sensors, clocked)
     if clocked:
         yield from _slip(reach)
 
@@ -154,4 +156,14 @@ def _slip(reach: Reach) -> Iterator[Candidate]:
     title = "slip: something slipped, was re-zeroed or hit once; before and after differ"
     yield Candidate(
         "slip", title, "", "slip", zero(effects), tuple(loadings), ("time_s",), "find out what happened then"
+    )
+
+
+def _artefact(reach: Reach, sensors: Sequence[str], clocked: bool) -> Candidate:
+    """The balls on the table move apart as their plate warms: no error of the machine, and none in its file."""
+    drive, size = _drive(reach, sensors, clocked)
+    effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive])
+    title = "artefact growth: the artefact or workpiece expands with temperature"
+    return Candidate(
+        "artefact growth", title, "", "heat", effects, (size,), (*sensors,), "log the artefact's own temperature", True
     )

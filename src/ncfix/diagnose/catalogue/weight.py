@@ -155,15 +155,26 @@ def _table(axis: Axis) -> Candidate:
 
 
 def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
-    """The load's weight turns the axis, once a turn and in proportion to the mass."""
+    """The load's weight turns the axis, once a turn and in proportion to the mass; less where the axis stands upright."""
     own = along(axis)
     if own is None or "load_kg" not in reach.columns:
         return
-    effects = zero([Effect(f"E{TURNS[own]}{axis.name}", (), Fourier(order=(1,)), **LOAD)])  # type: ignore[arg-type]
+    name, wave = f"E{TURNS[own]}{axis.name}", Fourier(order=(1,))
+    tilting = [other for other in reach.rotary if other is not axis]
+    effects = zero(
+        [
+            Effect(name, (), wave, **LOAD),  # type: ignore[arg-type]
+            *(Effect(name, (), wave, **reach.factor(other)) for other in tilting),  # type: ignore[arg-type]
+            Effect(name, (), wave),
+        ]
+    )
+    rest = 2 * len(effects) - 2
+    plain = np.eye(2 * len(effects))[:, :2]
+    leaning = weighed((1.0, 1.0, *(0.5,) * rest))
     title = f"unbalanced load on {axis.name}: its weight turns the axis"
     yield Candidate(
-        f"unbalanced load {axis.name}", title, axis.name, f"{axis.name} weight", effects, (np.eye(2),), ("load_kg",),
-        "balance the load",
+        f"unbalanced load {axis.name}", title, axis.name, f"{axis.name} weight", effects, (plain, leaning),
+        ("load_kg",), "balance the load",
     )  # fmt: skip
 
 
