@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from ncfix import fast
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.stream import Stream
@@ -105,6 +106,18 @@ def test_parts_as_the_whole(seed: int, machine: Machine) -> None:
 
 def test_plain_programs_are_done_in_parts(machine: Machine) -> None:
     assert all(assert_same(program(seed, 60, 0.0), machine, 300) for seed in (1, 5))
+
+
+def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    source = program(5, 300, 0.05)
+    plain = streamed(source, machine, 4000)[0]
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    assert fast.engage()
+    try:
+        assert streamed(source, machine, 4000)[0] == plain
+    finally:
+        fast.disengage()
 
 
 def test_play_remembers_the_way_across_parts(root: Path) -> None:

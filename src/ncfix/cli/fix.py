@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix import fast
 from ncfix.cli import console
 from ncfix.cli.options import (
     dialect_of,
@@ -130,6 +131,7 @@ class Job:
     def _outlet(self, source: Source, target: Target, dialect: Dialect) -> Iterator[tuple[Stream, Outlet]]:
         from ncfix.compensate.stream import Stream
 
+        fast.engage()
         path, found = shown(source.path), subprograms(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
             stream = Stream(

@@ -26,6 +26,9 @@ from ncfix.program.pieces import Pieces
 
 BATCH = 50_000
 """Samples worked on at a time."""
+STRAIGHT = 0.05
+"""Pieces over which the error may bend by less than that many times are looked at where they end: an eighth of a wave
+is once, so that in between the error is within 0.0002 of itself of the straight line between those at the ends."""
 START = 1e-6
 """Fraction of a motion at which its start is looked at."""
 
@@ -96,7 +99,7 @@ def path_error(
     start    (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
     rows     (n,) motions to look at; all that are not kept if not given
     density  samples for each time that the error model may bend
-    least    fewest samples inside a piece
+    least    fewest samples inside a piece over which the error may bend at all
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
@@ -108,35 +111,36 @@ def path_error(
 
 def samples(written: Written, which: Index, density: float = DENSITY, least: int = 2) -> Iterator[Samples]:
     """Look at pieces `which`, in batches."""
-    counts = _counts(written, which, density, least)
+    counts, along = _counts(written, which, density, least)
     uneasy = uneasy_starts(written.intent, _kept_motions(written))
     for batch in batches(counts + 1, BATCH):
-        piece, fraction = _places(written, which[batch], counts[batch], uneasy)
+        piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
         yield _looked_at(written, piece, fraction)
 
 
-def _counts(written: Written, which: Index, density: float, least: int) -> Index:
-    """Samples inside each piece, ends left out; none where only the end is looked at."""
+def _counts(written: Written, which: Index, density: float, least: int) -> tuple[Index, Mask]:
+    """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     move = written.pieces.move[which]
     motions = np.unique(move)
     place = np.searchsorted(motions, move)
-    wished = np.ceil(density * bends(written.intent, motions)[place] * written.span[which])
+    wished = bends(written.intent, motions)[place] * written.span[which]
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
     along &= written.intent.moving[move]
     along &= np.isfinite(written.segments.start[which]).all(axis=1) & np.isfinite(written.start[move]).all(axis=1)
     along &= np.isfinite(written.intent.moves.start[move]).all(axis=1)
-    return np.where(along, np.clip(np.nan_to_num(wished), least, MOST), 0).astype(np.intp)
+    counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST)
+    return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
-def _places(written: Written, which: Index, counts: Index, uneasy: Mask) -> tuple[Index, Array]:
+def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: Mask) -> tuple[Index, Array]:
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     each, inner = np.arange(len(which)), even(counts)
     lists = [(owners(counts), inner), (each, np.ones(len(which)))]
-    begun = np.flatnonzero(written.opens[which] & uneasy[written.pieces.move[which]] & (counts > 0))
+    begun = np.flatnonzero(written.opens[which] & uneasy[written.pieces.move[which]] & along)
     lists.append((begun, np.full(len(begun), START)))
     if written.intent.kinks:
-        long = np.flatnonzero(counts)
+        long = np.flatnonzero(along)
         ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
         on, share = passed(written.intent, *ends)
         lists.append((long[on], share))

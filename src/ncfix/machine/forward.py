@@ -16,7 +16,7 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.error_model import ErrorModel, Slot, Sort
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
-from ncfix.machine.transport import SmallMotion, Weight, advance, columns, composed, cross
+from ncfix.machine.transport import SmallMotion, Weight, advance, columns, composed, cross, dot
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +63,26 @@ class Joint:
         """The motion of the axis line, and the zero offset: the component along or about the axis itself."""
         if not self.location or self.axis is None:
             return None, None
-        along = slice(3, 6) if self.axis.rotary else slice(0, 3)
-        direction = np.asarray(self.axis.direction)
-        terms, offset = [], np.zeros(1)
+        along, terms = self._along, []
         for slot in self.location:
-            share = direction @ small[slot][along]
             across = small[slot].copy()
-            across[along] -= direction[:, None] * share
-            offset = offset + self.axis.zero_sense * share
+            across[along] -= np.multiply.outer(self.axis.direction, dot(self.axis.direction, small[slot][along]))
             terms.append((across, columns(slot.reference)))
-        return composed(terms, any(slot in self.rotating for slot in self.location)), offset
+        return composed(terms, any(slot in self.rotating for slot in self.location)), self.zero_offset(small)
+
+    @property
+    def _along(self) -> slice:
+        """The components of a small motion of which one is along or about the axis."""
+        return slice(3, 6) if self.axis is not None and self.axis.rotary else slice(0, 3)
+
+    def zero_offset(self, small: Mapping[Slot, Array]) -> Array | None:
+        """What location errors along or about the axis add to its position, (n,) or (1,); None without any."""
+        if not self.location or self.axis is None:
+            return None
+        offset = np.zeros(1)
+        for slot in self.location:
+            offset = offset + self.axis.zero_sense * dot(self.axis.direction, small[slot][self._along])
+        return offset
 
 
 @dataclass(frozen=True, slots=True)

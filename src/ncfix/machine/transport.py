@@ -11,11 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.machine import se3
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
 
 Weight = float | Array
+
+SMALL = 0.08
+"""rad; rotation vectors with such components are left to the power series, which is exact there."""
 
 
 def columns(*vectors: Sequence[float]) -> Array:
@@ -40,13 +44,54 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
     direction = np.asarray(axis.direction)
     if not axis.rotary:
         return moved + direction[:, None, None] * position * weight if np.any(weight) else moved
+    if _is_many(moved) and position.shape == moved.shape[2:]:
+        from ncfix.machine import kernels
+
+        constants = np.array(axis.direction, dtype=np.float64), np.array(axis.point, dtype=np.float64)
+        return kernels.advanced(*constants, np.sin(position), versine(position), moved, _weights(moved, weight))
     arm = moved - np.asarray(axis.point)[:, None, None] * weight
-    turning = se3.skew(direction)
-    flat = arm.reshape(3, -1)
-    once = (turning @ flat).reshape(arm.shape)
-    twice = (turning @ turning @ flat).reshape(arm.shape)
-    result: Array = moved + np.sin(position) * once + (2 * np.sin(position / 2) ** 2) * twice
+    once = cross_with(axis.direction, arm)
+    result: Array = moved + np.sin(position) * once + versine(position) * cross_with(axis.direction, once)
     return result
+
+
+def _is_many(moved: Array) -> bool:
+    """Whether compiled kernels are to take it: columns for each of many poses."""
+    return fast.engaged() and moved.shape[2] > 1 and moved.flags.c_contiguous
+
+
+def _weights(moved: Array, weight: Weight) -> Array:
+    """The weight of each column, (m,)."""
+    return np.broadcast_to(np.asarray(weight, dtype=np.float64).reshape(-1), moved.shape[1:2]).copy()
+
+
+def versine(angle: Array) -> Array:
+    """1 - cos of angles, without loss of digits for small ones."""
+    half = np.sin(angle / 2)
+    result: Array = 2 * (half * half)
+    return result
+
+
+def dot(direction: Sequence[float], vector: Array) -> Array:
+    """The scalar product of a constant direction and vectors (3, ...), summed in the order of the components."""
+    x, y, z = direction
+    result: Array = x * vector[0] + y * vector[1] + z * vector[2]
+    return result
+
+
+def cross_with(direction: Sequence[float], arm: Array) -> Array:
+    """The vector product of a constant direction, often one of the base axes, and arms (3, ...)."""
+    x, y, z = direction
+    out = np.empty_like(arm)
+    for place, (first, second) in enumerate(((y, z), (z, x), (x, y))):
+        following, last = arm[(place + 2) % 3], arm[(place + 1) % 3]
+        if first == 0.0:
+            np.multiply(last, -second, out=out[place])
+        elif second == 0.0:
+            np.multiply(following, first, out=out[place])
+        else:
+            np.subtract(first * following, second * last, out=out[place])
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,26 +109,56 @@ class SmallMotion:
 
     def forth(self, moved: Array, weight: Weight = 1.0) -> Array:
         """Carry with it."""
+        if self._varies_like(moved):
+            from ncfix.machine import kernels
+
+            return kernels.forth(*self._rows, moved, _weights(moved, weight))
         if self.rotation is not None:
-            moved = moved + rotated_by(self.rotation, moved - self.center * weight)
+            moved = _turned(self.rotation, self.center, moved, weight)
         return moved if self.translation is None else moved + self.translation * weight
 
     def back(self, moved: Array, weight: Weight = 1.0) -> Array:
         """Undo it."""
+        if self._varies_like(moved):
+            from ncfix.machine import kernels
+
+            return kernels.back(*self._rows, moved, _weights(moved, weight))
         if self.translation is not None:
             moved = moved - self.translation * weight
         if self.rotation is not None:
-            moved = moved + rotated_by(-self.rotation, moved - self.center * weight)
+            moved = _turned(-self.rotation, self.center, moved, weight)
         return moved
+
+    def _varies_like(self, moved: Array) -> bool:
+        """Whether rotation and translation differ from pose to pose, as the compiled kernels have it."""
+        if self.rotation is None or self.translation is None or not _is_many(moved):
+            return False
+        same = self.rotation.shape == self.translation.shape == (3, 1, moved.shape[2])
+        return same and bool(np.abs(self.rotation).max() < SMALL)
+
+    @property
+    def _rows(self) -> tuple[Array, Array, Array]:
+        """Rotation, translation and center, (3, n) each."""
+        assert self.rotation is not None
+        assert self.translation is not None
+        center = np.broadcast_to(self.center, self.rotation.shape)
+        return self.rotation[:, 0], self.translation[:, 0], np.ascontiguousarray(center[:, 0])
+
+
+def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
+    """What is carried, after a small rotation about a center."""
+    if vector.size == 3 and center.size == 3 and _is_many(moved):
+        from ncfix.machine import kernels
+
+        first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
+        weights = _weights(moved, weight)
+        return kernels.turned(vector.ravel(), first, second, center.ravel(), moved, weights)
+    return moved + rotated_by(vector, moved - center * weight)
 
 
 def rotated_by(vector: Array, arm: Array) -> Array:
     """By how much a rotation vector moves the end of an arm: (R - 1) arm, without loss of digits for small angles."""
     first, second = se3.rotation_factors((vector * vector).sum(0))
-    if vector.size == 3:
-        turning = se3.skew(vector.ravel())
-        matrix = first.ravel() * turning + second.ravel() * (turning @ turning)
-        return (matrix @ arm.reshape(3, -1)).reshape(arm.shape)
     once = cross(vector, arm)
     result: Array = first * once + second * cross(vector, once)
     return result

@@ -145,6 +145,12 @@ class Reading:
     def part(self, first: int, stop: int) -> Columns:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
+        if found.group is not None:
+            numbers = [self.index.get(shape, -1) for shape in found.shapes]
+            if min(numbers) >= 0:
+                self.rows += np.array(numbers)[found.group].tolist()
+                return Columns(np.diff(found.first_number), found.spans + self.blocks[first, 0], found.values)
+            found = found.expanded()
         exact: dict[int, Parsed] = {}
         for row, shape in enumerate(found.shapes):
             known = self.index.get(shape)
@@ -168,7 +174,11 @@ class Reading:
         if limit and len(blocks) == 1 and lengths[0] > limit:
             return ONE_UNSCANNED
         found = self.language.scan(self.source[start:end], blocks - start)
-        for row in np.flatnonzero(lengths > limit) if limit else ():
+        long = np.flatnonzero(lengths > limit) if limit else ()
+        if not len(long):
+            return found
+        found = found.expanded()
+        for row in long:
             found.shapes[row] = None
         return found
 

@@ -7,12 +7,23 @@ language: it only says where numbers would be. Whether they are is checked once 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import NUMERIC, POINT, find_numbers, table
+from ncfix import fast
+from ncfix.program.numbers import (
+    BLANK,
+    BLANKS,
+    EXACT_DIGITS,
+    NUMERIC,
+    POINT,
+    SIGN,
+    UNSIGNED_AFTER,
+    find_numbers,
+    table,
+)
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2
@@ -37,6 +48,7 @@ class Scan:
     """What the scan of a text found, columns over its n blocks and m numbers.
 
     shapes        n keys: blocks with equal keys have equal shapes; None for a block that must be taken as it is
+    group         (n,) index into `shapes`, if they are given once each; None: one for each block
     comment       (n,) where the comment that ends the block starts, -1 without one
     first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
     spans         (m, 2) start and stop byte of each number
@@ -48,6 +60,13 @@ class Scan:
     first_number: NDArray[np.int64]
     spans: NDArray[np.int64]
     values: NDArray[np.float64]
+    group: NDArray[np.int64] | None = None
+
+    def expanded(self) -> Scan:
+        """The same, with a shape for each block."""
+        if self.group is None:
+            return self
+        return replace(self, shapes=[self.shapes[index] for index in self.group.tolist()], group=None)
 
 
 def split_blocks(source: bytes) -> NDArray[np.int64]:
@@ -73,6 +92,10 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
     """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
     text = np.frombuffer(source, dtype=np.uint8)
     starts, stops, last = comments_of(source)
+    if fast.engaged():
+        found = scan_compiled(text, blocks, np.stack((starts, stops), axis=1), last, pointless)
+        if found is not None:
+            return found
     numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), starts, stops), FIXED)
     block_of_number = block_of(blocks, numbers.spans[:, 0])
     comment = np.full(len(blocks), -1, dtype=np.int64)
@@ -85,6 +108,34 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
         shapes[block] = None
     first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
     return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+
+
+def scan_compiled(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    comments: NDArray[np.int64],
+    last: NDArray[np.bool_],
+    pointless: bool,
+) -> Scan | None:
+    """As `scan`, by the compiled kernels; None where there are blocks that must be taken as they are."""
+    from ncfix.program import kernels
+
+    tables = NUMERIC, comments, FIXED, SIGN, UNSIGNED_AFTER, BLANK, BLANKS, EXACT_DIGITS
+    spans, values, kinds = kernels.numbers(text, *tables)
+    if kinds.any() or odd_blocks(text, blocks):
+        return None
+    marks = np.full(len(spans), NUMBER_MARK, dtype=np.uint8)
+    if pointless:
+        marks[without_point(text, spans)] = POINTLESS_MARK
+    ending = np.ascontiguousarray(comments[last])
+    marked, begins, hashes, first = kernels.shapes(text, blocks, spans, marks, ending, COMMENT_MARK)
+    _, model, group = np.unique(hashes, return_index=True, return_inverse=True)
+    if not kernels.alike(marked, begins, group, model):
+        return None
+    keys: list[bytes | None] = [marked[begins[block] : begins[block + 1]].tobytes() for block in model]
+    comment = np.full(len(blocks), -1, dtype=np.int64)
+    comment[block_of(blocks, ending[:, 0])] = ending[:, 0]
+    return Scan(keys, comment, first, spans, values, group)
 
 
 def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
@@ -101,7 +152,8 @@ def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np
 
 def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Start and stop of each comment, and whether it ends its block."""
-    found = [(*match.span(), match.start("last") >= 0) for match in COMMENT.finditer(source)]
+    text = source if b"(" in source or b";" in source else b""
+    found = [(*match.span(), match.start("last") >= 0) for match in COMMENT.finditer(text)]
     columns = np.array(found, dtype=np.int64).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
 

@@ -1,0 +1,63 @@
+"""The compiled kernels do what the plain way does, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from machine import chains
+from ncfix import fast
+from ncfix.machine import Machine, State, load
+
+pytest.importorskip("numba", reason="the `fast` extra is not installed")
+
+SHIPPED = ("angle_head", "dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
+
+
+@pytest.fixture(autouse=True)
+def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    yield
+    fast.disengage()
+
+
+def both(machine: Machine, q: np.ndarray, state: State) -> list[tuple[np.ndarray, ...]]:
+    results = []
+    for compiled in (False, True):
+        fast.disengage()
+        assert not compiled or fast.engage()
+        found = machine.tip(q, state.tool_length), machine.actual_tip(q, state), machine.actual(q, state)
+        results.append((*found, machine.nominal(q, state.tool_length)))
+    return results
+
+
+def poses(machine: Machine, n: int) -> np.ndarray:
+    rng = np.random.default_rng(n)
+    return rng.uniform(-1, 1, (n, len(machine.axes))) * np.where(machine.rotary, 2.0, 300.0)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_machines(name: str, root: Path) -> None:
+    machine = load(root / "examples" / "machines" / f"{name}.toml")
+    inputs = dict.fromkeys(machine.inputs, 1.5)
+    for n in (1, 7, 5000):
+        state = State(np.linspace(20, 90, n), 1, inputs)
+        for plain, compiled in zip(*both(machine, poses(machine, n), state), strict=True):
+            assert np.array_equal(plain, compiled)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_chains(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    machine = chains.random_errors(rng, chains.random_chain(rng, 4), 1e-4)
+    for plain, compiled in zip(*both(machine, poses(machine, 300), State(50.0)), strict=True):
+        assert np.array_equal(plain, compiled)
+
+
+def test_not_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    assert not fast.engage()
+    assert not fast.engaged()

@@ -1,0 +1,74 @@
+"""The compiled scan finds what the plain one finds, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ncfix import fast
+from ncfix.program.shapes import Scan, scan, split_blocks
+
+pytest.importorskip("numba", reason="the `fast` extra is not installed")
+
+LINES = st.lists(
+    st.one_of(
+        st.text("XYZGMNF0123456789.+-# ()[];%/\t", max_size=25),
+        st.from_regex(r"\A(N[0-9]{1,3} )?G1( [XYZ]-?[0-9]{1,3}\.?[0-9]{0,5}){1,3}( ?\([A-Z 0-9]{0,5}\))?\Z"),
+        st.sampled_from(["X1.2.3", "X.", "X12345678901234567890.5", "\x01", "G01.5X-  .5", "(a(b) 5", "X1;tail 7", ""]),
+    ),
+    min_size=1,
+    max_size=20,
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _plain_again() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("NCFIX_NO_FAST", raising=False)
+        yield
+    fast.disengage()
+
+
+def both(source: bytes, pointless: bool) -> list[Scan]:
+    blocks, found = split_blocks(source), []
+    for compiled in (False, True):
+        fast.disengage()
+        assert not compiled or fast.engage()
+        found.append(scan(source, blocks, pointless=pointless).expanded())
+    return found
+
+
+def assert_same(source: bytes, pointless: bool = False) -> None:
+    plain, compiled = both(source, pointless)
+    assert plain.shapes == compiled.shapes
+    for name in ("comment", "first_number", "spans"):
+        assert np.array_equal(getattr(plain, name), getattr(compiled, name)), name
+    assert np.array_equal(plain.values, compiled.values, equal_nan=True)
+    assert np.array_equal(np.signbit(plain.values), np.signbit(compiled.values))
+
+
+@settings(derandomize=True, deadline=None, max_examples=200)
+@given(LINES, st.sampled_from(["\n", "\r\n"]), st.booleans())
+def test_generated_texts(lines: list[str], end: str, pointless: bool) -> None:
+    source = end.join([*lines, "M2", ""]).encode("latin-1")
+    assert_same(source, pointless)
+
+
+def test_the_corpus(shared: Callable[[str], Path]) -> None:
+    texts = [path.read_bytes() for path in sorted(shared("corpus").glob("*/*"))[::3]]
+    for source in texts:
+        if source.strip() and len(source) < 200_000:
+            assert_same(source)
+
+
+def test_a_shape_that_shares_a_hash_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix.program import kernels
+
+    found = kernels.shapes
+    monkeypatch.setattr(kernels, "shapes", lambda *given: (*(f := found(*given))[:2], np.zeros_like(f[2]), f[3]))
+    assert_same(b"G1 X1\nG1 Y1\n")
