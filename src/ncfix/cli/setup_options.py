@@ -50,7 +50,7 @@ def number(text: str) -> float:
 def offset_values(name: str, text: str) -> dict[str, float]:
     """A work offset by axis letter: `0,0,-300`, or `X=..` where the option is written `G54=X0,Z-300`."""
     parts = [part.strip() for part in text.split(",")]
-    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)", name):
+    if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)|PRESET\d*", name):
         raise ValueError(f"{name} is not a work offset")
     if all(AXIS.match(part.upper()) for part in parts):
         return {part[0].upper(): number(part[1:]) for part in parts}

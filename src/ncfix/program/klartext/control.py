@@ -9,6 +9,7 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.klartext.calculate import Parameters, Scope
 from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.moves import Kind, Kinematics
+from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import control as base
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.builder import Arc
@@ -79,6 +80,8 @@ class Control(base.Control):
         self.unit = 1.0
         self.m128 = setup.tcp
         self.shortest = False
+        self.pointing: Pointing | None = None
+        self.points = False
         self.auto_feed = math.nan
         self.preset = ""
         self.preset_checked = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ncfix.diagnostics import UsageError
 from ncfix.program import stamp
 from ncfix.program.klartext.blocks import parse_block
@@ -33,7 +35,7 @@ def follow(
         raise UsageError.collected(lacking)
     marked = stamp.find(program)
     return Trace(
-        moves=control.builder.moves(),
+        moves=replace(control.builder.moves(), pointing=control.pointing if control.points else None),
         messages=(*control.knowledge.assumed.values(), *control.messages.values()),
         assumed=tuple(control.knowledge.assumed),
         stamp="" if marked is None else program.text_of(marked),

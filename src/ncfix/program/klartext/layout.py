@@ -32,6 +32,7 @@ class Layout:
     polar     PR, PA, IPR, IPA words
     radius    the R word of CR
     sense     DR+ or DR-
+    vector    TX TY TZ words
     late      M codes that act at the end of the block
     words_at  where missing words go: after the last word that leads somewhere
     starts_at where the function stands, or the first word
@@ -46,6 +47,7 @@ class Layout:
     polar: tuple[Word, ...]
     radius: Word | None
     sense: Span | None
+    vector: dict[str, Word]
     late: tuple[Word, ...]
     words_at: Anchor
     starts_at: Anchor
@@ -67,7 +69,7 @@ class Layout:
 
 
 def layout_of(program: Program, block: int) -> Layout | None:
-    """The layout of a block; None for an angle from a Q parameter, which may be several turns."""
+    """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
     items = program.items_of(block)
     commands = [item for item in items if isinstance(item, Command)]
     words = [item for item in items if isinstance(item, Word) and item.address != "N"]
@@ -75,7 +77,8 @@ def layout_of(program: Program, block: int) -> Layout | None:
     function = functions[0] if functions else None
     axes = {w.address.removeprefix("I"): w for w in words if w.address.removeprefix("I") in AXIS_LETTERS}
     polar = tuple(word for word in words if word.address in POLAR)
-    if any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar):
+    vector = {word.address: word for word in words if word.address in ("TX", "TY", "TZ")}
+    if 0 < len(vector) < 3 or any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar):
         return None
     leading = [*axes.values(), *polar]
     begins = [item.span.start for item in items if not isinstance(item, Skip) and item not in numbers_of(items)]
@@ -87,6 +90,7 @@ def layout_of(program: Program, block: int) -> Layout | None:
         polar=polar,
         radius=next((word for word in words if word.address == "R"), None),
         sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
+        vector=vector,
         late=tuple(
             w for w in words if w.address == "M" and isinstance(w.value, Constant) and int(w.value.value) in LATE
         ),

@@ -47,4 +47,10 @@ KLARTEXT_CODES: dict[str, Code] = {
         "The program checks its parameters, and stops with an error of its own (FN 14).",
         "Check the parameters with which it is called.",
     ),
+    "NCF279": Code(
+        "Several ways to turn to a tilted plane",
+        "PLANE turns the rotary axes until the tool stands square to the plane, and there is more than one way. The "
+        "control takes one by its travels and parameters; here it is the nearest.",
+        "Say SEQ+ or SEQ- in the program, or state the rotary axes.",
+    ),
 }

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 from ncfix.program.klartext.control import RETRACTED, Control
+from ncfix.program.klartext.posture import angles_for
 from ncfix.program.klartext.targets import (
     BAD_POLE,
     PLANE_OF,
@@ -25,6 +26,7 @@ from ncfix.program.klartext.targets import (
     starts_unknown,
 )
 from ncfix.program.klartext.tilting import check_normal
+from ncfix.program.klartext.transformations import unit
 from ncfix.program.moves import Kind
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.arcs import centre_from_radius, check_closure, sweep_angle
@@ -38,7 +40,7 @@ BAD_ARC = "NCF220"
 CLOCKWISE, COUNTER = 20, 30
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
-ORIENTED = "the control works out the rotary axes (TX TY TZ)"
+ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
 TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
 OFF = "a rapid after a retract (M140)"
@@ -70,11 +72,29 @@ class Step:
 def straight(control: Control, step: Step) -> None:
     """L, LN, and blocks of words alone."""
     control.use()
-    if {"TX", "TY", "TZ"} & step.words.values.keys():
+    target, unknown = destination(control, step.words)
+    if not {"TX", "TY", "TZ"} & step.words.values.keys():
+        run(control, step, target, unknown, step.words.axes)
+        return
+    way = None if step.words.runtime else pointed(control, step.words)
+    if way is None:
         refuse(control, ORIENTED)
         return
-    target, unknown = destination(control, step.words)
-    run(control, step, target, unknown, step.words.axes)
+    control.points = True
+    for index, angle in way.items():
+        target[index] = angle
+        unknown.pop(index, None)
+    run(control, step, target, unknown, step.words.axes | sum(1 << index for index in way))
+
+
+def pointed(control: Control, words: Words) -> dict[int, float] | None:
+    """The rotary positions that point the tool along TX TY TZ, the nearest; None if that is not known."""
+    vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
+    if vector is None or not control.m128:
+        return None
+    x, y, z = (dot(row, vector) for row in control.rotation)
+    ways = angles_for(control, (x, y, z))
+    return ways[0] if ways else None
 
 
 def straight_polar(control: Control, step: Step) -> None:

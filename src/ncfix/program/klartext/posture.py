@@ -9,10 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
-from ncfix.program.rs274.coordinates import Rotation, Vector, X, Y, Z, as_rotation
+from ncfix.program.pointing import Pointing
+from ncfix.program.rs274.coordinates import Rotation, Vector, X, Y, Z, as_rotation, zeros
+
+FloatArray = NDArray[np.float64]
 
 PROBE = 128.0
 """mm; a power of two, so that dividing by it rounds nothing."""
@@ -70,6 +76,35 @@ def apart(a: Triple, b: Triple) -> float:
 def normal_of(tilt: Rotation) -> Triple:
     """The Z axis of a tilted plane."""
     return tilt[0][2], tilt[1][2], tilt[2][2]
+
+
+def pointing_of(control: Control) -> Pointing | None:
+    """How the two rotary axes point the tool; None without kinematics, or with other than two of them."""
+    columns = [column for column, index in enumerate(control.machine) if control.rotary[index]]
+    if control.kinematics is None or len(columns) != 2 or not {X, Y, Z} <= set(control.machine):
+        return None
+    if control.pointing is None:
+
+        def directions(first: float, second: float) -> FloatArray:
+            position = zeros()
+            for column, angle in zip(columns, (first, second), strict=True):
+                position[control.machine[column]] = angle
+            return np.array(minus(tip(control, position, 0.0), tip(control, position, PROBE))) / PROBE
+
+        control.pointing = Pointing.of((columns[0], columns[1]), directions)
+    return control.pointing
+
+
+def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
+    """The ways to point the tool, letter index -> rad, the nearest first; empty if there is none or none is known."""
+    pointing = pointing_of(control)
+    if pointing is None:
+        return []
+    first, second = (control.machine[column] for column in pointing.columns)
+    if first in control.unknown or second in control.unknown:
+        return []
+    ways = pointing.angles(np.array(direction), (control.position[first], control.position[second]))
+    return [{first: outer, second: inner} for outer, inner in ways]
 
 
 def stands_normal(control: Control, tilt: Rotation) -> bool | None:

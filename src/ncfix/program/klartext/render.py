@@ -6,6 +6,8 @@ A word is rewritten only when its value moves by half an output step. What relie
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,8 @@ SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
 CLOCKWISE = 20
+VECTOR_DIGITS = 7
+"""Of components of a direction: 1e-7 rad is 6e-6 degrees; the control takes eight."""
 EXACT = 1e-9
 
 
@@ -104,9 +108,46 @@ class Renderer:
     def _own_line(self) -> FloatArray:
         """The block itself as a straight piece."""
         position = self._words(self.target.ends[0], self._polar_columns())
+        if self.layout.vector:
+            self._direction(position, self.target.ends[0])
         if self.layout.name not in ("", "l", "ln") or self.layout.polar:
             self._straightened()
         return position
+
+    # -- the direction of the tool ------------------------------------------------------------------------------------
+
+    def _turning(self) -> tuple[int, ...]:
+        """The columns of the rotary axes that a vector says where to turn; none without one."""
+        pointing = self.target.pointing
+        return pointing.columns if self.layout.vector and pointing is not None else ()
+
+    def _direction(self, position: FloatArray, end: FloatArray) -> None:
+        """Put TX TY TZ right, and `position` where they take the rotary axes."""
+        target, pointing = self.target, self.target.pointing
+        assert pointing is not None
+        turning = list(pointing.columns)
+        vector = self._pointed(target.nominal)
+        if (np.abs(end[turning] - target.nominal[turning]) >= self.half[turning]).any() or len(target.ends) > 1:
+            vector = self._pointed(end)
+            for (address, word), part in zip(sorted(self.layout.vector.items()), vector, strict=True):
+                assert address[0] == "T"
+                self._rewrite(word, float(part), VECTOR_DIGITS)
+            vector = np.round(vector, VECTOR_DIGITS)
+            near = math.radians(end[turning[0]]), math.radians(end[turning[1]])
+            outer, inner = pointing.angles(self._rotation() @ vector / float(np.linalg.norm(vector)), near)[0]
+            position[turning] = math.degrees(outer), math.degrees(inner)
+        else:
+            position[turning] = target.nominal[turning]
+
+    def _rotation(self) -> FloatArray:
+        assert self.target.rotation is not None
+        return self.target.rotation
+
+    def _pointed(self, end: FloatArray) -> FloatArray:
+        """The direction of the tool at a position, in the program's coordinates."""
+        assert self.target.pointing is not None
+        found: FloatArray = self._rotation().T @ self.target.pointing.direction(np.radians(end))
+        return found
 
     def _straightened(self) -> None:
         """What is not straight by its words becomes an L, and an approach in polar words a Cartesian one."""
@@ -119,17 +160,35 @@ class Renderer:
 
     def _further_line(self, position: FloatArray, end: FloatArray) -> FloatArray:
         position = position.copy()
-        words = ["L"]
+        words = ["L" if not self.layout.vector else "LN"]
         for column, letter in self.columns:
-            if not abs(end[column] - position[column]) >= self.half[column]:
+            if column in self._turning() or not abs(end[column] - position[column]) >= self.half[column]:
                 continue
             text = self._number(float(end[column]), column)
             words.append(letter + text)
             position[column] = value_of(text)
+        if self.layout.vector:
+            words += self._further_direction(position, end)
         if self.layout.rapid:
             words.append("FMAX")
         self._line(words)
         return position
+
+    def _further_direction(self, position: FloatArray, end: FloatArray) -> list[str]:
+        """TX TY TZ of a further piece; its normal is that of the block."""
+        pointing = self.target.pointing
+        assert pointing is not None
+        turning = list(pointing.columns)
+        vector = np.round(self._pointed(end), VECTOR_DIGITS)
+        near = math.radians(end[turning[0]]), math.radians(end[turning[1]])
+        outer, inner = pointing.angles(self._rotation() @ vector / float(np.linalg.norm(vector)), near)[0]
+        position[turning] = math.degrees(outer), math.degrees(inner)
+        normals = [w for w in self.program.items_of(self.block) if isinstance(w, Word) and w.address[0] == "N"]
+        kept = [self.program.slice(self.block, word.span) for word in normals if len(word.address) == 2]
+        return kept + [
+            f"T{letter}{self.style.number(float(part), VECTOR_DIGITS)}"
+            for letter, part in zip("XYZ", vector, strict=True)
+        ]
 
     def _polar_columns(self) -> tuple[int, ...]:
         """The columns that polar words stood for: they are named from now on."""
@@ -142,6 +201,8 @@ class Renderer:
         position = self.target.start.copy()
         for column, letter in self.columns:
             word = self.layout.axes.get(letter)
+            if column in self._turning():
+                continue
             if column in left_out:
                 position[column] = end[column]
                 self._drop(word)

@@ -1,7 +1,7 @@
 """PLANE, and cycle 19: from angles, vectors or points to a tilted plane.
 
-Source: TNC 640, "The PLANE function: tilting the working plane", and "Cycle 19". Tilting moves no axis by itself as far
-as it is followed here: after TURN and MOVE the control has positioned the rotary axes, and where is not known.
+Source: TNC 640, "The PLANE function: tilting the working plane", and "Cycle 19". Where TURN and MOVE take the rotary
+axes follows from the machine's kinematics; MOVE also moves the linear axes, which are not known after it.
 """
 
 from __future__ import annotations
@@ -9,14 +9,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from ncfix.program.klartext.control import TILTED, Control
-from ncfix.program.klartext.posture import NOT_NORMAL, apart, normal_of, posture, stands_normal
+from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
 from ncfix.program.klartext.transformations import euler, from_points, from_vectors, projected, spatial
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, Rotation, product
+from ncfix.program.moves import Kind
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.program.rs274.faults import Fault
 
 BAD_PLANE = "NCF273"
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
+TURNED = "the control positions the rotary axes (PLANE)"
+WAY = "NCF279"
+WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
 RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
 NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
 CALCULATED = ("Q120", "Q121", "Q122")
@@ -93,13 +98,53 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
     control.suspended.pop(TILTED, None)
     if refusal:
         control.suspended[TILTED] = refusal
+    way = None if refusal else chosen_way(control, tilt, flags)
+    for letter, name in zip("ABC", CALCULATED, strict=True):
+        known = way is not None and INDEX[letter] in way
+        angle = way[INDEX[letter]] - control.offset[INDEX[letter]] if way is not None and known else 0.0
+        control.scope.parameters.assign(name, angle / DEGREE, runtime=not known)
     if flags & {"turn", "move"}:
-        control.pass_here("the control positions the rotary axes (PLANE)", POSITIONED, rotary_letters(control))
-    for name in CALCULATED:
-        control.scope.parameters.assign(name, 0.0, runtime=True)
+        turn_axes(control, way)
+    if "move" in flags:
+        control.lose(range(3), "where the axis {} stands after PLANE ... MOVE is not followed")
     control.recompose()
     control.switch_tip()
     control.path.tangent = None
+
+
+def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -> dict[int, float] | None:
+    """The rotary positions that the control works out, by letter; None where that is not known or not sure.
+
+    SEQ (or SYM) says which of the two ways is taken by the sign of the master axis, the one that tilts the tool when
+    all rotary axes stand at zero. Without it the nearest is.
+    """
+    normal = normal_of(IDENTITY if tilt is None else tilt)
+    ways = angles_for(control, normal)
+    sign = next((flag[-1] for flag in flags if flag[:3] in ("seq", "sym")), "")
+    pointing = control.pointing
+    if not ways or pointing is None:
+        return None
+    if sign:
+        master = control.machine[pointing.columns[1]]
+        ways = [way for way in ways if abs(way[master]) < 1e-9 or (way[master] < 0) == (sign == "-")]
+    if len(ways) > 1:
+        angles = " ".join(f"{'XYZABC'[index]}{angle / DEGREE:.3f}" for index, angle in ways[0].items())
+        control.warn(WAY, f"the rotary axes are taken to turn to {angles}, the nearest of several ways", WAY_HINT)
+    return ways[0] if ways else None
+
+
+def turn_axes(control: Control, way: dict[int, float] | None) -> None:
+    """TURN and MOVE: the control positions the rotary axes."""
+    if way is None:
+        control.pass_here(TURNED, POSITIONED, rotary_letters(control))
+        return
+    if control.tcp:
+        tcp.switch(control, control.offsets.tool, False)
+        control.refresh()
+    target = control.position[:]
+    for index, angle in way.items():
+        target[index] = angle
+    control.move(Kind.RAPID, 0, target, dict(control.unknown), 0, passing=TURNED)
 
 
 def rotary_letters(control: Control) -> str:

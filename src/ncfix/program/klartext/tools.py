@@ -11,7 +11,10 @@ from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.coordinates import Z, zeros
 from ncfix.program.setup import Tool
 
-BY_NAME = "the length of tool {} is not known by its number"
+BY_NAME = "the length of the tool {} is not given"
+NAMED = -1
+"""The number that stands for a tool that is called by name."""
+
 OTHER_AXIS = "the tool axis is {}: only tools along Z are followed"
 AT_RUN_TIME = "the length of the tool is known only at run time"
 
@@ -32,18 +35,23 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
         return
     control.suspended.pop(TOOL, None)
     axis = next((letter for letter in "xyuvw" if letter in flags), None)
-    if isinstance(tool, str):
+    named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
+    if isinstance(tool, str) and (named is None or named.length is None):
         control.suspended[TOOL] = BY_NAME.format(tool)
     if axis is not None:
         control.suspended[TOOL] = OTHER_AXIS.format(axis.upper())
     if "DL" in words.runtime:
         control.suspended[TOOL] = AT_RUN_TIME
+    if isinstance(tool, str):
+        control.tools.spindle = NAMED
     if isinstance(tool, float):
         control.tools.spindle = control.tools.selected = int(tool)
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))
-    set_length(control, length_of(control, int(control.tools.spindle)) + words.values.get("DL", 0.0) * control.unit)
+    known = 0.0 if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
+    length = known if named is None or named.length is None else named.length
+    set_length(control, length + words.values.get("DL", 0.0) * control.unit)
 
 
 def tell_radius(control: Control, oversize: float) -> None:
