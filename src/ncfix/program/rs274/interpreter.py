@@ -156,7 +156,7 @@ class Interpreter:
             return self.at_tape(index)
         if plan.flow is not None:
             self.span = plan.flow.span
-            if self.recorder:
+            if self.recorder and not self.flow.calls:
                 self.recorder.head(unit, index, plan.flow.keyword)
             self.flow.follow(plan.flow)
             if self.flow.unit is not self.main and unit is self.main:

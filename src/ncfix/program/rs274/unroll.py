@@ -97,7 +97,8 @@ class Recorder:
         made = [change for change in changes if change is not None]
         made += self.absent(unit, index, plan, block)
         motion = self.control.modal.motion if codes.motion is None else codes.motion
-        if holes and self.is_cycle(motion) and (len(holes) > 1 or self.control.modal.incremental):
+        drills = holes and self.is_cycle(motion) and not codes.takes
+        if drills and (len(holes) > 1 or self.control.modal.incremental):
             self.cycle(unit, index, plan, block, made, holes)
         else:
             self.put(unit, index, made)
