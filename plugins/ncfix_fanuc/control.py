@@ -15,8 +15,9 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.mesh import search
 from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.volume import Volume, search
+from ncfix.tables.volume import Volume
 from ncfix_fanuc.records import NAME, TABLE, TEXT, Style, Volc, csv_text, json_text, read_volc, template_text
 
 SIDE = 25

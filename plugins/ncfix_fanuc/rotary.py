@@ -20,7 +20,8 @@ from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
-from ncfix.tables.volume import Volume, search
+from ncfix.tables.mesh import search
+from ncfix.tables.volume import Volume
 from ncfix_fanuc.control import AXES, SIDE
 
 NAME = "rotary.json"

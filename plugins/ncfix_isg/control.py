@@ -13,8 +13,9 @@ from typing import ClassVar
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.lines import Remarks
+from ncfix.tables.mesh import Mesh, search
 from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.volume import Mesh, Volume, inputs_that_matter, search
+from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, read_configuration
 from ncfix_isg.csv_file import grid_text, read_grids
 
@@ -68,6 +69,7 @@ class Isg(Control):
         "folder": Option("C:\\vc", "where the control finds the grid file"),
         "axes": Option("", "logical axis numbers, e.g. X:1,Y:2,Z:3,B:4,C:5"),
         "filter_steps": Option("20", "over how many cycles the control spreads a change"),
+        "fit": Option("nodes", "nodes: exact at the nodes; area: least squares over what is around them"),
         "points": Option("20000", "most nodes of the grid; vol_comp[0].max_records must allow them"),
     }
     steps = (
@@ -88,7 +90,9 @@ class Isg(Control):
         numbers = _numbers(request, settings["axes"])
         inputs = inputs_that_matter(request.machine, request.space, request.tool_length)
         inputs = tuple(sorted(inputs, key=LETTERS.index))
-        volume = Volume(request.machine, inputs, request.space, request.tool_length)
+        if settings["fit"] not in ("nodes", "area"):
+            raise UsageError.of("NCF485", f"fit={settings['fit']}", hint="nodes or area")
+        volume = Volume(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")
         mesh = search(volume, request.target, [most] * len(inputs), most)
         files = {
             CONFIG: config_text(numbers, settings["folder"], TABLE, filter_steps),

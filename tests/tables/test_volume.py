@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import State, loads
 from ncfix.tables.exact import exact_correction
+from ncfix.tables.mesh import search
 from ncfix.tables.poses import random_poses, ranges_of
-from ncfix.tables.volume import Volume, inputs_that_matter, search
+from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix.testing import single_error
+from tables import table_4_2
 
 STRAIGHT = """
 ncfix = 1
@@ -104,3 +108,32 @@ def test_wrong_ranges(given: dict[str, tuple[float, float]]) -> None:
     with pytest.raises(UsageError) as caught:
         ranges_of(single_error("EXX"), given)
     assert caught.value.code == "NCF483"
+
+
+def test_table_4_2_takes_fewer_nodes_than_the_thesis(figures: Callable[[str], None]) -> None:
+    """84 coefficients: the thesis's real data took 19 x 19 x 19 equal steps. What those leave is the target."""
+    machine = table_4_2.machine()
+    assert len(table_4_2.coefficients()) == 84
+    volume = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), table_4_2.LENGTH)
+    target = volume.left(volume.grid([19] * 3))
+    same, free = (search(volume, target, [25] * 3, 15625, equal) for equal in (True, False))
+    assert same.reached
+    assert free.reached
+    assert same.grid.points <= 19**3
+    assert free.grid.points < same.grid.points
+    counts = " x ".join(map(str, free.grid.counts))
+    figures(
+        f"Table 4-2, {1e3 * target:.3f} um: equal steps {same.grid.counts[0]}^3 = {same.grid.points} nodes, "
+        f"unequal {counts} = {free.grid.points}"
+    )
+
+
+def test_nodes_fitted_to_what_is_around_them_halve_the_error() -> None:
+    """A parabola between nodes: chords leave h^2 f''/8 of one sign, the fit about half of that, of both."""
+    machine = single_error("EXX", 0.05)
+    space = ranges_of(machine)
+    left = [
+        volume.left(volume.grid([7, 2, 2]))
+        for volume in (Volume(machine, ("X", "Y", "Z"), space, 0.0, area) for area in (False, True))
+    ]
+    assert left[1] < 0.8 * left[0]
