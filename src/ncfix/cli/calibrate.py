@@ -83,7 +83,7 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
     from ncfix.measure.residuals import residuals, rms_by_set
 
     diagnosis = residuals(found.problem, found.estimate)
-    bars = {"ball_bar": rows} if (rows := _ball_bars(found)) else {}
+    tests = {"ball_bar": _ball_bars(found), "positioning": _positioning(found)}
     sigma, covariance = found.sigma, found.covariance
     return {
         "parameters": [
@@ -99,7 +99,7 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
         "condition": found.estimate.solution.condition,
         "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
         "largest_cook": float(diagnosis.cook.max(initial=0.0)),
-        **bars,
+        **{name: rows for name, rows in tests.items() if rows},
         "remarks": [message.as_dict() for message in found.remarks],
     }
 
@@ -112,6 +112,15 @@ def _ball_bars(found: Calibration) -> list[dict[str, Any]]:
 
     seen = (each.measurement for each in found.problem.observations)
     return [asdict(each) for measurement in seen for each in figures(measurement, found.problem.machine)]
+
+
+def _positioning(found: Calibration) -> list[dict[str, Any]]:
+    """ISO 230-2 of direct readings, um and urad."""
+    from dataclasses import asdict
+
+    from ncfix.measure.positioning import figures
+
+    return [asdict(each) for seen in found.problem.observations for each in figures(seen.measurement)]
 
 
 def _set_up(found: Calibration) -> dict[str, float]:
@@ -130,6 +139,8 @@ def _print(found: Calibration) -> None:
     console.table(("coefficient", "value", "sigma", "unit"), rows)
     for bar in _ball_bars(found):
         _say_bar(bar)
+    for row in _positioning(found):
+        _say_positioning(row)
     console.say(
         f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
         f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
@@ -146,3 +157,9 @@ def _say_bar(bar: dict[str, Any]) -> None:
         names = {"G(b)": "Gb", "H": "H", "D": "D", "Fmax": "F_max", "Fmin": "F_min"}
         text += "; ISO 230-4: " + ", ".join(f"{name} {circle[key]:.1f}" for name, key in names.items())
     console.say(text)
+
+
+def _say_positioning(row: dict[str, Any]) -> None:
+    unit = "urad" if row["component"][1] in "ABC" else "um"
+    known = [f"{name} {row[name]:.1f}" for name in ("A", "R", "E", "M", "B") if row[name] == row[name]]
+    console.say(f"{row['component']} set {row['name']}, ISO 230-2: {', '.join(known)} {unit}")
