@@ -1,0 +1,121 @@
+"""Every sample of a table file is read, and written again to the byte where it is well formed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ncfix.tables.forms import BY_NAME, read, recognised
+
+SAMPLES = {
+    "beckhoff_isg/crosscomp.lis": ("isg-list", 7),
+    "beckhoff_isg/etalon_exchange.txt": ("etalon", 12),
+    "beckhoff_isg/ssfk.lis": ("isg-list", 8),
+    "beckhoff_isg/volc_isg_csv_1d.csv": ("isg-csv", 7),
+    "beckhoff_isg/volc_isg_csv_grid.csv": ("isg-csv", 5),
+    "beckhoff_isg/volcomp_config.lis": ("isg-list", 5),
+    "fanuc/g10_param_input.txt": ("g10", 9),
+    "heidenhain/TNC306_example.txt": ("tnc306", 8),
+    "linuxcnc/doc_type0_example.comp": ("comp", 9),
+    "linuxcnc/doc_type1_example.comp": ("comp", 9),
+    "linuxcnc/ini_snippet.ini": ("ini", 1),
+    "linuxcnc/screwcompX.dat": ("comp", 33),
+    "other/centroid_cnc1.tab.example": ("centroid", 5),
+    "other/elmo_maestro_2d.txt": ("elmo", 33),
+    "other/hexagon_COMP.ERR": ("hexagon", 2),
+    "other/pmac_define_comp.txt": ("pmac", 0),
+    "other/weihong_axeserr.dat": ("weihong", 6),
+    "renishaw/rtl_skeleton.rtl": ("rtl", 23),
+}
+ELSEWHERE = {
+    "README.md": "says what is there",
+    "fanuc/param_record_15i.txt": "tests/plugins/test_fanuc_pitch.py",
+    "fanuc/pitch_example_B63980EN_p100.csv": "tests/plugins/test_fanuc_pitch.py",
+    "heidenhain/AXIS-X_iTNC530.COM": "tests/plugins/test_heidenhain_tables.py",
+    "heidenhain/AXIS_X_TNC640.COM": "tests/plugins/test_heidenhain_tables.py",
+    "heidenhain/config.cma": "tests/plugins/test_heidenhain_tables.py",
+    "heidenhain/kinematics_COMPTAB_iTNC530.txt": "tests/plugins/test_heidenhain_kinematics.py",
+    "siemens/cec_802Dsl_manual_example.ini": "tests/plugins/test_siemens*.py",
+    "siemens/cec_fig73_seed001.ini": "tests/plugins/test_siemens*.py",
+    "siemens/cec_mult_probe_RECONSTRUCTED.ini": "tests/plugins/test_siemens*.py",
+    "siemens/eec_manual_example.ini": "tests/plugins/test_siemens*.py",
+}
+ELMO = b"""[header]
+Table size\t4
+Error table dimension\t2
+Target axis\ta01
+Reference axes\ta02\ta03
+Start position\t0\t0
+Axis grid size\t16\t16
+Table dimensions\t2\t2
+[header/]
+[table]
+Table #1 Start Data
+1\t2
+3\t4
+Table #1 End Data
+[table/]
+"""
+BROKEN = {
+    "comp": (b"0 0 0\n1 0,1 0\n", "a decimal comma"),
+    "tnc306": (b"DATUM POINT 0\nY = F(Z)\n0 Z0 Y0\n", "should begin with the line of rule"),
+    "g10": (b"G10L50\nN1 R1\n", "end with that of end"),
+    "isg-csv": (b"X EXX\n0 0 0\n", "3 numbers under 2 names"),
+    "elmo": (ELMO.replace(b"3\t4\n", b""), "1 rows, and Table dimensions says 2 of 2"),
+    "weihong": (b"unit = mm\n[X]\n0, 0\n", "is no line of"),
+    "hexagon": (b"STARTW\n10=10.1\n", "end with that of end"),
+    "centroid": (b"24 0 0 0\n", "is no line of"),
+    "rtl": (b"Target-count: 2\nRun-count: 1\nDEVIATIONS::\nRun Target Data:\n1 1 0.0\n", "1 deviations, 2 expected"),
+    "etalon": (b"[EXY]\nGridpoints = {\n0 one\n}\n", "is no line of"),
+    "pmac": (b"DEFINE COMP ten, #1\n", "is no line of"),
+    "isg-list": (b"X\n", "is no line of"),
+    "ini": (b"[A]\nb c\n", "is no line of"),
+}
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_samples_are_read_and_written_again_identically(shared: Callable[[str], Path], name: str) -> None:
+    content = (shared("tables") / name).read_bytes()
+    document = recognised(name, content)
+    assert document is not None
+    assert (document.form, sum(len(line.numbers) for line in document.lines)) == SAMPLES[name]
+    assert document.content() == content
+    assert read(BY_NAME[document.form], name, content.replace(b"\n", b"\r\n"))[0].content().count(b"\r\n") > 0
+
+
+def test_no_sample_is_forgotten(shared: Callable[[str], Path]) -> None:
+    folder = shared("tables")
+    found = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert found == set(SAMPLES) | set(ELSEWHERE)
+
+
+def test_numbers_can_be_changed_and_the_rest_stays() -> None:
+    document = recognised("x", b"unit = mm\n[X]\n0.000, 0.000, 0.002\n10.000, 0.003, 0.005\n")
+    assert document is not None
+    assert document.rows("row") == [(0.0, 0.0, 0.002), (10.0, 0.003, 0.005)]
+    changed = document.with_numbers(3, Decimal("10.000"), Decimal("-0.001"), Decimal("0.000"))
+    assert changed.content() == b"unit = mm\n[X]\n0.000, 0.000, 0.002\n10.000, -0.001, 0.000\n"
+
+
+def test_a_sound_elmo_table() -> None:
+    assert not read(BY_NAME["elmo"], "x", ELMO)[1].messages
+
+
+@pytest.mark.parametrize("form", BROKEN)
+def test_broken_files(form: str) -> None:
+    content, expected = BROKEN[form]
+    _, remarks = read(BY_NAME[form], "x", content)
+    assert any(expected in message.text for message in remarks.messages), remarks.messages
+
+
+@given(st.lists(st.decimals(-10, 10, places=4), min_size=3, max_size=3), st.sampled_from(["\n", "\r\n"]))
+def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) -> None:
+    content = f"unit = mm{eol}[X]{eol}{numbers[0]}, {numbers[1]}, {numbers[2]}{eol}".encode()
+    document, remarks = read(BY_NAME["weihong"], "x", content)
+    assert not remarks.wrong
+    assert document.content() == content
