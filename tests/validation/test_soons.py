@@ -11,11 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from measure.poses import plan
 from ncfix.machine import Effect, load
 from ncfix.machine.smooth import Polynomial
+from ncfix.measure.calibrate import Problem
 from ncfix.measure.exchange import Pool, choose
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe
+from ncfix.measure.selection import Selection
+from ncfix.measure.solve import solve
 
 THREE = load(str(Path(__file__).resolve().parents[2] / "examples" / "machines" / "three_axis.toml"))
 LINE = Polynomial(degree=(1,))
@@ -66,3 +70,36 @@ def test_the_exchange_finds_the_best_design():
     far = rows(np.arange(0, 180, 5))
     variance = np.einsum("ni,ij,nj->n", far, np.linalg.inv(chosen.T @ chosen), far)
     assert variance.max() == pytest.approx(0.5, abs=1e-6)
+
+
+# -- chapter 2: which frame an error belongs to -----------------------------------------------------------------------
+
+
+def test_a_guide_that_stands_still_is_an_effect_times_the_position():
+    """A ram in a fixed bearing (Soons's fixed frame): its tilt acts with an arm that grows as it comes out.
+
+    ncfix's frames move with the body. A tilt e about a point that stays is one about the point that moves, and a shift
+    of it by e x q: `EYZ` with the same functions, `times = "Z"`.
+    """
+    tilt = 2e-5
+    standing = (
+        Effect("EAZ", (tilt,), reference=(0.0, 0.0, 0.0)),
+        Effect("EYZ", (-tilt,), times="Z"),
+    )
+    known = THREE.replace(effects=standing)
+    moving = THREE.replace(effects=standing[:1])
+    for z in (0.0, 150.0, 400.0):
+        q = np.array([0.0, 0.0, 0.0])
+        q[THREE.axis_names.index("Z")] = z
+        tip = THREE.tip(q)
+        assert known.error(q)[1] == pytest.approx(-tilt * tip[2], abs=1e-9)
+        assert moving.error(q)[1] == pytest.approx(-tilt * (tip[2] - z), abs=1e-9)
+
+
+def test_reference_alignment_takes_off_what_does_not_vary():
+    """A part that was aligned on the machine shows the variation of errors only (Soons, section 1.3): rigid set-up."""
+    known = THREE.replace(effects=(Effect("EX0S", (0.01,)), Effect("EC0Y", (2e-5,))))
+    poses = plan(THREE, "tcp", 40).with_header("setup", "rigid")
+    problem = Problem.of([poses], THREE, Selection(known.effects, (True,) * 2))
+    found = solve(problem.design, problem.nuisance(problem.start), np.zeros(len(problem.values)))
+    assert [known.effects[k].name for k in found.set_up] == ["EX0S"]
