@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
@@ -18,7 +19,7 @@ from ncfix.program.rs274.groups import CYCLES
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
-from ncfix.program.rs274.plans import Codes, Plan, grouped_codes
+from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.rs274.unroll import Recorder
@@ -32,6 +33,7 @@ PROGRAM_ENDS = (20, 300)
 LAST_PROGRAM = 9999
 """Greater P words of M98 on ISO controls hold the number of repeats before the four digits of the program."""
 
+POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
@@ -274,13 +276,24 @@ class Interpreter:
         if text.startswith(("$H", "$J")):
             self.control.lose(self.control.machine, MACHINE_MOVED)
 
+    @contextmanager
+    def polar_words(self, block: Block) -> Iterator[None]:
+        """Motions with @ or ^ are followed; written they can be in X and Y only."""
+        polar = bool(block.values.keys() & POLAR)
+        if polar:
+            self.control.suspended[POLAR_WORDS] = POLAR_WORDS
+        yield
+        if polar:
+            self.control.suspended.pop(POLAR_WORDS)
+
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""
         if MACHINE in codes.g.values():
             in_machine_coordinates(self.control, block, motion)
         else:
             step = self.control.rules.steps.get(motion) or MOTIONS[motion]
-            step(self.control, block, motion)
+            with self.polar_words(block):
+                step(self.control, block, motion)
         if motion not in CYCLES:
             self.control.modal.cycle.initial = None
 

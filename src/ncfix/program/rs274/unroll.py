@@ -17,7 +17,7 @@ from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import RUNTIME_BRANCH
-from ncfix.program.rs274.plans import Codes, Plan
+from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Word
 
@@ -97,11 +97,29 @@ class Recorder:
         made = [change for change in changes if change is not None]
         made += self.absent(unit, index, plan, block)
         motion = self.control.modal.motion if codes.motion is None else codes.motion
+        if block.values.keys() & POLAR:
+            self.polar(unit, index, made)
+            return
         drills = holes and self.is_cycle(motion) and not codes.takes
         if drills and (len(holes) > 1 or self.control.modal.incremental):
             self.cycle(unit, index, plan, block, made, holes)
         else:
             self.put(unit, index, made)
+
+    def polar(self, unit: Unit, index: int, changes: list[Change]) -> None:
+        """A block with polar words: X and Y of where it leads, absolute."""
+        incremental = self.control.modal.incremental
+        written = unit.program.templates[unit.template[index]].words
+        words = [w for w in written if w.address in POLAR or w.address in INDEX or (incremental and is_distance(w))]
+        spans = {unit.program.span(index, word.span) for word in words}
+        kept = [change for change in changes if not inside(change, spans)]
+        stop = end_of_words(unit, index)
+        others = "".join(x for x in LETTERS if x in self.steps)
+        text = (" G90" if incremental else "") + self.place(self.control.position, others)
+        kept += [self.removal(unit, index, word) for word in words]
+        self.put(unit, index, [*kept, Change(stop, stop, text)])
+        if incremental:
+            self.write("G91")
 
     def check(self, plan: Plan, block: Block) -> None:
         """Raise `Fault` where the values of a block depend on the machine at run time."""
@@ -271,10 +289,15 @@ def end_of_words(unit: Unit, index: int) -> int:
     return max(words, default=int(unit.program.blocks[index, 0]))
 
 
+def is_distance(word: Word) -> bool:
+    """Whether a word is G90 or G91."""
+    return word.address == "G" and isinstance(word.value, Constant) and word.value.value in (90.0, 91.0)
+
+
 def is_place(word: Word, control: Control) -> bool:
     """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
     if word.address in "GM":
-        return isinstance(word.value, Constant) and word.address == "G" and word.value.value in (90.0, 91.0)
+        return is_distance(word)
     return word.address in INDEX or word.address in ("R", "L") or (word.address == "K" and not control.rules.strict)
 
 

@@ -1,0 +1,95 @@
+"""The classes of blocks in LinuxCNC, plain ISO code and Fanuc: right, passed, or refused by line; none silently wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from classes.judging import Case, judged
+
+HEAD = "G21 G90 G94 G17 G40 G54\nG0 X1. Y2. Z50.\n"
+"""Two lines; the second is the motion to the start."""
+
+
+def case(name: str, body: str, flat: bool = False, **lines: str) -> Case:
+    """A case after the head; lines of the body are counted from 3, as `L3`."""
+    return Case(name, HEAD + body + "\nM2\n", {2: "right"} | {int(k[1:]): v for k, v in lines.items()}, flat)
+
+
+R, P, N = "right", "passed", "refused"
+COMMON = [
+    case("G0 and G1 with all words", "G1 X5. Y6. Z7. F100.", L3=R),
+    case("omitted words", "G1 X5. F100.\nZ3.\nG0 Y9.", L3=R, L4=R, L5=R),
+    case("G91", "G91\nG1 X5. F100.\nX5. Y1.\nG90 X0.", L4=R, L5=R, L6=R),
+    case("inches", "G20\nG1 X1. Y.5 F10.\nG91 X.25", L4=R, L5=R),
+    case("arc with a centre", "G2 X11. Y12. I10. J0 F100.", L3=R),
+    case("arc with a radius", "G2 X11. Y12. R10. F100.", L3=R),
+    case("full circle", "G3 I10. J0 F100.", L3=R),
+    case("arc in the plane G18", "G18\nG2 X11. Z60. I0 K10. F100.", L4=R),
+    case("helix", "G2 X11. Y12. Z40. I10. J0 F100.", L3=R),
+    case("canned cycle", "G98 G81 X5. Y5. Z-3. R2. F100.\nX9.\nG80\nG0 X1.", L3=R, L4=R, L6=R),
+    case("canned cycle with G91", "G91 G81 X5. Z-3. R-45. F100.\nG80\nG90 G0 X1. Y1. Z50.", L3=N, L5=R),
+    case("cutter compensation", "G41 D1 G1 X5. F100.\nX20.\nY20.\nG40 X30.", L3=R, L4=R, L5=R, L6=R),
+    case("G53", "G53 G0 Z0.\nG0 X5. Y5. Z20.", L3=P, L4=R),
+    case("G28", "G28 Z100.\nG0 X5. Y5. Z20.", L3=P, L4=R),
+    case("G92", "G92 X0.\nG1 X5. F100.", L4=R),
+    case("G52", "G52 X3.\nG1 X5. F100.", L4=R),
+    case("G10 L2", "G10 L2 P1 X7.\nG1 X5. F100.", L4=R),
+    case("another work offset", "G55\nG1 X5. F100.", L4=R),
+    case("tool length", "T3 M6\nG43 H3\nG1 Z5. F100.\nG49\nG1 Z80.", L5=R, L7=R),
+    case("block skip", "/G0 X5.\nG0 Y5.", L3=R, L4=R),
+    case("expression", "#1=5\nG1 X[#1] F100.", L4=R),
+    case("dwell", "G4 P1.\nG1 X5. F100.", L4=R),
+    case("no change of the feed word", "G1 X5. F123.\nM8\nY7. M9", L3=R, L5=R),
+]
+LINUXCNC = [
+    case("polar", "G0 @10. ^90.\nG0 X5. Y5.", L3=N, L4=R),
+    case("polar, flat", "G0 @10. ^90.\n@5.\nG91 @1. ^10.\nX5.", flat=True, L0=R),
+    case("spline", "G5.1 X5. Y6. I2. J3. F100.", L3=N),
+    case("probing", "G38.2 Z0. F100.\nG0 X5. Y5. Z20.", L3=P, L4=R),
+    case("rotated frame", "G10 L2 P1 R30.\nG1 X5. Y6. Z7. F100.", L4=R),
+    case("loop", "o1 repeat [2]\nG91 G1 X5. F100.\no1 endrepeat", L4=R),
+    case("loop, flat", "o1 repeat [2]\nG91 G1 X5. F100.\no1 endrepeat", flat=True, L0=R),
+    case("subprogram from two places", "o1 sub\nG0 Z5.\no1 endsub\nG0 X5.\no1 call\nG0 X9.\no1 call", L4=R, L6=R, L8=R),
+    case("subprogram, flat", "o1 sub\nG91 G0 Z5.\nG90\no1 endsub\no1 call\nG0 X9.\no1 call", flat=True, L0=R),
+]
+FANUC = [
+    case("number without a point", "G1 X5 Y6 F100", L3=R),
+    case("canned cycle with repeats", "G91 G81 X5. Z-3. R-45. K3 F100.\nG80\nG90 G0 X1. Y1. Z50.", L3=N, L5=R),
+    case(
+        "canned cycle with repeats, flat", "G91 G81 X5. Z-3. R-45. K3 F100.\nG80\nG90 G0 X1. Y1. Z50.", flat=True, L0=R
+    ),
+    case("polar", "G16\nG0 X10. Y90.\nG15\nG0 X5. Y5.", L2=R, L4=N, L6=R),
+    case("polar, flat", "G16\nG0 X10. Y90.\nG15\nG0 X5. Y5.", flat=True, L0=R),
+    case("G54.1", "G54.1 P2\nG1 X5. F100.", L4=R),
+    case("rotated frame", "G68 X1. Y1. R30.\nG1 X5. Y6. Z7. F100.\nG69\nG0 X1.", L4=R, L6=R),
+    case("tilted plane", "G68.2 X1. Y1. Z0. I0. J30. K0.\nG1 X5. Y6. Z47. F100.\nG69\nG0 X1. Y1. Z50.", L4=R, L6=R),
+    case("tool tip control", "G43.4 H1\nG1 X5. Y6. Z47. F100.\nG49\nG0 X1. Y1. Z50.", L4=R, L6=R),
+    case("scaling", "G51 X0 Y0 Z0 P2.\nG1 X5. F100.\nG50\nG0 X5. Y5. Z20.", L2=R, L4=N, L6=R),
+    case("probing", "G31 Z0. F100.\nG0 X5. Y5. Z20.", L3=P, L4=R),
+    case("corner rounding", "G1 X5. F100. ,R2.\nY20.", L3=N, L4=R),
+    case("loop", "#1=0\nWHILE[#1LT2]DO1\nG1 X[5.*#1] F100.\n#1=#1+1\nEND1", L2=R, L5=N),
+    case("loop, flat", "#1=0\nWHILE[#1LT2]DO1\nG1 X[5.*#1] F100.\n#1=#1+1\nEND1", flat=True, L0=R),
+    case("macro with arguments", "G65 P1 A5. B6.\nM2\nO1\nG1 X#1 Y#2 F100.\nM99", L6=R),
+    case("position in a variable", "#1=#5041\nG1 X[#1+1.] F100.\nG0 X5. Y5. Z20.", L2=R, L4=N, L5=R),
+    case("unknown code", "G107.1\nG1 X5. F100.", L2=R, L4=N),
+]
+
+
+def check(each: Case, dialect: str) -> None:
+    assert judged(each, dialect) == ({0: R} if each.flat else each.expected)
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc"])
+@pytest.mark.parametrize("each", COMMON, ids=lambda each: each.name)
+def test_common_classes(each: Case, dialect: str) -> None:
+    check(each, dialect)
+
+
+@pytest.mark.parametrize("each", LINUXCNC, ids=lambda each: each.name)
+def test_classes_of_linuxcnc(each: Case) -> None:
+    check(each, "linuxcnc")
+
+
+@pytest.mark.parametrize("each", FANUC, ids=lambda each: each.name)
+def test_classes_of_fanuc(each: Case) -> None:
+    check(each, "fanuc")
