@@ -69,7 +69,7 @@ class ArcText:
     words     R, or IPA
     sense     DR+ or DR-
     end       (n_axes,) where it ends: of CP as the control works it out
-    centre    (3,) about what, NaN across the plane
+    centre    (3,) about what
     """
 
     function: str
@@ -158,7 +158,10 @@ def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> Float
 
 
 def spatial(arc: PieceOfArc, middle: FloatArray) -> FloatArray:
-    """A centre in the plane as one of X Y Z, NaN across."""
-    found = np.full(3, np.nan)
+    """A centre in the plane as one of X Y Z; across the plane it lies where the arc begins."""
+    found = arc.centre.copy()
     found[list(arc.plane[:2])] = middle
+    across = arc.spatial[arc.plane[2]]
+    if across >= 0:
+        found[arc.plane[2]] = arc.begin[across]
     return found

@@ -39,6 +39,7 @@ class Layout:
     blank     what separates words in this block
     comma     numbers have a decimal comma
     rapid     FMAX
+    corner    the block before or after it is a corner that the control makes (RND, CHF)
     """
 
     name: str
@@ -54,6 +55,7 @@ class Layout:
     blank: str
     comma: bool
     rapid: bool
+    corner: bool
 
     @property
     def motion(self) -> Word | None:
@@ -99,7 +101,18 @@ def layout_of(program: Program, block: int) -> Layout | None:
         blank=separator(program, block, last),
         comma=uses_comma(program.source),
         rapid=any(command.name == "fmax" for command in commands),
+        corner=is_corner(program, block - 1) or is_corner(program, block + 1),
     )
+
+
+def is_corner(program: Program, block: int) -> bool:
+    """Whether a block is RND or CHF."""
+    if not 0 <= block < len(program):
+        return False
+    names = (
+        item.name if isinstance(item, Command) else getattr(item, "address", "") for item in program.items_of(block)
+    )
+    return any(name.lower() in ("rnd", "chf") for name in names)
 
 
 def numbers_of(items: tuple[object, ...]) -> list[object]:
@@ -123,6 +136,12 @@ def uses_comma(source: bytes) -> bool:
     """Whether a program writes decimal commas and no points in its motion blocks."""
     commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source))
     return commas > len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source))
+
+
+@lru_cache(maxsize=4)
+def tilts(source: bytes) -> bool:
+    """Whether a program has tilted planes."""
+    return re.search(rb"(?i)\bPLANE[ \t]+(?!RESET)|CYCL[ \t]*DEF[ \t]*19\b", source) is not None
 
 
 @lru_cache(maxsize=4)

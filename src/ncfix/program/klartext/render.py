@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.klartext.arc_text import ArcText, PieceOfArc, arc_text
 from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
-from ncfix.program.klartext.layout import Layout, poles_move
+from ncfix.program.klartext.layout import Layout, poles_move, tilts
 from ncfix.program.klartext.number_text import Style, value_of
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.render import Rendered, Target
@@ -162,7 +162,8 @@ class Renderer:
         position = position.copy()
         words = ["L" if not self.layout.vector else "LN"]
         for column, letter in self.columns:
-            if column in self._turning() or not abs(end[column] - position[column]) >= self.half[column]:
+            bare = letter not in self.layout.axes and self._left_alone(column)
+            if column in self._turning() or bare or not abs(end[column] - position[column]) >= self.half[column]:
                 continue
             text = self._number(float(end[column]), column)
             words.append(letter + text)
@@ -201,7 +202,7 @@ class Renderer:
         position = self.target.start.copy()
         for column, letter in self.columns:
             word = self.layout.axes.get(letter)
-            if column in self._turning():
+            if column in self._turning() or (word is None and self._left_alone(column)):
                 continue
             if column in left_out:
                 position[column] = end[column]
@@ -211,6 +212,18 @@ class Renderer:
             else:
                 self._absent(position, column, end[column], column in always)
         return position
+
+    def _left_alone(self, column: int) -> bool:
+        """An axis that must not get a word.
+
+        A rotary axis in a program with tilted planes: the control would not keep the tip where it is. The tool axis
+        beside a corner that the control makes, which lies in the working plane, and in a departure.
+        """
+        layout, target = self.layout, self.target
+        if target.rotary and target.rotary[column]:
+            turned = any(letter in layout.axes for letter in "ABC")
+            return not turned and tilts(self.program.source)
+        return (layout.corner or layout.name.startswith("dep")) and column == target.spatial[2]
 
     def _present(self, position: FloatArray, column: int, end: float, word: Word) -> None:
         base = float(position[column]) if word.address[0] == "I" else 0.0
@@ -244,7 +257,7 @@ class Renderer:
                 position[column] = self._bottom(across)
             elif word is not None:
                 self._present(position, column, target.ends[0][column], word)
-            else:
+            elif not self._left_alone(column):
                 self._absent(position, column, target.ends[0][column], column in polar)
         if polar:
             self._straightened()
@@ -285,7 +298,7 @@ class Renderer:
         columns = tuple(target.spatial[index] for index in target.plane[:2])
         named = columns if layout.polar or found.function == "C" else ()
         position = self._words(found.end, named, columns if found.function == "CP" else ())
-        self._function(found.function)
+        self._function(" ".join([found.function, *found.words]) if found.function == "CP" else found.function)
         self._drop(*layout.polar)
         self._radius(found)
         if layout.sense is None:
@@ -294,15 +307,14 @@ class Renderer:
             start = int(self.program.blocks[self.block, 0])
             self.out.edits.append((start, start, self._prefix() + self._pole(found) + self._line_end()))
             self.own_pole = True
-        self.out.centre = np.where(np.isnan(found.centre), target.centre, found.centre)
+        self.out.centre = found.centre
         return position
 
     def _radius(self, found: ArcText) -> None:
-        """The R word of CR, or the IPA word of CP."""
+        """The R word of CR."""
         word = self.layout.radius
         if found.function != "CR":
             self._drop(word)
-            self.added += [self.layout.blank + text for text in found.words]
             return
         (text,) = found.words
         if word is None:
@@ -317,10 +329,12 @@ class Renderer:
         found = arc_text(self._piece_of_arc(position, piece, centre), self.style)
         columns = tuple(target.spatial[index] for index in target.plane[:2])
         position = position.copy()
-        words = [found.function]
+        words = [found.function, *(found.words if found.function == "CP" else ())]
         for column, letter in self.columns:
             if column in columns and found.function == "CP":
                 position[column] = found.end[column]
+            elif self._left_alone(column) and letter not in self.layout.axes:
+                continue
             elif column in columns or abs(found.end[column] - position[column]) >= self.half[column]:
                 text = self._number(float(found.end[column]), column)
                 words.append(letter + text)
@@ -328,8 +342,8 @@ class Renderer:
         if found.pole:
             self._line([self._pole(found)])
             self.own_pole = True
-        self._line([*words, *found.words, found.sense])
-        self.out.centres[piece] = np.where(np.isnan(found.centre), centre, found.centre)
+        self._line([*words, *(found.words if found.function == "CR" else ()), found.sense])
+        self.out.centres[piece] = found.centre
         return position
 
     def _pole(self, found: ArcText) -> str:
