@@ -53,7 +53,9 @@ class Limits:
 class Scheme:
     """Tables with one input each, sums and pairs; the second factor of a pair has no unit and is at most 1.
 
-    missed   largest displacement that the tables lack at random poses, mm
+    What they leave at the tip:
+
+    missed   the largest displacement that the tables lack at random poses, mm
     rest     rms of what sums and products of pairs cannot say, mm
     dropped  rms of what was left out because it is small or for want of tables, mm
     """
@@ -85,7 +87,7 @@ def automatic(job: Job, rotary: bool = True) -> Scheme:
         most -= used
     moved, _ = _staged(job, linear_axes(job.machine), moving(job, done.tables), 1.0, most)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
-    return Scheme(tables, moved.missed, max(done.rest, moved.rest), max(done.dropped, moved.dropped))
+    return Scheme(tables, moved.missed, moved.rest, moved.dropped)
 
 
 def turning(job: Job) -> Corrections:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.tables.scheme_layout import Layout, absorbed, arranged, tables_of
@@ -10,6 +10,8 @@ from ncfix.tables.separable import Part, Parts
 
 Face = tuple[int, int | None]
 """(output, way): the correction of an axis, and the axis with whose direction it changes sign, or None."""
+Key = tuple[Face, int]
+"""A part: the face, and its number there, the largest first."""
 
 
 @dataclass(slots=True)
@@ -19,24 +21,29 @@ class Selection:
     faces      what each face consists of
     tolerance  rms that a layout may be off by when it merges tables
     free       axes whose sum over themselves takes no table of this kind (it goes into another one)
-    kept       what is kept of each face
+    kept       the parts that are kept
     silent     faces of which not even the constant is kept
     """
 
     faces: Mapping[Face, Parts]
     tolerance: float
     free: frozenset[int] = frozenset()
-    kept: dict[Face, tuple[Part, ...]] = field(default_factory=dict)
-    silent: set[Face] = field(default_factory=set)
-    _known: dict[tuple[Face, float, tuple[int, ...]], Layout] = field(default_factory=dict)
+    kept: frozenset[Key] = frozenset()
+    silent: frozenset[Face] = frozenset()
+    _known: dict[tuple[Face, bool, tuple[int, ...]], Layout] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.kept = {face: parts.parts for face, parts in self.faces.items()}
+        self.kept = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
 
     @property
     def outputs(self) -> list[int]:
         """The axes that are corrected."""
         return list(dict.fromkeys(output for output, _ in self.faces))
+
+    def part(self, key: Key) -> Part:
+        """The part with this key."""
+        face, number = key
+        return self.faces[face].parts[number]
 
     def layouts(self, output: int) -> list[Layout]:
         """The layouts of an axis, not absorbed, that without direction first; empty ones left out."""
@@ -44,16 +51,19 @@ class Selection:
         return [layout for layout in found if layout.axes or layout.constant]
 
     def tables(self, output: int) -> int:
-        """How many tables that takes."""
+        """How many tables an axis takes."""
         return needed(output, [absorbed(layout, self.tolerance) for layout in self.layouts(output)], self.free)
+
+    @property
+    def total(self) -> int:
+        """How many tables all of it takes."""
+        return sum(self.tables(output) for output in self.outputs)
 
     @property
     def lost(self) -> float:
         """Rms of the parts that were left out."""
-        kept = {id(part) for parts in self.kept.values() for part in parts}
-        gone = (part for parts in self.faces.values() for part in parts.parts if id(part) not in kept)
-        constants = sum(self.faces[face].constant ** 2 for face in self.silent)
-        return float((sum(part.size**2 for part in gone) + constants) ** 0.5)
+        gone = (part.size**2 for face in self.faces for n, part in self._numbered(face) if (face, n) not in self.kept)
+        return float((sum(gone) + sum(self.faces[face].constant ** 2 for face in self.silent)) ** 0.5)
 
     @property
     def rest(self) -> float:
@@ -62,59 +72,83 @@ class Selection:
 
     def drop_small(self, budget: float) -> None:
         """Leave out the smallest parts as long as they are below `budget` (rms) together."""
-        sizes = sorted(
-            (part.size, face, index) for face, parts in self.kept.items() for index, part in _numbered(parts)
-        )
-        total, gone = 0.0, set()
-        for size, face, index in sorted(sizes, key=lambda entry: entry[0]):
-            total += size**2
+        total = 0.0
+        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+            total += self.part(key).size ** 2
             if total > budget**2:
-                break
-            gone.add((face, index))
-        for face, parts in self.kept.items():
-            self.kept[face] = tuple(part for index, part in _numbered(parts) if (face, index) not in gone)
+                return
+            self.kept -= {key}
 
     def fit_into(self, tables: int) -> None:
+        """Keep what takes off most with no more than `tables`.
+
+        Parts are taken away, cheapest first, and put together, most worth first; then each part that is left out is
+        tried in the better of the two, in place of others.
+        """
+        whole = self.kept
+        self._thin(tables)
+        best = self.kept, self.silent, self.lost
+        if best[0] == whole:
+            return
+        self._grow(whole, tables)
+        best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
+        for key in sorted(whole - best[0], key=lambda key: -self.part(key).size):
+            self.kept, self.silent = best[0] | {key}, best[1]
+            self._thin(tables)
+            best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
+        self.kept, self.silent, _ = best
+
+    def _thin(self, tables: int) -> None:
         """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""
-        while sum(self.tables(output) for output in self.outputs) > max(tables, 0):
-            choices = [(face, index) for face, parts in self.kept.items() for index in range(len(parts))]
-            if not choices:
-                self._leave_out_constant(tables)
+        while self.total > max(tables, 0):
+            if not self.kept:
+                order = sorted(self.faces, key=lambda face: -abs(self.faces[face].constant))
+                self.silent = frozenset(order[max(tables, 0) :])
                 return
-            self._leave_out(*min(choices, key=lambda choice: self._price(*choice)))
+            self.kept -= {min(sorted(self.kept, key=str), key=self._price)}
 
-    def _leave_out_constant(self, tables: int) -> None:
-        """Keep the largest constants only: nothing else is left."""
-        order = sorted(self.faces, key=lambda face: -abs(self.faces[face].constant))
-        self.silent.update(order[max(tables, 0) :])
+    def _price(self, key: Key) -> tuple[bool, float]:
+        """What a part costs for each table that it frees; parts that free none come last."""
+        saved = self._change(key, self.kept - {key})
+        return saved >= 0, self.part(key).size ** 2 / max(-saved, 1)
 
-    def _price(self, face: Face, index: int) -> tuple[bool, float]:
-        before = self.tables(face[0])
-        size = self.kept[face][index].size
-        whole = self.kept[face]
-        self._leave_out(face, index)
-        saved = before - self.tables(face[0])
-        self.kept[face] = whole
-        return saved <= 0, size**2 / max(saved, 1)
+    def _grow(self, whole: frozenset[Key], tables: int) -> None:
+        """Begin with nothing, and add what takes off most for the tables that it takes."""
+        self.kept = frozenset()
+        self._thin(tables)
+        room = tables - self.total
+        while True:
+            costs = {key: self._change(key, self.kept | {key}) for key in sorted(whole - self.kept, key=str)}
+            allowed = [key for key, cost in costs.items() if cost <= room]
+            if not allowed:
+                return
+            best = max(allowed, key=lambda key: self.part(key).size ** 2 / max(costs[key], 0.1))
+            self.kept |= {best}
+            room -= costs[best]
 
-    def _leave_out(self, face: Face, index: int) -> None:
-        parts = self.kept[face]
-        self.kept[face] = parts[:index] + parts[index + 1 :]
+    def _change(self, key: Key, kept: frozenset[Key]) -> int:
+        """How many tables more the axis takes if other parts are kept."""
+        output, before = key[0][0], self.kept
+        now = self.tables(output)
+        self.kept = kept
+        then = self.tables(output)
+        self.kept = before
+        return then - now
 
     def _layout(self, face: Face) -> Layout:
-        parts = self.kept[face]
-        constant = 0.0 if face in self.silent else self.faces[face].constant
-        key = (face, constant, tuple(id(part) for part in parts))
+        numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.kept)
+        key = (face, face in self.silent, numbers)
         if key not in self._known:
+            constant = 0.0 if face in self.silent else self.faces[face].constant
+            parts = [self.part((face, n)) for n in numbers]
             self._known[key] = arranged(parts, constant, face[1], self.tolerance)
         return self._known[key]
+
+    def _numbered(self, face: Face) -> Iterator[tuple[int, Part]]:
+        return iter(enumerate(self.faces[face].parts))
 
 
 def needed(output: int, layouts: Sequence[Layout], free: frozenset[int]) -> int:
     """How many tables these layouts of an axis take, without that over the axis itself if that is free."""
     ways = {layout.way for layout in layouts if output in layout.sums or layout.constant}
     return tables_of(layouts) - int(output in free and ways == {None})
-
-
-def _numbered(parts: Sequence[Part]) -> list[tuple[int, Part]]:
-    return list(enumerate(parts))
