@@ -1,4 +1,4 @@
-"""The classes of blocks in LinuxCNC, plain ISO code and Fanuc: right, passed, or refused by line; none silently wrong."""
+"""The classes of blocks in LinuxCNC, plain ISO code and Fanuc: right, passed or refused; never silently wrong."""
 
 from __future__ import annotations
 
