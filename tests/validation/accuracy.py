@@ -2,7 +2,8 @@
 
     python tests/validation/accuracy.py [STUDY...] [--draws N] [--chains N] [-o FILE]
 
-The text is that of accuracy_seeds.md, beside this file; a study's table replaces its mark `<!-- name -->` there.
+The text is that of accuracy_seeds.md and accuracy_checklists.md, beside this file; in it a study's table replaces its
+mark `<!-- name -->`.
 Studies that are not asked for keep what the page has for them, and so does the hidden-effect benchmark's section, which
 `make hidden` writes.
 """
@@ -21,6 +22,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from tests.hidden import tally  # noqa: E402
 
 TEMPLATE = Path(__file__).with_name("accuracy_seeds.md")
+CHECKLISTS = Path(__file__).with_name("accuracy_checklists.md")
 PAGE = ROOT / "docs" / "accuracy.md"
 
 
@@ -80,7 +82,7 @@ def benchmark(page: str) -> str:
 
 def assembled(page: str, tables: dict[str, str]) -> str:
     """The new page from the old one and the tables that were worked out."""
-    text = TEMPLATE.read_text()
+    text = TEMPLATE.read_text().replace("<!-- checklists -->\n", CHECKLISTS.read_text())
     for name in STUDIES:
         text = text.replace(f"<!-- {name} -->", marked(name, tables.get(name) or kept(page, name)))
     section = benchmark(page)
