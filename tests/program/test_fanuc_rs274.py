@@ -1,4 +1,4 @@
-"""Fanuc programs without macros against LinuxCNC's interpreter: where both languages mean the same, so do the motions."""
+"""Fanuc programs without macros against LinuxCNC's interpreter: where both mean the same, so do the motions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def cycle(rng: random.Random) -> str:
     """Holes with the levels named in the first block."""
     code = rng.choice(("G81", "G82P1", "G83Q1.", "G85", "G86P1", "G89P1"))
     holes = "".join(f"\nX{number(rng)}Y{number(rng)}" for _ in range(rng.randint(0, 2)))
-    return f"{rng.choice(('G98', 'G99'))}{code}X{number(rng)}Y{number(rng)}Z{number(rng, -9, -1)}R{number(rng, 1, 9)}{holes}\nG80"
+    levels = f"Z{number(rng, -9, -1)}R{number(rng, 1, 9)}"
+    return f"{rng.choice(('G98', 'G99'))}{code}X{number(rng)}Y{number(rng)}{levels}{holes}\nG80"
 
 
 def setting(rng: random.Random) -> str:

@@ -1,0 +1,111 @@
+"""What becomes of the motion blocks of the world's programs, by dialect: corrected, passed, refused and why.
+
+`python -m classes.accounting` (with `tests` on the path) prints the table of all dialects, or of those named;
+`--flatten` with flat programs.
+"""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.flat import fix_flat
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, load
+from ncfix.program import dialects
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+FAMILIES = {
+    "linuxcnc": "linuxcnc",
+    "iso": "iso",
+    "grbl": "iso",
+    "fanuc": "fanuc",
+    "siemens": "siemens",
+    "heidenhain": "heidenhain",
+}
+"""Folder of the corpus -> the dialect with which it is read, unless a near relative shows itself."""
+
+RELATIVES = {"fanuc": ("haas",)}
+FOREIGN = frozenset({"NCF101", "NCF102", "NCF103"})
+SETUP = Setup(assume_zero=True, no_point="calculator")
+
+
+@dataclass(slots=True)
+class Account:
+    """The books of one folder.
+
+    files      read, of another family, unreadable, and those that the control would stop in
+    blocks     corrected, passed, refused
+    reasons    of refused blocks
+    stopped    why the control would stop, or what is not given
+    """
+
+    files: Counter[str] = field(default_factory=Counter)
+    blocks: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    stopped: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def refused(self) -> float:
+        """The share of motion blocks that are refused."""
+        return self.blocks["refused"] / max(1, sum(self.blocks.values()))
+
+    def lines(self, name: str) -> list[str]:
+        """The account in words."""
+        files = ", ".join(f"{count} {what}" for what, count in sorted(self.files.items()))
+        blocks = ", ".join(f"{self.blocks[what]} {what}" for what in ("corrected", "passed", "refused"))
+        reasons = [f"    {count} {reason}" for reason, count in self.reasons.most_common(10)]
+        return [f"{name}: files: {files}; motion blocks: {blocks} ({100 * self.refused:.2f} %)", *reasons]
+
+
+def dialect_of(source: bytes, name: str, dialect: str) -> str:
+    """The dialect of a folder, or a near relative that the file shows."""
+    found = dialects.detect(source, name).name
+    return found if found in RELATIVES.get(dialect, ()) else dialect
+
+
+def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False) -> Account:
+    """Correct every program of a folder and keep the books."""
+    books = Account()
+    fix = fix_flat if flat else fix_program
+    for path in sorted(folder.iterdir()):
+        source = path.read_bytes()
+        try:
+            program = read(source, path.name, dialect_of(source, path.name, dialect))
+        except NcfixError as error:
+            books.files["of another family" if error.messages[0].code in FOREIGN else "unreadable"] += 1
+            continue
+        try:
+            report = fix(program, machine, SETUP, FixOptions(verify=False, tolerance_um=5.0)).report
+        except NcfixError as error:
+            books.files["not followed"] += 1
+            books.stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1
+            continue
+        books.files["followed"] += 1
+        refused = {each.line: each.reason for each in report.refused}
+        books.blocks.update(corrected=report.compensated, passed=report.passed, refused=len(refused))
+        books.reasons.update(refused.values())
+    return books
+
+
+def main() -> None:
+    """Print the table."""
+    root = Path(__file__).resolve().parents[2]
+    corpus = root.parent / "shared" / "corpus"
+    machine = load(str(root / "examples/machines/three_axis.toml"))
+    with (corpus / "manifest.csv").open(newline="", encoding="utf-8") as manifest:
+        present = {row["dialect"] for row in csv.DictReader(manifest)}
+    wanted = [name for name in FAMILIES if name in present and (not sys.argv[1:] or name in sys.argv)]
+    for name in wanted:
+        books = account(corpus / name, FAMILIES[name], machine, flat="--flatten" in sys.argv)
+        print("\n".join(books.lines(name)))
+        print("\n".join(f"  stopped: {count} {why}" for why, count in books.stopped.most_common(10)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
