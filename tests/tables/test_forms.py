@@ -68,6 +68,7 @@ BROKEN = {
     "isg-csv": (b"X EXX\n0 0 0\n", "3 numbers under 2 names"),
     "elmo": (ELMO.replace(b"3\t4\n", b""), "1 rows, and Table dimensions says 2 of 2"),
     "weihong": (b"unit = mm\n[X]\n0, 0\n", "is no line of"),
+    "weihong ": (b"unit = mm\n[X]\n1, 0, 0\n1, 0, 0\n", "must ascend"),
     "hexagon": (b"STARTW\n10=10.1\n", "end with that of end"),
     "centroid": (b"24 0 0 0\n", "is no line of"),
     "rtl": (b"Target-count: 2\nRun-count: 1\nDEVIATIONS::\nRun Target Data:\n1 1 0.0\n", "1 deviations, 2 expected"),
@@ -109,13 +110,14 @@ def test_a_sound_elmo_table() -> None:
 @pytest.mark.parametrize("form", BROKEN)
 def test_broken_files(form: str) -> None:
     content, expected = BROKEN[form]
-    _, remarks = read(BY_NAME[form], "x", content)
+    _, remarks = read(BY_NAME[form.strip()], "x", content)
     assert any(expected in message.text for message in remarks.messages), remarks.messages
 
 
 @given(st.lists(st.decimals(-10, 10, places=4), min_size=3, max_size=3), st.sampled_from(["\n", "\r\n"]))
 def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) -> None:
-    content = f"unit = mm{eol}[X]{eol}{numbers[0]}, {numbers[1]}, {numbers[2]}{eol}".encode()
+    rows = [f"{place}, {numbers[1]}, {numbers[2]}" for place in (numbers[0], numbers[0] + 1)]
+    content = eol.join(["unit = mm", "[X]", *rows, ""]).encode()
     document, remarks = read(BY_NAME["weihong"], "x", content)
     assert not remarks.wrong
     assert document.content() == content

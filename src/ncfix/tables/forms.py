@@ -1,7 +1,7 @@
-"""Table files of controls for which ncfix makes no tables of its own: read line by line, written again to the byte.
+"""Table files of controls that ncfix makes no tables for: read line by line, and written again to the byte.
 
-A form is a list of the lines that it may have. A line is kept as its words and its numbers; a number keeps its decimals,
-its sign and its place, so that it may be changed and the file written again as its control likes it.
+A form is a list of the lines that it may have. A line is kept as its words and its numbers; a number keeps its
+decimals, its sign and its place, so that it may be changed and the file written again as its control likes it.
 """
 
 from __future__ import annotations
@@ -52,6 +52,17 @@ class Document:
     def rows(self, kind: str) -> list[tuple[float, ...]]:
         """The numbers of all lines of a kind."""
         return [tuple(map(float, line.numbers)) for line in self.lines if line.kind == kind]
+
+    def sections(self, kind: str) -> dict[str, list[tuple[float, ...]]]:
+        """The numbers of the lines after each line of a kind, `[X]`, under what that has between its brackets."""
+        found: dict[str, list[tuple[float, ...]]] = {}
+        rows: list[tuple[float, ...]] = []
+        for line in self.lines:
+            if line.kind == kind:
+                rows = found.setdefault(line.text.strip("[]"), [])
+            elif line.numbers:
+                rows.append(tuple(map(float, line.numbers)))
+        return found
 
     def with_numbers(self, index: int, *numbers: Decimal) -> Document:
         """With other numbers in one line."""
@@ -146,6 +157,14 @@ def _runs(document: Document, remarks: Remarks) -> None:
         expected = int(targets[0][0] * runs[0][0])
         if found != expected:
             remarks.refuse(0, f"{found} deviations, {expected} expected of targets and runs")
+
+
+def _united(document: Document, remarks: Remarks) -> None:
+    if [line.kind for line in document.lines].count("unit") != 1 or document.lines[0].kind != "unit":
+        remarks.refuse(0, "should begin with the line of the unit")
+    for axis, rows in document.sections("axis").items():
+        if len(rows) < 2 or any(after[0] <= before[0] for before, after in pairwise(rows)):
+            remarks.refuse(0, f"axis {axis} needs two positions or more, and they must ascend")
 
 
 def _defined(document: Document, remarks: Remarks) -> None:
@@ -250,7 +269,7 @@ FORMS = (
         "weihong",
         "NcStudio's axeserr.dat",
         {"unit": r"unit = (?:mm|inch)", "axis": r"\[\w\]", "row": rf"{N}, {N}, {N}"},
-        _framed("unit", "row"),
+        _united,
     ),
     Form(
         "hexagon",

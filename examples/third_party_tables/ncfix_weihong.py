@@ -1,0 +1,40 @@
+import numpy as np
+
+from ncfix.hookspecs import hookimpl
+from ncfix.tables.control import Control, Properties, Written
+from ncfix.tables.forms import BY_NAME, read
+from ncfix.tables.grid import Grid
+from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.positioning import positioning
+
+FILE, FORM = "axeserr.dat", BY_NAME["weihong"]
+
+
+class Weihong(Control):
+    name, title, reaches = "weihong", "Weihong NcStudio axis errors", "L-POS"
+    properties = Properties("error", "setpoint", "machine zero", "mm", (1e-6, 0.0), "end values", True, 999, 3, "one")
+    steps, switch_off = (f"Copy {FILE} to NcStudio, restart, home.",), f"Delete {FILE}."
+
+    def write(self, request):
+        terms, lines = positioning(request.machine, request.space, request.tool_length, 999, request.target).terms, []
+        for there, back in zip(terms[::2], terms[1::2], strict=True):
+            if there.outputs[0] in "XYZ":
+                columns = there.factors[0].nodes[0], *(-term.factors[0].values[:, 0] for term in (there, back))
+                lines += [f"[{there.outputs[0]}]", *map("{:.6f}, {:.6f}, {:.6f}".format, *columns)]
+        return Written({FILE: "\n".join(["unit = mm", *lines, ""]).encode()})
+
+    def read(self, files):
+        terms = []
+        for axis, rows in read(FORM, FILE, files[FILE])[0].sections("axis").items():
+            place, *errors = np.array(rows).T
+            grids = [Grid((axis,), (place,), (axis,), -error[:, None]) for error in errors]
+            terms += [Term((grid,), (axis, way)) for grid, way in zip(grids, (1, -1), strict=True)]
+        return Compensation(tuple(terms))
+
+    def lint(self, files):
+        return read(FORM, FILE, files[FILE])[1].messages
+
+
+@hookimpl
+def register_controls(register):
+    register(Weihong, name="weihong")
