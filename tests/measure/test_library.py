@@ -24,6 +24,10 @@ NAMES = (
     "spindle-growth-late",
     "drift-Y",
     "load-X",
+    "worn-Y",
+    "moment-X",
+    "weight-EAY-X",
+    "warming-Z",
 )
 
 
@@ -42,6 +46,7 @@ def test_an_effect_comes_back(name):
     poses = plan(THREE, "tcp", 200)
     state = {column: random.uniform(20, 35, 200) for column in ("temp_x", "temp_spindle")}
     state |= {"time_s": np.sort(random.uniform(0, 2e4, 200)), "load_kg": random.uniform(0, 300, 200)}
+    state |= {"load_kgm": random.uniform(0, 100, 200), "temp_structure": random.uniform(20, 30, 200)}
     size = 1e-3 if not named.effects[0].rotational else 1e-7
     known = THREE.replace(effects=tuple(replace(e, coefficients=(size,) * e.basis.size) for e in named.effects))
     data = simulate(poses.with_columns(state), known, Faults(noise_um=0.5), seed=2).with_header("setup", "rigid")

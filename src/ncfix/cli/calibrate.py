@@ -80,6 +80,9 @@ def calibrate(
 
 
 def _as_dict(found: Calibration) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from ncfix.measure.prediction import over_the_travels
     from ncfix.measure.residuals import residuals, rms_by_set
 
     diagnosis = residuals(found.problem, found.estimate)
@@ -98,6 +101,7 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
         "freedom": found.freedom,
         "condition": found.estimate.solution.condition,
         "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
+        "prediction": asdict(over_the_travels(found)),
         "largest_cook": float(diagnosis.cook.max(initial=0.0)),
         **{name: rows for name, rows in tests.items() if rows},
         "remarks": [message.as_dict() for message in found.remarks],
@@ -129,6 +133,8 @@ def _set_up(found: Calibration) -> dict[str, float]:
 
 
 def _print(found: Calibration) -> None:
+    from ncfix.measure.prediction import over_the_travels
+
     rows = []
     for label, value, deviation in zip(
         found.labels, found.estimate.coefficients.tolist(), found.sigma.tolist(), strict=True
@@ -141,6 +147,8 @@ def _print(found: Calibration) -> None:
         _say_bar(bar)
     for row in _positioning(found):
         _say_positioning(row)
+    over = over_the_travels(found)
+    console.say(f"sigma of the tip error over the travels: {over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms")
     console.say(
         f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
         f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
