@@ -27,11 +27,13 @@ SETUP = Setup(assume_zero=True)
 SIZES = (150, 1500)
 
 
-def streamed(source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS) -> tuple[bytes, dict[str, Any]]:
+def streamed(
+    source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS, jobs: int = 1
+) -> tuple[bytes, dict[str, Any]]:
     out: list[bytes] = []
     dialect = dialects.get("linuxcnc")
     given = io.BytesIO(source)
-    done = Stream(machine, SETUP, options, None, "p.ngc", dialect, given.read, out.append, size).run()
+    done = Stream(machine, SETUP, options, None, "p.ngc", dialect, given.read, out.append, size, jobs).run()
     text, stamp = b"".join(out), done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
     return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()
@@ -106,6 +108,11 @@ def test_parts_as_the_whole(seed: int, machine: Machine) -> None:
 
 def test_plain_programs_are_done_in_parts(machine: Machine) -> None:
     assert all(assert_same(program(seed, 60, 0.0), machine, 300) for seed in (1, 5))
+
+
+def test_several_processes_give_the_same_bytes(machine: Machine) -> None:
+    source = program(5, 300, 0.05)
+    assert streamed(source, machine, 3000, jobs=2) == streamed(source, machine, 3000)
 
 
 def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -49,6 +50,14 @@ if TYPE_CHECKING:
 @click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
 @click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Processes that work on a long program; the result is the same.",
+)
 @json_option
 def fix(
     programs: tuple[str, ...],
@@ -58,6 +67,7 @@ def fix(
     force: bool,
     dialect: str | None,
     given: SetupOptions,
+    jobs: int,
     as_json: bool,
     **choices: Any,
 ) -> int:
@@ -70,7 +80,8 @@ def fix(
     if as_json and any(target.path == STREAM for target in found):
         text = "the program and the JSON object would both go to standard output"
         raise UsageError.of("NCF010", text, hint="-o FILE")
-    job = _job(machine_path, dialect, given, {**choices, "force": force})
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
+    job = _job(machine_path, dialect, given, jobs, {**choices, "force": force})
     outcomes = [job.outcome(target) for target in found]
     if as_json:
         console.put_json(files=[outcome.entry for outcome in outcomes])
@@ -93,6 +104,7 @@ class Job:
     setup: Setup
     dialect: str | None
     options: FixOptions
+    jobs: int = 1
 
     def outcome(self, target: Target) -> Outcome:
         """Fix one program and say what came of it; an error ends this program only."""
@@ -135,7 +147,16 @@ class Job:
         path, found = shown(source.path), subprograms(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
             stream = Stream(
-                self.machine, self.setup, self.options, found, path, dialect, source.read, outlet.put, part_bytes()
+                self.machine,
+                self.setup,
+                self.options,
+                found,
+                path,
+                dialect,
+                source.read,
+                outlet.put,
+                part_bytes(),
+                self.jobs,
             )
             yield stream, outlet
 
@@ -151,12 +172,12 @@ class Job:
         return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
 
 
-def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: dict[str, Any]) -> Job:
+def _job(machine_path: str, dialect: str | None, setup: SetupOptions, jobs: int, choices: dict[str, Any]) -> Job:
     from ncfix.compensate.options import FixOptions
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"
-    return Job(load_machine(machine_path), setup.load(), dialect, FixOptions(**choices))
+    return Job(load_machine(machine_path), setup.load(), dialect, FixOptions(**choices), jobs)
 
 
 def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:

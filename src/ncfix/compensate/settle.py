@@ -22,6 +22,7 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
+from ncfix.program.dialect import Dialect
 from ncfix.program.emit import PINNED, Emission, Reading, closure_of_refusals, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
@@ -66,6 +67,19 @@ class Settled:
     reasons: dict[int, Reason]
 
 
+@dataclass(frozen=True, slots=True)
+class Agreed:
+    """A plan that nothing speaks against but, perhaps, its text.
+
+    kept     (n,) motions left as they were
+    reasons  block -> why it was refused
+    """
+
+    plan: Plan
+    kept: Mask
+    reasons: dict[int, Reason]
+
+
 def settle(
     program: Program,
     moves: Moves,
@@ -73,14 +87,38 @@ def settle(
     options: FixOptions,
     reading: Reading | None = None,
     before: Before | None = None,
+    first: Agreed | None = None,
 ) -> Settled:
     """Plan and write until both agree.
 
     reading  what the control made of an earlier attempt
     before   what an earlier part of the program left, where this is a part: its last motion is the first one here
+    first    the plan to begin with, from `agree`, if that has been made already
     """
-    kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL))
-    reasons = _by_rule(moves)
+    agreed = first or agree(moves, machine, program.dialect, options, before)
+    done = None if before is None else before.position
+    while True:
+        emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done)
+        if not emission.conflicts:
+            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons)
+        if emission.conflicts.keys() <= agreed.reasons.keys():
+            raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
+        for block, why in emission.conflicts.items():
+            _explain(agreed.reasons, [block], CODE_OF_TEXT, why)
+        agreed = agree(moves, machine, program.dialect, options, before, agreed)
+
+
+def agree(
+    moves: Moves,
+    machine: Machine,
+    dialect: Dialect,
+    options: FixOptions,
+    before: Before | None = None,
+    earlier: Agreed | None = None,
+) -> Agreed:
+    """Plan until nothing speaks against it; `earlier` says what is kept already, and why."""
+    kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)) if earlier is None else earlier.kept
+    reasons = _by_rule(moves) if earlier is None else earlier.reasons
     state = State()
     if before is not None:
         kept[0] |= before.kept
@@ -89,24 +127,16 @@ def settle(
         kept, pinned = closure_of_refusals(moves, kept)
         _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
-        planned = _planned(program, moves, machine, options, kept, state, before)
+        planned = _planned(dialect, moves, machine, options, kept, state, before)
         planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
             refused[finding.moves] = True
-        if refused.any():
-            _explain_findings(reasons, (*against, *planned.findings), moves, refused)
-            kept |= refused
-            continue
-        done = None if before is None else before.position
-        emission = emit(program, moves, planned.pieces, increments(machine), reading, done)
-        if not emission.conflicts:
-            return Settled(moves, planned, emission, kept, reasons)
-        if emission.conflicts.keys() <= reasons.keys():
-            raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
-        for block, why in emission.conflicts.items():
-            _explain(reasons, [block], CODE_OF_TEXT, why)
+        if not refused.any():
+            return Agreed(planned, kept, reasons)
+        _explain_findings(reasons, (*against, *planned.findings), moves, refused)
+        kept |= refused
 
 
 def increments(machine: Machine) -> Array:
@@ -126,7 +156,7 @@ def rounding(machine: Machine, turns: bool = False) -> float:
 
 
 def _planned(
-    program: Program,
+    dialect: Dialect,
     moves: Moves,
     machine: Machine,
     options: FixOptions,
@@ -134,7 +164,7 @@ def _planned(
     state: State,
     before: Before | None,
 ) -> Plan:
-    dialect, strategy = program.dialect, get_strategy(options.strategy)
+    strategy = get_strategy(options.strategy)
     return plan(
         machine,
         moves,

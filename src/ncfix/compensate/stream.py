@@ -10,23 +10,26 @@ one part has to know of the earlier ones is what that motion left (`Before`). Wh
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.compensate.account import FixReport
-from ncfix.compensate.direction import matters
+from ncfix.compensate.crew import Crew, Later, crew
+from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import refuse_stamped, stamp_of
 from ncfix.compensate.following import Resolve, kinematics_of, placed, rotary_names, with_tool_lengths
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, differences
-from ncfix.compensate.settle import Before, Settled, settle
+from ncfix.compensate.settle import Agreed, Before, Settled, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
-from ncfix.compensate.verify import PathError, path_error
+from ncfix.compensate.verify import PathError
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.program import stamp
@@ -71,6 +74,17 @@ class Part:
     last: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A part behind the last motion of the one before: `before` as far as it is known yet; `agreed` gives its plan."""
+
+    program: Program
+    moves: Moves
+    last: bool
+    before: Before | None
+    agreed: Later[Agreed]
+
+
 @dataclass(slots=True)
 class Stream:
     """One program on its way. `run` is called once.
@@ -78,6 +92,7 @@ class Stream:
     read   gives the next so many bytes of the text; none at its end
     write  takes the corrected text, part by part
     size   bytes of a part
+    jobs   processes that work on parts
     """
 
     machine: Machine
@@ -89,16 +104,22 @@ class Stream:
     read: Callable[[int], bytes]
     write: Callable[[bytes], None]
     size: int = PART_BYTES
+    jobs: int = 1
     tally: Tally = field(default_factory=Tally)
     rest: bytes = b""
-    context: Part | None = None
+    context: tuple[Part, Signs] | None = None
+    direction: Signs = field(init=False)
     before: Before | None = None
+    looks: deque[tuple[Later[PathError], NDArray[np.int64]]] = field(default_factory=deque)
     at: int = 0
     stamped: bytes = b""
     head: Program | None = None
     units: set[float] = field(default_factory=set)
     tools: dict[str, str] = field(default_factory=dict)
     lacking: dict[str, Message] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.direction = np.zeros(len(self.machine.axes), dtype=np.int8)
 
     def run(self) -> Streamed:
         """Correct the program; raises what `fix_program` raises, and `NotInPartsError`."""
@@ -111,10 +132,18 @@ class Stream:
         on_machine = placed(self.machine, self.setup)
         follower, proof = self._follower(), self._follower()
         again = PartReader(self.path, self.dialect)
-        for part in self._parts(follower):
-            if follower.lacking:
-                continue
-            self._correct(part, on_machine, follower, (again, proof))
+        with crew(self.jobs, on_machine, self.dialect, self.options) as workers:
+            waiting: deque[Unit] = deque()
+            for part in self._parts(follower):
+                moves = self._known(part)
+                if follower.lacking or self.lacking:
+                    continue
+                waiting.append(self._unit(part, moves, on_machine, workers))
+                while len(waiting) > workers.ahead:
+                    self._correct(waiting.popleft(), on_machine, follower, (again, proof), workers)
+            while waiting and not (follower.lacking or self.lacking):
+                self._correct(waiting.popleft(), on_machine, follower, (again, proof), workers)
+            self._gather(workers, 0)
         if follower.lacking:
             raise UsageError.collected(follower.lacking)
         if self.lacking:
@@ -193,30 +222,60 @@ class Stream:
 
     # -- one part -----------------------------------------------------------------------------------------------------
 
-    def _correct(self, part: Part, machine: Machine, follower: Follower, proof: tuple[PartReader, Follower]) -> None:
-        """Correct a part, prove it, write it, and keep what the next one has to know."""
-        program, moves = part.program, self._known(part)
-        if self.lacking:
-            return
+    def _unit(self, part: Part, moves: Moves, machine: Machine, workers: Crew) -> Unit:
+        """A part behind the last motion of the one before, and its plan, which somebody begins to make."""
+        program, before = part.program, None
+        if self.context is not None:
+            head, self.direction = self.context
+            program = joined([head.program, program])
+            moves = joined_moves([head.moves, moves], [1, len(part.program)])
+            nowhere = np.zeros(len(moves.axes))
+            before = Before(False, nowhere, self.direction, nowhere)
         units = {frame.unit for frame in moves.frames}
         if not units <= self.units and self.context is not None:
             raise NotInPartsError("the program changes between inch and mm")
         self.units |= units
-        if self.context is not None:
-            program = joined([self.context.program, program])
-            moves = joined_moves([self.context.moves, moves], [1, len(part.program)])
+        if not part.last:
+            self.context = self._context(program, moves, machine)
+        return Unit(program, moves, part.last, before, workers.agree(moves, before))
+
+    def _context(self, program: Program, moves: Moves, machine: Machine) -> tuple[Part, Signs]:
+        """The last motion with its block, and the way in which the axes came there."""
+        row = len(moves) - 1
+        block = int(moves.block[row])
+        head = Part(stretch(program, block, block + 1), rows_of(moves, row, row + 1, block), False)
+        if not matters(machine):
+            return head, self.direction
+        arrival = Intent(machine, moves, State(direction=self.direction)).arrival
+        assert arrival is not None
+        return head, arrival[row - 1] if row else self.direction
+
+    def _correct(
+        self, unit: Unit, machine: Machine, follower: Follower, proof: tuple[PartReader, Follower], workers: Crew
+    ) -> None:
+        """Correct a part, prove it, write it, and keep what the next one has to know."""
+        program, moves = unit.program, unit.moves
+        agreed: Later[Agreed] | None = unit.agreed
         own = np.ones(len(moves), dtype=bool)
-        own[: 0 if self.before is None else 1] = False
-        settled = settle(program, moves, machine, self.options, before=self.before)
+        if unit.before is not None:
+            assert self.before is not None
+            own[0] = False
+            agreed = None if self.before.kept else agreed
+            self.before = replace(self.before, direction=unit.before.direction)
+        first = agreed() if agreed is not None else None
+        settled = settle(program, moves, machine, self.options, before=self.before, first=first)
         if self.before is not None and settled.kept[0] != self.before.kept:
             raise NotInPartsError("a refusal reaches back into an earlier part")
         text = self._text(program, settled, follower)
-        self._prove(text, settled, own, part.last, *proof)
-        self.tally.add(program, settled, own, self._errors(machine, settled, own))
+        self._prove(text, settled, own, unit.last, *proof)
+        self.tally.add(program, settled, own)
+        if self.options.verify:
+            self._look(program, settled, own, workers)
         if self.options.allow_refused or not self.tally.refused:
             self.write(text)
-        if not part.last:
-            self._keep(program, settled, machine)
+        shift = settled.plan.start[-1] - moves.start[-1]
+        shift = np.where(np.isfinite(shift), shift, 0.0)
+        self.before = Before(bool(settled.kept[-1]), shift, self.direction, settled.emission.end[-1].copy())
 
     def _known(self, part: Part) -> Moves:
         """The motions of a part with every tool length known; notes what is lacking."""
@@ -233,8 +292,9 @@ class Stream:
     def _text(self, program: Program, settled: Settled, follower: Follower) -> bytes:
         """The corrected text of a part."""
         splices = settled.emission.splices
-        if self.context is not None:
-            return spliced(program.source, splices)[len(self.context.program.source) :]
+        if self.before is not None:
+            stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
+            return spliced(program.source, splices)[stop:]
         edit = stamp.insertion(program, stamp_of(program, self.machine, self.options, ()))
         self.at = edit.start
         self.head = program
@@ -262,30 +322,20 @@ class Stream:
         if wrong is None or wrong.any():
             raise NotInPartsError("the program takes frames or values from where the machine stands")
 
-    def _errors(self, machine: Machine, settled: Settled, own: Mask) -> PathError | None:
-        """Tip errors before and after, with the numbers as the control will understand them."""
-        if not self.options.verify:
-            return None
-        emission = settled.emission
+    def _look(self, program: Program, settled: Settled, own: Mask, workers: Crew) -> None:
+        """Begin to find out the tip errors before and after, with the numbers as the control will understand them."""
+        emission, moves = settled.emission, settled.moves
         pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
         state = State() if self.before is None else State(direction=self.before.direction)
-        rows = own & ~settled.kept
-        return path_error(machine, settled.moves, pieces, emission.start, state=state, rows=rows)
+        found = workers.errors(moves, pieces, emission.start, state, own & ~settled.kept)
+        self.looks.append((found, program.lines(moves.block)))
+        self._gather(workers, workers.ahead)
 
-    def _keep(self, program: Program, settled: Settled, machine: Machine) -> None:
-        """What the next part has to know."""
-        moves, plan, row = settled.moves, settled.plan, len(settled.moves) - 1
-        direction = np.zeros(len(moves.axes), dtype=np.int8)
-        if matters(machine):
-            came = State() if self.before is None else State(direction=self.before.direction)
-            arrival = Intent(machine, moves, came).arrival
-            assert arrival is not None
-            direction = arrival[row - 1] if row else np.broadcast_to(came.direction, direction.shape).astype(np.int8)
-        shift = plan.start[row] - moves.start[row]
-        shift = np.where(np.isfinite(shift), shift, 0.0)
-        self.before = Before(bool(settled.kept[row]), shift, direction, settled.emission.end[-1].copy())
-        block = int(moves.block[row])
-        self.context = Part(stretch(program, block, block + 1), rows_of(moves, row, row + 1, block), False)
+    def _gather(self, workers: Crew, most: int) -> None:
+        """Take in what was found out, but for that of the last `most` parts."""
+        while len(self.looks) > most:
+            found, lines = self.looks.popleft()
+            self.tally.figures(found(), lines)
 
 
 def _ends_clean(program: Program, moves: Moves) -> bool:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.compensate.account import Account, FixReport, Refusal
 from ncfix.compensate.findings import MOST, Finding, Mask
@@ -69,7 +70,7 @@ class Tally:
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     found: dict[tuple[str, str, str], Found] = field(default_factory=dict)
 
-    def add(self, program: Program, settled: Settled, own: Mask, errors: PathError | None) -> None:
+    def add(self, program: Program, settled: Settled, own: Mask) -> None:
         """Take in a part; `own` (n,) motions that were not the last of the part before."""
         moves = settled.moves
         account = Account.of(moves, settled.kept, settled.reasons)
@@ -84,13 +85,12 @@ class Tally:
         self.refused += refusals(program, Account(account.compensated, account.passed, refused))
         for finding in settled.plan.findings:
             self._note(finding, program, moves, own)
-        if errors is not None:
-            self._figures(errors, program, moves)
 
-    def _figures(self, errors: PathError, program: Program, moves: Moves) -> None:
+    def figures(self, errors: PathError, lines: NDArray[np.int64]) -> None:
+        """Take in the tip errors of a part; `lines` (n,) of its motions."""
         self.way += errors.way
         for side, figures in ((self.before, errors.before), (self.after, errors.after)):
-            line = program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
+            line = int(lines[figures.move]) if figures.move >= 0 else None
             side.add(figures, errors.way, line)
 
     def _note(self, finding: Finding, program: Program, moves: Moves, own: Mask) -> None:
