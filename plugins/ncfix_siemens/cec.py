@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ STEEP = 0.01
 CLEARLY = 1.001
 """How much larger than the largest positive value the largest negative one must be to be remarked on."""
 BOTH_WAYS = 0
+Key = TypeVar("Key", int, str)
 FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
 LARGE = 1.0
 """mm or degree: no machine is that wrong; most likely the unit is."""
@@ -88,11 +90,16 @@ def _sort(each: Assignment, found: dict[int, _Found], remarks: Remarks) -> None:
         return
     numbers = [int(index) for index in each.indices]
     table = found.setdefault(numbers[0], _Found({}, {}))
-    place: dict[int, Assignment] | dict[str, Assignment] = table.values if name == VALUE else table.fields
-    key = numbers[1] if name == VALUE else field
+    if name == VALUE:
+        _put(table.values, numbers[1], each, remarks)
+    else:
+        _put(table.fields, field, each, remarks)
+
+
+def _put(place: dict[Key, Assignment], key: Key, each: Assignment, remarks: Remarks) -> None:
     if key in place:
         remarks.doubt(each.line, "is assigned twice: the control keeps the last", "a slip?")
-    place[key] = each  # type: ignore[index]
+    place[key] = each
 
 
 def _table(index: int, found: _Found, remarks: Remarks) -> Table | None:

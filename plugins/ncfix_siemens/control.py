@@ -161,7 +161,8 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     if scheme.dropped > request.target / 10:
         yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
     yield from _turned(request, scheme)
-    yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
+    if cec:
+        yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
     yield from _sums(request, settings, scheme)
     if products:
         yield "Products hold in millimetres only: do not switch the control to inches with these tables on."

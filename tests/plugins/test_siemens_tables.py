@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Backlash, Polynomial
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
@@ -24,6 +24,7 @@ from ncfix_siemens.syntax import Assignment, assignments, parsed, written
 from ncfix_siemens.table import Table
 
 CONTROL = get_control("siemens")
+MACHINES = Path(__file__).resolve().parents[2] / "examples" / "machines"
 HEAD = b"""%_N_NC_CEC_INI
 CHANDATA(1)
 ; ncfix: value_sign=error product_terms=only X=AX1 Y=AX2 Z=AX3 most_tables=40 most_points=1000
@@ -122,6 +123,30 @@ def test_golden_bytes_of_an_encoder_table() -> None:
         b"$AA_ENC_COMP[0,0,X1]=0.01\n$AA_ENC_COMP[0,1,X1]=0.01\n$AA_ENC_COMP_STEP[0,X1]=500.0\n"
         b"$AA_ENC_COMP_MIN[0,X1]=-200.0\n$AA_ENC_COMP_MAX[0,X1]=300.0\n$AA_ENC_COMP_IS_MODULO[0,X1]=0\nM17\n"
     }
+
+
+def test_encoder_tables_take_what_is_an_axis_over_itself_and_the_others_the_rest() -> None:
+    machine = single_error("ECX", 20e-6)
+    machine = machine.replace(effects=(*machine.effects, *single_error("EYY").effects, *single_error("EZZ").effects))
+    found = made(machine, positioning="eec", value_sign="correction")
+    assert set(found.native) == {"NC_CEC.INI", "AX2_EEC.INI", "AX3_EEC.INI"}
+    tables = read_cec(parsed(found.native["NC_CEC.INI"].decode()), Remarks(""))
+    pointed = {table.multiply for table in tables}
+    added = [table for table in tables if not table.multiply and table.index + 1 not in pointed]
+    assert all(table.input != table.output for table in added)
+    assert not found.messages
+    assert found.left.after.max() < 2e-4
+
+
+def test_rotary_axes_keep_their_values_where_the_machine_does_not_allow_so_much() -> None:
+    """0.001 rad are 0.057 degree, and 0.05 are allowed."""
+    machine = load(str(MACHINES / "wCAYFXZSt.toml")).replace(effects=(Effect("EA0C", (0.001,), carried=True),))
+    with pytest.raises(RefusedError) as caught:
+        made(machine, rotary="correct", target=1e-3)
+    assert caught.value.code == "NCF489"
+    kept = made(machine.replace(max_correction=(1.0, 0.05 * np.pi / 180)), target=1e-3)
+    assert any("keep their values" in note for note in kept.notes)
+    assert kept.left.after.max() < 0.05 * kept.left.before.max()
 
 
 @pytest.mark.parametrize(("sign", "terms"), [("error", "only"), ("correction", "plus_both")])

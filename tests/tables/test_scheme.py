@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.machine import Effect, Machine, load
+from ncfix.machine import Effect, Machine, State, load
 from ncfix.machine.smooth import Backlash, Fourier, Polynomial
-from ncfix.tables.poses import ranges_of
+from ncfix.tables.poses import random_poses, ranges_of
 from ncfix.tables.residual import Residual, residual
 from ncfix.tables.scheme import Job, Limits, Scheme, automatic
 from ncfix.tables.scheme_nodes import Line
+from ncfix.tables.scheme_rotary import orientation_error, rotary_correction
 from ncfix.testing import single_error
 
 MACHINES = Path(__file__).resolve().parents[2] / "examples" / "machines"
@@ -95,6 +96,20 @@ def test_tables_of_an_endless_axis_repeat() -> None:
         assert grid.modulo == (True,)
         assert grid.values[0] == grid.values[-1]
         assert np.degrees(grid.nodes[0][-1] - grid.nodes[0][0]) == pytest.approx(360)
+
+
+def test_rotary_axes_take_off_what_they_can_of_the_orientation() -> None:
+    """The angular positioning error of C wholly; of a tilt about Y nothing at A = 0, where no axis turns that way."""
+    q, state = random_poses(ranges_of(CRADLE), 50), State(120.0)
+    machine = CRADLE.replace(effects=(EFFECTS["ECC"],))
+    correction = np.zeros_like(q)
+    correction[:, machine.rotary] = rotary_correction(machine, q, state)
+    assert orientation_error(machine, q, correction, state).max() < 1e-9
+    assert orientation_error(machine, q, 0 * correction, state).max() > 20e-6
+    tilted, level = CRADLE.replace(effects=(Effect("EB0Z", (40e-6,), carried=True),)), np.zeros((1, 5))
+    correction = np.zeros_like(level)
+    correction[:, tilted.rotary] = rotary_correction(tilted, level, state)
+    assert orientation_error(tilted, level, correction, state)[0] == pytest.approx(40e-6, rel=1e-3)
 
 
 def test_rotary_axes_keep_their_values_if_asked() -> None:
