@@ -14,6 +14,7 @@ from ncfix.compensate.following import kinematics_of
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine import load, loads
 from ncfix.program import dialects
+from ncfix.program.language import language_of
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
@@ -303,6 +304,11 @@ def test_programs_of_the_world(shared: Callable[[str], Path], figures: Callable[
     figures(f"corpus, fanuc: {readable} read, {foreign} of another family, {len(unreadable)} unreadable")
     assert len(unreadable) <= 1
     assert readable > 20
+
+
+def test_long_programs_are_followed_as_fanuc_programs() -> None:
+    """Programs of RS274 are followed in parts when they are long; in parts a Fanuc program would be one of RS274."""
+    assert language_of(dialects.get("fanuc")).follower is None
 
 
 def test_tools_named_by_h() -> None:

@@ -70,4 +70,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     return RS274.bulk(program, block)
 
 
-FANUC: Language = replace(RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk, unroll=unroll)
+FANUC: Language = replace(
+    RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk, unroll=unroll, follower=None
+)
+"""Not followed part by part: jumps and calls may lead anywhere in the text."""

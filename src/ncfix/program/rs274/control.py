@@ -303,6 +303,7 @@ class Control:
                 length,
                 modal.feed_mode,
                 code,
+                self.tilted,
             )
         )
 
