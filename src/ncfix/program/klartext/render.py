@@ -282,7 +282,7 @@ class Renderer:
         turn = self.layout.turn(self.program, self.block)
         return PieceOfArc(
             begin=begin,
-            end=target.ends[piece],
+            end=self._as_written(begin, target.ends[piece], own=piece == 0),
             centre=centre,
             plane=target.plane,
             spatial=target.spatial,
@@ -290,6 +290,19 @@ class Renderer:
             turn=None if turn is None else turn * float(target.shares[piece]),
             decimals=target.decimals,
         )
+
+    def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
+        """An end on the digits that will be written; `own`: by the words of the block itself."""
+        result = end.copy()
+        for column, letter in self.columns:
+            word = self.layout.axes.get(letter) if own else None
+            base = float(begin[column]) if word is not None and word.address[0] == "I" else 0.0
+            result[column] = base + round(float(end[column]) - base, int(self.target.decimals[column]))
+            if word is not None and isinstance(word.value, Literal):
+                original = base + float(self.program.values_of(self.block)[word.value.slot])
+                if abs(end[column] - original) < self.half[column]:
+                    result[column] = original
+        return result
 
     def _own_arc(self, centre: FloatArray) -> FloatArray:
         """The block itself as an arc."""
