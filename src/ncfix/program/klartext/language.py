@@ -50,4 +50,5 @@ KLARTEXT = Language(
     follow=follow,
     layout=layout_of,
     render=render,
+    arc_pieces=True,
 )
