@@ -164,6 +164,8 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     if cec:
         yield f"MD18342[0...]: {' '.join(str(len(table.values)) for table in cec)} points."
     yield from _sums(request, settings, scheme)
+    if any(table.direction for table in cec):
+        yield "Tables for one way hold the play of the axes: MD32450 $MA_BACKLASH must be what it was when measured."
     if products:
         yield "Products hold in millimetres only: do not switch the control to inches with these tables on."
 

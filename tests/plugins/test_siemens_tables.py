@@ -191,6 +191,7 @@ def test_what_changes_with_the_way_becomes_tables_for_each_way() -> None:
     found = made(machine)
     tables = read_cec(parsed(found.native["NC_CEC.INI"].decode()), Remarks(""))
     assert [(table.direction, table.input) for table in tables] == [(1, "AX1"), (-1, "AX1")]
+    assert any("MD32450" in note for note in found.notes)
     assert found.left.before.max() == pytest.approx(0.002)
     assert found.left.after.max() < 1e-7  # digits of the file
 

@@ -30,7 +30,7 @@ class Selection:
     free: frozenset[int] = frozenset()
     kept: frozenset[Key] = frozenset()
     silent: frozenset[Face] = frozenset()
-    _known: dict[tuple[Face, bool, tuple[int, ...]], Layout] = field(default_factory=dict)
+    _known: dict[tuple[Face, bool, tuple[int, ...]], tuple[Layout, Layout]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.kept = frozenset((face, n) for face, parts in self.faces.items() for n in range(len(parts.parts)))
@@ -47,12 +47,12 @@ class Selection:
 
     def layouts(self, output: int) -> list[Layout]:
         """The layouts of an axis, not absorbed, that without direction first; empty ones left out."""
-        found = [self._layout(face) for face in self.faces if face[0] == output]
+        found = [self._layouts(face)[0] for face in self.faces if face[0] == output]
         return [layout for layout in found if layout.axes or layout.constant]
 
     def tables(self, output: int) -> int:
         """How many tables an axis takes."""
-        return needed(output, [absorbed(layout, self.tolerance) for layout in self.layouts(output)], self.free)
+        return needed(output, [self._layouts(face)[1] for face in self.faces if face[0] == output], self.free)
 
     @property
     def total(self) -> int:
@@ -135,13 +135,15 @@ class Selection:
         self.kept = before
         return then - now
 
-    def _layout(self, face: Face) -> Layout:
+    def _layouts(self, face: Face) -> tuple[Layout, Layout]:
+        """The layout of a face, and the same absorbed."""
         numbers = tuple(n for n, _ in self._numbered(face) if (face, n) in self.kept)
         key = (face, face in self.silent, numbers)
         if key not in self._known:
             constant = 0.0 if face in self.silent else self.faces[face].constant
             parts = [self.part((face, n)) for n in numbers]
-            self._known[key] = arranged(parts, constant, face[1], self.tolerance)
+            layout = arranged(parts, constant, face[1], self.tolerance)
+            self._known[key] = layout, absorbed(layout, self.tolerance)
         return self._known[key]
 
     def _numbered(self, face: Face) -> Iterator[tuple[int, Part]]:
