@@ -17,7 +17,7 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.poses import even_poses
 from ncfix.tables.positioning import nodes_needed
 
-REST = 256
+REST = 128
 """Poses of the other axes that a mean is taken over: half of them, and those opposite."""
 FINE = 121
 """Positions at which an axis is looked at."""
