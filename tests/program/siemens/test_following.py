@@ -219,7 +219,7 @@ def test_what_is_not_given_is_asked_for() -> None:
     with pytest.raises(UsageError) as caught:
         follow('T="DRILL 8.5" M6\nG54 G0 X1 Y1 Z1', setup=Setup(initial=ZERO))
     texts = [message.text for message in caught.value.messages]
-    assert texts == ['length of tool DRILL 8.5 is used and not given', "work offset G54 is used and not given"]
+    assert texts == ["length of tool DRILL 8.5 is used and not given", "work offset G54 is used and not given"]
 
 
 def test_an_axis_that_the_machine_lacks_is_named() -> None:

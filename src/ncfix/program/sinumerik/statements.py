@@ -241,7 +241,8 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         return
     framing.tool(control, words, 60 in plan.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
     feed(control, turn)
-    strangers(control, words)
+    if motion.REFERENCE.keys().isdisjoint(plan.g):
+        strangers(control, words)
     if "MEAS" in words.values or "MEAW" in words.values:
         turn.special.add("meas")
     if turn.used:

@@ -1,0 +1,91 @@
+"""The classes of blocks in SINUMERIK: right, passed or refused; never silently wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from classes.judging import Case, judged
+
+HEAD = "G710 G90 G94 G17 G40 G54\nG0 X1 Y2 Z50\n"
+"""Two lines; the second is the motion to the start."""
+
+R, P, N = "right", "passed", "refused"
+
+
+def case(name: str, body: str, **lines: str) -> Case:
+    """A case after the head; lines of the body are counted from 3, as `L3`."""
+    return Case(name, HEAD + body + "\nM30\n", {2: R} | {int(key[1:]): what for key, what in lines.items()})
+
+
+WORDS = [
+    case("G0 and G1 with all words", "G1 X5 Y6 Z7 F100", L3=R),
+    case("omitted words", "G1 X5 F100\nZ3\nG0 Y9", L3=R, L4=R, L5=R),
+    case("packed words", "G1X5Y6Z7F100\nG0X-.5", L3=R, L4=R),
+    case("words with =", "G1 X=5 Y=-6.5 F100\nZ = 7", L3=R, L4=R),
+    case("AC and IC", "G1 X=IC(5) Y=AC(3) F100\nG91 X1 Y=AC(7)", L3=R, L4=R),
+    case("G91", "G91\nG1 X5 F100\nX5 Y1\nG90 X0", L4=R, L5=R, L6=R),
+    case("inches", "G700\nG1 X1 Y.5 F10\nG91 X.25", L4=R, L5=R),
+    case("diameters", "DIAMON\nG1 X5 F100\nDIAMOF\nX7", L4=R, L6=R),
+    case("radii beside diameters", "DIAM90\nG1 X6 F100\nG91 X1", L2=N, L4=N, L5=N),
+    case("expressions of constants", "R1=5\nDEF REAL DEEP=-2\nG1 X=R1*2 Z=DEEP F100", L5=R),
+    case("a value of the machine", "G1 X=$AA_IW[X]+1 F100\nG1 X5", L3=N, L4=N),
+    case("block skip", "/G0 X5\nG0 Y5", L3=R, L4=R),
+    case("dwell", "G4 F1\nG1 X5 F100", L4=R),
+    case("rounding at the corner", "G1 X5 RND=2 F100\nY20", L3=R, L4=R),
+    case("a contour by an angle", "G1 X5 ANG=45 F100", L3=N),
+    case("a positioning axis", "POS[X]=5\nG0 X7", L3=N, L4=R),
+]
+ARCS = [
+    case("arc with a centre", "G2 X11 Y12 I10 J0 F100", L3=R),
+    case("arc with an absolute centre", "G2 X11 Y12 I=AC(11) J=AC(2) F100", L3=R),
+    case("arc with a radius", "G2 X11 Y12 CR=10 F100", L3=R),
+    case("arc with an opening angle and an end", "G3 X11 Y12 AR=90 F100", L3=R),
+    case("arc with an opening angle and a centre", "G3 I0 J10 AR=90 F100", L3=R),
+    case("full circle", "G3 I10 J0 F100", L3=R),
+    case("several turns", "G3 I10 J0 Z40 TURN=2 F100", L3=R),
+    case("arc through a point", "CIP X21 Y2 I1=11 J1=12 F100\nG1 X5", L3=R, L4=R),
+    case("helix", "G2 X11 Y12 Z40 I10 J0 F100", L3=R),
+    case("tangential arc", "G1 X5 F100\nCT X10 Y5\nG1 X20", L3=R, L4=N, L5=R),
+    case("splines", "BSPLINE X5 Y5 F100\nX10\nG1 X20", L3=N, L4=N, L5=R),
+    case("polynomials", "POLY PO[X]=(5,1) F100\nG1 X20 Y5 Z5", L4=R),
+    case("cutter compensation", "G41 D1 G1 X5 F100\nX20\nY20\nG40 X30", L3=R, L4=R, L5=R, L6=R),
+    case("soft approach", "G147 G41 DISR=5 X5 Y5 F100\nG0 X1 Y1 Z1", L3=N, L4=R),
+]
+FRAMES = [
+    case("another work offset", "G55\nG1 X5 F100", L4=R),
+    case("no work offset", "G500\nG1 X5 F100", L4=R),
+    case("TRANS and ATRANS", "TRANS X3\nATRANS Y2\nG1 X5 F100\nTRANS\nX7", L5=R, L7=R),
+    case("ROT", "ROT RPL=30\nG1 X5 Y6 Z7 F100\nROT\nX1", L4=R, L6=R),
+    case("ROT in space", "ROT X10 Y20 Z30\nG1 X5 Y6 Z7 F100", L4=R),
+    case("MIRROR", "MIRROR X0\nG1 X5 F100\nG2 X15 Y2 CR=5", L4=R, L5=R),
+    case("SCALE alike", "SCALE X2 Y2 Z2\nG1 X5 Y6 Z7 F100", L4=R),
+    case("SCALE of one axis", "SCALE X2\nG1 X5 F100\nSCALE\nX7 Y7 Z7", L4=N, L6=R),
+    case("SUPA", "SUPA G0 Z0\nG0 X5 Y5 Z20", L3=P, L4=R),
+    case("G53 and G153", "G53 G0 Z0\nG153 Z1\nG0 X5 Y5 Z20", L3=P, L4=P, L5=R),
+    case("reference and fixed points", "G74 Z1=0\nG75 X1=0\nG0 X5 Y5 Z20", L3=P, L4=P, L5=R),
+    case("measuring", "MEAS=1 G1 Z0 F100\nG0 X5 Y5 Z20", L3=P, L4=R),
+    case("tool length", "T3 M6\nG1 Z5 F100\nD0 Z80", L4=R, L5=R),
+    case("polar", "G111 X5 Y5\nG1 AP=30 RP=10 F100\nAP=60 RP=10", L4=R, L5=R),
+    case("polar with words left out", "G111 X5 Y5\nG1 AP=30 RP=10 F100\nAP=60", L4=N, L5=N),
+    case("TRAORI", "TRAORI\nG1 X5 Y6 Z7 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=R, L6=R),
+    case("TRANSMIT", "TRANSMIT\nG1 X5 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=N, L6=R),
+    case("CYCLE800 without rotary axes", "CYCLE800()\nG1 X5 F100", L4=R),
+]
+FLOW = [
+    case("a branch that is decided", "R1=1\nIF R1==1\nG1 X5 F100\nELSE\nG1 X6 F100\nENDIF\nY7", L5=R, L9=R),
+    case("a branch decided at run time", "IF $A_IN[1]==1\nG1 X5 F100\nENDIF\nG1 X7", L4=N, L6=N),
+    case("a loop", "FOR R1=1 TO 2\nG1 X=R1 F100\nENDFOR\nX7", L4=N, L6=R),
+    case("a jump", "GOTOF DOWN\nG0 X99\nDOWN: G0 X5", L5=R),
+    case("a subprogram in the text", "SUB1\nM30\n%_N_SUB1_SPF\nG1 X5 F100\nM17", L6=R),
+    case("a cycle nobody knows", "HEAD_CLEAN\nG1 X5 F100\nG0 X1 Y1 Z1\nX3", L4=N, L5=R, L6=R),
+    case("a block nobody understands", 'OTHER "x" 5\nG1 X5 F100', L4=N),
+    case("drilling cycle", "CYCLE81(50,0,2,-20)\nG0 X5", L3=P, L4=R),
+    case("modal drilling cycle", "MCALL CYCLE81(50,0,2,-20)\nX5 Y5\nX9\nMCALL\nG0 X1", L3=P, L4=R, L5=R, L7=R),
+    case("a row of holes", "HOLES1(0,0,0,10,10,5)\nG0 X5 Y5 Z5", L3=N, L4=R),
+    case("a synchronized action", "WHEN TRUE DO $A_OUT[1]=1\nG1 X5 F100\nID=1 DO POS[X]=5\nX7", L4=R, L6=N),
+]
+
+
+@pytest.mark.parametrize("each", [*WORDS, *ARCS, *FRAMES, *FLOW], ids=lambda each: each.name)
+def test_classes_of_siemens(each: Case) -> None:
+    assert judged(each, "siemens") == each.expected
