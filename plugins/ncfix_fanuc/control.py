@@ -21,6 +21,7 @@ from ncfix.tables.volume import Volume
 from ncfix_fanuc.records import NAME, TABLE, TEXT, Style, Volc, csv_text, json_text, read_volc, template_text
 
 SIDE = 25
+MOST_MAGNIFICATION = 100
 AXES = ("X", "Y", "Z")
 TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
 
@@ -114,6 +115,10 @@ class Fanuc(Control):
         order = [mesh.grid.outputs.index(axis) for axis in AXES]
         values = mesh.grid.values[..., order]
         magnification = max(1, math.ceil(float(np.abs(values).max()) / (style.largest * unit) - 1e-9))
+        if magnification > MOST_MAGNIFICATION:
+            text = f"a value of {float(np.abs(values).max()):.3f} mm needs a magnification of {magnification}"
+            hint = f"the control takes {MOST_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
+            raise RefusedError.of("NCF484", text, hint=hint)
         whole = np.rint(sign * values / (magnification * unit)).astype(np.int64)
         low = tuple(float(line[0]) for line in mesh.grid.nodes)
         step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
