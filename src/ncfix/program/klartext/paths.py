@@ -45,6 +45,7 @@ TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is cor
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
 OFF = "a rapid after a retract (M140)"
 DEPARTURE = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
+NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
 FLAT = 1e-9
 
 
@@ -273,7 +274,7 @@ def tangential(control: Control, step: Step) -> None:
     if give_up(control, step, where):
         return
     if control.path.tangent is None:
-        refuse(control, "a tangential arc (CT), and the direction of the element before is not known")
+        do_without(control, step, where, NO_TANGENT)
         return
     plane = control.path.plane if step.name == "ctp" else plane_of(control, step.words)
     ahead = [dot(row, control.path.tangent) for row in control.inverse] if control.is_rotated else control.path.tangent
@@ -282,10 +283,8 @@ def tangential(control: Control, step: Step) -> None:
     left = -ahead[plane.second], ahead[plane.first]
     side = away[0] * left[0] + away[1] * left[1]
     size = math.hypot(*left)
-    if size < FLAT or math.hypot(*away) < FLAT:
-        raise Fault(BAD_ARC, "a tangential arc (CT) has no way in its plane")
-    if abs(side) < FLAT * math.hypot(*away):
-        refuse(control, "a tangential arc (CT) that is a straight line")
+    if size < FLAT or abs(side) < FLAT * math.hypot(*away):
+        do_without(control, step, where, NO_TANGENT)
         return
     radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)
     centre = radius * left[0] / size, radius * left[1] / size
