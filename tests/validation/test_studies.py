@@ -9,7 +9,9 @@ import pytest
 
 from validation import accuracy, plans, random_chains, round_trips
 
-CHAINS = int(os.environ.get("NCFIX_CHAINS", "12"))
+QUICK = (0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11)
+"""Chains whose formulas take a second or so; some of four revolute joints, or three skew ones, take a minute."""
+CHAINS = range(int(os.environ["NCFIX_CHAINS"])) if "NCFIX_CHAINS" in os.environ else QUICK
 DRAWS = int(os.environ.get("NCFIX_DRAWS", "4"))
 EXACT = 1e-12
 """Relative: a few dozen products in double precision."""
@@ -25,7 +27,7 @@ def test_round_trips_of_all_instruments(figures):
     assert 0.9 < squares.mean() < 1.1
 
 
-@pytest.mark.parametrize("seed", range(CHAINS))
+@pytest.mark.parametrize("seed", CHAINS)
 def test_random_chains(seed):
     found = random_chains.compare(seed)
     assert max(found.composed, found.turned, found.nominal, found.first, found.rotated) < EXACT
