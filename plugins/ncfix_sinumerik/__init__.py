@@ -19,6 +19,27 @@ SIEMENS = Dialect(
     comment="; {}",
     closure_mm=0.01,
     closure_relative=0.0,
+    understands=(
+        "packed words, X=, AC IC DC ACP ACN, R parameters, DEF, arithmetic, strings",
+        "G0 G1 G2 G3 with I J K, CR=, AR=, TURN=; CIP; G90 G91, G70 G71 G700 G710, DIAMON DIAM90",
+        "IF WHILE FOR LOOP REPEAT CASE GOTO, labels, PROC with parameters, subprograms in the text or beside it",
+        "G54 ... G599, G500, TRANS ROT MIRROR and what is added to them, SCALE alike in all axes, G58 G59",
+        "TRAORI with rotary words or A3= B3= C3= (--strategy full corrects the vector)",
+        "CYCLE800 axis by axis; CYCLE81 ... CYCLE89, CYCLE840 where the axes stand or by MCALL",
+        "polar AP= RP= with G110 ... G112, where both are written",
+        "G41 G42: the programmed contour is corrected, the control offsets it",
+    ),
+    passes=(
+        "SUPA, G53, G153, G74, G75, MEAS, the turn of CYCLE800, the depth of drilling cycles, dwell (G4), tool change, "
+        "other M codes, feed and path modes (G64x, CYCLE832, COMPCAD, FFWON, SOFT ...)",
+    ),
+    refuses=(
+        "what depends on values known at run time only: global data, $ variables, parameters of a PROC by itself",
+        "CT, splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes",
+        "A2 B2 C2, LEAD and TILT, vectors under ORIMKS; CYCLE800 by solid or projected angles",
+        "holes and pockets that a cycle makes up; everything after a block or synchronized action not understood",
+        "blocks executed from several states",
+    ),
     language="ncfix.program.sinumerik.language:SINUMERIK",
 )
 
