@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from ncfix.diagnostics import UsageError
@@ -19,7 +21,25 @@ def test_actual_positions_are_the_same_tables_in_another_form() -> None:
 
 
 def test_all_are_found() -> None:
-    assert {"fanuc", "linuxcnc", "isg"} <= set(controls())
+    fanuc, heidenhain = {"fanuc", "fanuc-pitch", "fanuc-rotary"}, {"heidenhain", "heidenhain-kinematics"}
+    assert fanuc | heidenhain | {"gcode", "isg", "linuxcnc", "siemens"} <= set(controls())
+
+
+@pytest.mark.parametrize("name", sorted(controls()))
+def test_what_is_assumed_can_be_checked_and_what_is_set_is_explained(name: str, root: Path) -> None:
+    control = get_control(name)
+    assert all((each.id and each.text and each.source and each.default and each.verify) for each in control.assumptions)
+    assert len({each.id for each in control.assumptions}) == len(control.assumptions)
+    assert control.steps
+    assert control.switch_off
+    assert all(option.text for option in control.options.values())
+    assert f"| `{name}` |" in (root / "docs" / "controllers.md").read_text()
+
+
+def test_a_sign_that_no_public_text_gives_has_no_default() -> None:
+    for name in ("fanuc", "fanuc-pitch", "fanuc-rotary", "heidenhain", "heidenhain-kinematics", "siemens"):
+        options = get_control(name).options
+        assert options["value_sign" if name == "siemens" else "sign"].default is None
 
 
 def test_an_unknown_control_is_refused() -> None:
