@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy hidden ci clean
+.PHONY: demo test lint format accuracy tables hidden ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -21,6 +21,9 @@ format:
 
 accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." of it
 	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py $(STUDIES)
+
+tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
+	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py
 
 hidden:          ## the hidden-effect benchmark into docs/accuracy.md (an hour); FINAL=1 for the final seeds
 	$(PYTHON) -m tests.hidden --command $(dir $(PYTHON))ncfix $(if $(FINAL),--final) --table docs/accuracy.md
