@@ -1,0 +1,89 @@
+"""A table that was made before reference points were moved: the same curves, some way beside their place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ncfix.diagnose.view import view
+from ncfix.machine import Effect, Machine
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.solve import orthonormal, without
+
+REACH = 0.16
+"""Of the travel measured: how far a table may be off."""
+PLACES = 33
+ROUNDS = 4
+
+
+def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Machine, str]]:
+    """The machine with its curves at the likeliest other place, and with a control that corrects there."""
+    seen = view(data, machine)
+    basis = orthonormal(seen.base / seen.relative[:, None])
+    curves = {axis.name: [e for e in machine.effects if _bent(e) and e.signal == axis.name] for axis in seen.reach.linear}
+    curves = {name: effects for name, effects in curves.items() if effects}
+    if not curves:
+        return
+    ways = {name: _ways(seen.reach.spans[name]) for name in curves}
+    shown = {
+        name: np.stack([_left(basis, seen.design(each) @ _values(each) / seen.relative) for each in _at(curves[name], ways[name])])
+        for name in curves
+    }
+    own = {name: rows[len(rows) // 2] for name, rows in shown.items()}
+    y = _left(basis, seen.y / seen.relative) + sum(own.values(), np.zeros(len(seen.y)))
+    beside = _found(y, shown)
+    title = "stale table: the curves of the file belong some way beside: "
+    if any(k != PLACES // 2 for k in beside.values()):
+        yield _machine(machine, curves, ways, beside, False), title + _said(ways, beside)
+    corrected = {name: own[name] - rows for name, rows in shown.items()}
+    beside = _found(y, corrected)
+    title = "stale table: the control corrects with a table shifted by "
+    if any(k != PLACES // 2 for k in beside.values()):
+        yield _machine(machine, curves, ways, beside, True), title + _said(ways, beside)
+
+
+def _bent(effect: Effect) -> bool:
+    return effect.active and effect.basis.needs_signal and not effect.location
+
+
+def _ways(span: tuple[float, float]) -> Array:
+    return np.linspace(-REACH, REACH, PLACES) * (span[1] - span[0])
+
+
+def _at(effects: Sequence[Effect], ways: Array) -> list[list[Effect]]:
+    return [[replace(e, center=e.center - float(way)) for e in effects] for way in ways]
+
+
+def _values(effects: Sequence[Effect]) -> Array:
+    return np.concatenate([np.asarray(e.coefficients) for e in effects])
+
+
+def _left(basis: Array, values: Array) -> Array:
+    return without(basis, values[:, None])[:, 0]
+
+
+def _found(y: Array, shown: dict[str, Array]) -> dict[str, int]:
+    """The place of each axis's curves that leaves least, one axis after another."""
+    chosen = {name: PLACES // 2 for name in shown}
+    for _ in range(ROUNDS):
+        for name, rows in shown.items():
+            rest = y - sum((shown[other][k] for other, k in chosen.items() if other != name), np.zeros(len(y)))
+            chosen[name] = int(((rest - rows) ** 2).sum(axis=1).argmin())
+    return chosen
+
+
+def _machine(
+    machine: Machine, curves: dict[str, list[Effect]], ways: dict[str, Array], at: dict[str, int], corrected: bool
+) -> Machine:
+    moved = {id(e): replace(e, center=e.center - float(ways[name][at[name]])) for name in curves for e in curves[name]}
+    if not corrected:
+        return machine.replace(effects=tuple(moved.get(id(e), e) for e in machine.effects))
+    against = tuple(replace(e, coefficients=tuple(-c for c in e.coefficients)) for e in moved.values())
+    constants = tuple(e if id(e) in moved else replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects)
+    return machine.replace(effects=(*constants, *against))
+
+
+def _said(ways: dict[str, Array], at: dict[str, int]) -> str:
+    return ", ".join(f"{ways[name][k]:+.0f} mm in {name}" for name, k in at.items())
