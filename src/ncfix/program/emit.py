@@ -19,7 +19,8 @@ from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
-from ncfix.program.render import STRAIGHT_AND_ARCS, Rendered, Target
+from ncfix.program.render import STRAIGHT_AND_ARCS
+from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
 from ncfix.program.writer import Edit, Splices
@@ -181,8 +182,11 @@ class _Emitter:
             self.position = np.where(jump, read[row], self.position)
 
     def _retract(self, row: int) -> None:
-        """After a canned cycle the control stands where it started along the axes along which it went back."""
-        if row + 1 == len(self.moves):
+        """After a canned cycle the control stands where it started along the axes along which it went back.
+
+        An earlier attempt may have shown otherwise (a height of the cycle's own): then that is believed.
+        """
+        if row + 1 == len(self.moves) or self.reading.start is not None:
             return
         moves = self.moves
         back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from ncfix.program.flatten import Unroll
     from ncfix.program.moves import Kinematics, Trace
     from ncfix.program.parts import Follower
-    from ncfix.program.render import Rendered, Target
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
+    from ncfix.program.target import Rendered, Target
     from ncfix.program.tree import Anchor, Program, Word
 
 Resolve = Callable[[str], bytes | None]

@@ -7,117 +7,22 @@ much. What is returned as emitted is what the control will understand, digits an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
-from ncfix.program.pointing import Pointing
+from ncfix.program.target import LINE, Rendered, Target
 from ncfix.program.tree import Constant, Literal, Program, Word
 from ncfix.program.turns import is_dragged, number, way
 
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
-LINE = 10
 INVERSE_TIME, PER_MINUTE = "93", "94"
 LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be stated anew: G0 to G3."""
-
-
-@dataclass(frozen=True, slots=True)
-class Target:
-    """What one motion shall become, in program numbers.
-
-    letters      axis letters of the columns
-    decimals     (n_axes,) digits after the point that the least increment needs
-    start        (n_axes,) where the control stands, as emitted so far (NaN unknown)
-    nominal      (n_axes,) where the motion ended as programmed
-    original     (n_axes,) value of each programmed word: target or increment
-    ends         (k, n_axes) where its pieces shall end
-    arc          the first piece is an arc
-    centre       (3,) of that arc, and
-    original_centre (3,) the centre as programmed, absolute
-    origin       (3,) the start of the motion as programmed: what incremental centres were meant from
-    plane        the arc's two axes in its plane and the one across it, as indices of X Y Z
-    spatial      columns of X Y Z (-1: not an axis of the machine)
-    diameter     X is a diameter; centres and radii are not
-    incremental, centre_absolute   how words are meant
-    shares       (k,) fraction of the block's time in each piece, for G93
-    inverse_time the block's F is the time of the block
-    code         motion code the pieces need, tenths
-    active_code  motion code in force before the block, as emitted
-    feed         the number after F that is in force, NaN where there is none
-    turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
-    turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
-    increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
-    rotary       (n_axes,) which axes turn
-    arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
-    arc_code     motion code of these, tenths
-    pointing     how rotary positions (rad) point the tool, where the program gives its direction
-    rotation     (3, 3) how the frame is turned
-    offset       (n_axes,) of the frame, mm and rad
-    """
-
-    letters: tuple[str, ...]
-    decimals: NDArray[np.int64]
-    start: FloatArray
-    nominal: FloatArray
-    original: FloatArray
-    ends: FloatArray
-    arc: bool
-    centre: FloatArray
-    original_centre: FloatArray
-    origin: FloatArray
-    plane: tuple[int, int, int]
-    spatial: tuple[int, int, int]
-    diameter: bool
-    incremental: bool
-    centre_absolute: bool
-    shares: FloatArray
-    inverse_time: bool
-    code: int
-    active_code: int
-    feed: float = float("nan")
-    turn_minutes: float = float("nan")
-    turn_by_feed: bool = False
-    arcs: NDArray[np.bool_] | None = None
-    centres: FloatArray | None = None
-    arc_code: int = 0
-    increments: tuple[float, float] = (1.0, 1.0)
-    rotary: tuple[bool, ...] = ()
-    pointing: Pointing | None = None
-    rotation: FloatArray | None = None
-    offset: FloatArray | None = None
-
-    @property
-    def last_code(self) -> int:
-        """The motion code that is in force after the pieces, in tenths."""
-        if self.arcs is None:
-            return self.code
-        return self.arc_code if self.arcs[-1] else LINE
-
-
-@dataclass(slots=True)
-class Rendered:
-    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
-
-    centre, centres  of the first piece if it is an arc, and of further ones by their number
-    """
-
-    edits: list[tuple[int, int, str]] = field(default_factory=list)
-    lines: list[str] = field(default_factory=list)
-    ends: list[FloatArray] = field(default_factory=list)
-    centre: FloatArray | None = None
-    centres: dict[int, FloatArray] = field(default_factory=dict)
-
-    @property
-    def text(self) -> tuple[object, ...]:
-        """What the control reads; two executions of a block agree when this is equal."""
-        return (tuple(self.edits), tuple(self.lines))
 
 
 class BlockRenderer:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ncfix.program.moves import FeedMode, Kind, Moves
 
 if TYPE_CHECKING:
-    from ncfix.program.render import Target
+    from ncfix.program.target import Target
 
 FloatArray = NDArray[np.float64]
 

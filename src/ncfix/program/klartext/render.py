@@ -16,7 +16,7 @@ from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
 from ncfix.program.klartext.layout import Layout, poles_move, tilts
 from ncfix.program.klartext.number_text import Style, value_of
 from ncfix.program.layout import AXIS_LETTERS
-from ncfix.program.render import Rendered, Target
+from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program, Span, Word
 
 FloatArray = NDArray[np.float64]

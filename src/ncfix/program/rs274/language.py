@@ -11,7 +11,7 @@ from ncfix.program.language import BulkLayout, Language, Resolve
 from ncfix.program.layout import AXIS_LETTERS, Layout, has_free_text, layout_of
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.reach import tape_end
-from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.render import BlockRenderer
 from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.following import RS274Follower
@@ -19,6 +19,7 @@ from ncfix.program.rs274.interpreter import Interpreter
 from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.setup import Setup
 from ncfix.program.shapes import scan, split_blocks
+from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program, Word
 
 

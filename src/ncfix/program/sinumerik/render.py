@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ncfix.program.layout import CENTRE_LETTERS
 from ncfix.program.number_style import NumberStyle
 from ncfix.program.pointing import Pointing
-from ncfix.program.render import BlockRenderer, Rendered, Target
+from ncfix.program.render import BlockRenderer
 from ncfix.program.sinumerik.circles import VIA, circle_through
 from ncfix.program.sinumerik.layout import SinumerikLayout
 from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
+from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Call, Literal, Program, Word
 
 FloatArray = NDArray[np.float64]
