@@ -36,6 +36,8 @@ ROOM = 1.5
 """MD32720 as a multiple of the largest correction."""
 WORTH = 0.9
 """Rotary axes keep their values if less than this share of what correcting them leaves at the tip is left then."""
+ENOUGH = 0.5
+"""Unless correcting them leaves (rms) less than this share of the target anyway."""
 CHECKS = 1000
 
 
@@ -103,7 +105,8 @@ def _scheme(request: Request, settings: Settings) -> Scheme:
         return automatic(job, settings.rotary != "keep")
     keeping, turning = automatic(job, False), automatic(job, True)
     allowed = _largest(request, turning)[request.machine.rotary].max() <= request.machine.max_correction[1]
-    return turning if allowed and WORTH * _left(turning) <= _left(keeping) else keeping
+    good = _left(turning) <= max(_left(keeping) / WORTH, ENOUGH * request.target)
+    return turning if allowed and good else keeping
 
 
 def _left(scheme: Scheme) -> float:

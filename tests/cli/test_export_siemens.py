@@ -71,6 +71,21 @@ def test_other_controls_have_nothing_to_probe(shop: Any, ncfix: Any) -> None:
     assert (result.code, "nothing to probe" in result.err) == (ExitCode.USAGE, True)
 
 
+def test_the_machine_of_the_thesis_takes_20_tables(root: Path, ncfix: Any, tmp_path: Path) -> None:
+    """44 um, of which 40 tables left 9.1 there; and 8 tables of a 828D leave 2.6."""
+    machine = root / "examples/siemens/tilted_ac.toml"
+    common = ("-m", machine, "--tool-length", 200, *SAID, "--json")
+    found = ncfix("export", "siemens", *common, "-o", tmp_path / "a", "--target-um", 0.1).json()
+    assert found["residual_um"]["before"]["mean"] == pytest.approx(44, abs=1)
+    assert found["residual_um"]["after"]["mean"] < 0.1
+    assert found["limits"]["tables"] <= 20
+    assert ncfix("emulate", "siemens", tmp_path / "a", "-m", machine).code == ExitCode.DONE
+    few = ncfix("export", "siemens", *common, "-o", tmp_path / "b", "--set", "model=828D").json()
+    assert few["limits"]["tables"] <= 8
+    assert few["limits"]["largest"] <= 200
+    assert few["residual_um"]["after"]["mean"] < 3
+
+
 def test_the_sheet_has_machine_data_and_assumptions(shop: Any, ncfix: Any) -> None:
     folder: Path = shop.folder / "t"
     ncfix("export", "siemens", "-m", shop.machine, "-o", folder, *SAID)
