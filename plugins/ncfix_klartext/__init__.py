@@ -19,6 +19,27 @@ HEIDENHAIN = Dialect(
     closure_mm=0.016,
     closure_relative=0.0,
     feed_of="all",
+    understands=(
+        "L, LN, LP, CC with C, CR, CP (helices too), CT, CTP, words alone; absolute, incremental and polar words",
+        "R0 RL RR, APPR and DEP, RND and CHF: the contour is corrected, the control offsets and rounds it",
+        "FMAX, F, decimal points and commas, `~`, block numbers of any kind, MM and INCH",
+        "presets (CYCL DEF 247), datum shift (7, TRANS DATUM), mirror (8), rotation (10), scale (11), tool lengths",
+        "PLANE SPATIAL, PROJECTED, EULER, VECTOR, POINTS, RELATIV, AXIAL, RESET with STAY and TURN, and cycle 19",
+        "M128, M129, FUNCTION TCPM; LN with TX TY TZ; M126 and M127",
+        "drilling cycles 1, 2, 17, 18, 200 ... 209, 240, 241 with M99, M89, CYCL CALL POS: the position, not the depth",
+        "Q parameters, formulas, FN 0 ... FN 13, LBL, CALL LBL with REP, jumps; CALL PGM is followed",
+    ),
+    passes=(
+        "M91 and M92, M140, TCH PROBE, the turn of PLANE ... TURN, rapids after a retract, DEP without an end",
+        "CYCL CALL alone, rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
+    ),
+    refuses=(
+        "free contours (FK), patterns, cycles with a path of their own, called programs (they are not rewritten)",
+        "tables of datums, TCPM with spatial angles or another point than the tip, M114, M144, TRANS ROTATION",
+        "a shift in a rotated frame, mirror with rotation, a scale of single axes: how they add up is not sure",
+        "what depends on Q parameters that the control sets, blocks executed from several states",
+        "a line that is no Klartext: the control stops there",
+    ),
     language="ncfix.program.klartext.language:KLARTEXT",
 )
 

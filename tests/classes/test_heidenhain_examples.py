@@ -1,0 +1,132 @@
+"""The five-axis Klartext programs that ship: corrected on their machine, within the figures of docs/dialects.md."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import follow
+from ncfix.machine import load
+from ncfix.program.dialects import detect
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.reader import read
+from ncfix.program.setup_file import load as load_setup
+
+PROGRAMS = ("klartext_tcp.h", "klartext_tilted.h")
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
+def test_a_shipped_program_is_corrected(root: Path, name: str, strategy: str) -> None:
+    machine = load(str(root / "examples/machines/dmu50.toml"))
+    setup = load_setup(str(root / "examples/programs/klartext.setup.toml"))
+    source = (root / "examples/programs" / name).read_bytes()
+    assert detect(source, name, machine.control or "").name == "heidenhain"
+    fixed = fix_program(read(source, name), machine, setup, FixOptions(strategy=strategy))
+    assert fixed.report.refused == ()
+    before, after = fixed.report.error_before_um["max"], fixed.report.error_after_um["max"]
+    assert before is not None
+    assert after is not None
+    assert after < before / 5
+    if strategy == "full":
+        return
+    row = next(line for line in (root / "docs/dialects.md").read_text().splitlines() if f"`{name}`" in line)
+    assert f"| {before:.1f} um | {after:.2f} um |" in row
+
+
+def moves_of(root: Path, text: str) -> Moves:
+    """A program on the machine of the examples."""
+    machine = load(str(root / "examples/machines/dmu50.toml"))
+    setup = load_setup(str(root / "examples/programs/klartext.setup.toml"))
+    return follow(read(text.encode(), "t.h"), machine, setup).trace.moves
+
+
+def xyz(moves: Moves) -> np.ndarray:
+    """Ends in X Y Z."""
+    return moves.end[:, [moves.axes.index(letter) for letter in "XYZ"]]
+
+
+def test_in_the_tilted_plane_the_drill_stands_on_its_holes(root: Path) -> None:
+    """A hole 15 mm from the datum at 45 degrees, 12 mm deep, in a plane tilted by 30 degrees about X."""
+    moves = moves_of(root, (root / "examples/programs/klartext_tilted.h").read_text())
+    hole = xyz(moves)[moves.kind == Kind.CYCLE][0]
+    side, cosine, sine = 15 * math.sqrt(0.5), math.sqrt(0.75), 0.5
+    assert hole == pytest.approx([side, side * cosine + 12 * sine, 120 + side * sine - 12 * cosine])
+
+
+HEAD = "BEGIN PGM P MM\nTOOL CALL 7 Z\nL Z+200 R0 FMAX\nL X+0 Y+0 FMAX\n"
+
+
+def program(*blocks: str) -> str:
+    return HEAD + "\n".join(blocks) + "\nEND PGM P MM\n"
+
+
+def test_all_ways_to_say_a_plane_turn_the_axes_alike(root: Path) -> None:
+    ways = [
+        "PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN SEQ+ FMAX",
+        "PLANE PROJECTED PROPR+0 PROMIN+30 ROT+0 TURN SEQ+ FMAX",
+        "PLANE EULER EULPR+0 EULNU+30 EULROT+0 TURN SEQ+ FMAX",
+        "PLANE VECTOR BX+1 BY+0 BZ+0 NX+0 NY-0.5 NZ+0.8660254037844386 TURN SEQ+ FMAX",
+        "PLANE POINTS P1X+0 P1Y+0 P1Z+0 P2X+9 P2Y+0 P2Z+0 P3X+0 P3Y+8.660254037844386 P3Z+5 TURN SEQ+ FMAX",
+        "PLANE SPATIAL SPA+10 SPB+0 SPC+0 STAY\nPLANE RELATIV SPA+20 TURN SEQ+ FMAX",
+        "PLANE SPATIAL SPA+30 SPB+0 SPC+0 STAY SEQ+\nL B+Q121 C+Q122 FMAX",
+    ]
+    ends = [moves_of(root, program(way, "L X+5 Y+6 Z+7 FMAX")).end[-1] for way in ways]
+    assert np.abs(np.array(ends) - ends[0]).max() < 1e-9
+
+
+def test_with_and_without_a_tilted_plane_the_tool_goes_to_the_same_place(root: Path) -> None:
+    """The axes turned by numbers and M128 with the turned coordinates, against PLANE with its own."""
+    tilted = moves_of(root, program("PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN SEQ+ FMAX", "L X+5 Y+6 Z+7 FMAX"))
+    c, b = (math.degrees(tilted.end[-1, tilted.axes.index(letter)]) for letter in "CB")
+    y, z = 6 * math.cos(math.pi / 6) - 7 * 0.5, 6 * 0.5 + 7 * math.cos(math.pi / 6)
+    turned = moves_of(root, program(f"L B{b:+.9f} C{c:+.9f} FMAX", "M128", f"L X+5 Y{y:+.9f} Z{z:+.9f} FMAX"))
+    assert tilted.tcp[-1]
+    assert turned.tcp[-1]
+    assert np.abs(tilted.end[-1] - turned.end[-1]).max() < 1e-8
+
+
+def test_a_direction_of_the_tool_is_the_rotary_axes_that_point_it(root: Path) -> None:
+    moves = moves_of(root, program("L B+30 C+40 F1000", "M128", "L X+5 Y+6 Z+7 F500"))
+    pointing = moves_of(root, program("M128", "LN X+5 Y+6 Z+7 TX+0 TY+0 TZ+1 F500")).pointing
+    assert pointing is not None
+    x, y, z = pointing.direction(moves.end[-1])
+    text = f"LN X+5 Y+6 Z+7 NX+0 NY+0 NZ+1 TX{x:+.9f} TY{y:+.9f} TZ{z:+.9f} F500"
+    found = moves_of(root, program("L B+30 C+40 F1000", "L B+29 C+41", "M128", text))
+    assert np.abs(found.end[-1] - moves.end[-1]).max() < 1e-6
+
+
+def test_a_direction_of_the_tool_is_corrected_by_the_strategy_full(root: Path) -> None:
+    machine = load(str(root / "examples/machines/dmu50.toml"))
+    setup = load_setup(str(root / "examples/programs/klartext.setup.toml"))
+    points = [(x, 0.5 * x, 5 + 0.1 * x, 0.3, -0.2 + 0.01 * x, 0.9) for x in range(0, 30, 5)]
+    lines = [
+        f"LN X{x:+.3f} Y{y:+.3f} Z{z:+.3f} NX+0 NY+0 NZ+1 TX{a:+.7f} TY{b:+.7f} TZ{c:+.7f} F500"
+        for x, y, z, a, b, c in points
+    ]
+    first = lines[0].replace("F500", "FMAX")
+    source = read(program("L B+30 C+40 FMAX", "M128", first, *lines[1:]).encode(), "t.h")
+    fixed = fix_program(source, machine, setup, FixOptions(strategy="full"))
+    assert fixed.report.refused == ()
+    assert fixed.report.error_after_um["max"] is not None
+    assert fixed.report.error_after_um["max"] < 1.0
+    old, new = ([line for line in text.decode().splitlines() if "LN" in line] for text in (source.source, fixed.text))
+    assert all(line.split("TX")[1] not in {other.split("TX")[1] for other in old} for line in new)
+
+
+def test_a_plane_that_the_axes_do_not_stand_square_to_is_refused(root: Path) -> None:
+    moves = moves_of(root, program("PLANE SPATIAL SPA+30 SPB+0 SPC+0 STAY", "L X+5 Y+6 Z+7 FMAX"))
+    assert "square" in moves.reasons[moves.reason[-1]] or "normal" in moves.reasons[moves.reason[-1]]
+
+
+def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
+    by_plane = moves_of(root, program("PLANE AXIAL B+40 C+30 TURN", "L B+40 C+30 FMAX", "L X+5 Y+6 Z+7 FMAX"))
+    by_axes = moves_of(
+        root, program("L B+40 C+30 FMAX", "CYCL DEF 19.0 W", "CYCL DEF 19.1 B+40 C+30", "L X+5 Y+6 Z+7 FMAX")
+    )
+    assert by_axes.rule[-1] == 0
+    assert np.abs(by_plane.end[-1] - by_axes.end[-1]).max() < 1e-9
