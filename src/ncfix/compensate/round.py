@@ -26,13 +26,21 @@ SHORTEST = 0.05
 """mm between the ends of the shortest arc that is written."""
 
 
+OTHER_CODES = 1000
+"""Motion codes in tenths from here on are no G codes."""
+
+
 def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float) -> Mask:
-    """Motions `rows` (k,) that may be made of arcs: radii off by rounding are within half of what the control takes."""
+    """Motions `rows` (k,) that may be made of arcs: radii off by rounding are within half of what the control takes.
+
+    Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight.
+    """
     moves = intent.moves
     spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
     radius = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
     allowed = np.maximum(closure.mm, closure.relative * radius) / 2
     enough: Mask = intent.segments.arc[rows] & (radius > SHORTEST) & (4 * rounding <= allowed)
+    enough &= moves.modal[rows] < OTHER_CODES
     return enough if APART * rounding < SHORTEST else np.zeros(len(rows), dtype=bool)
 
 

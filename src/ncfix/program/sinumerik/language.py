@@ -59,4 +59,5 @@ SINUMERIK = Language(
     follow=follow,
     layout=layout_of,
     render=render,
+    arc_pieces=True,
 )
