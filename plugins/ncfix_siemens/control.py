@@ -45,7 +45,7 @@ class Siemens(Control):
     """The control `siemens`."""
 
     name = "siemens"
-    title = "Siemens SINUMERIK compensation tables (CEC, EEC)"
+    title = "Siemens SINUMERIK (CEC, EEC)"
     reaches = "L-VOL, and R-VOL as far as sums and products of pairs can say it"
     properties: ClassVar[Properties] = PROPERTIES
     assumptions: ClassVar[tuple[Assumption, ...]] = ASSUMPTIONS

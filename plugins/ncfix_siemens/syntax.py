@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from ncfix.tables.lines import Remarks
 
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-ASSIGNMENT = re.compile(r"(\s*)\$(\w+)\[([^\]]*)\](\s*=\s*)([^;]*?)(\s*(?:;.*)?)", re.ASCII)
-HEADER = re.compile(r"%_N_(\w+)_INI\s*", re.ASCII)
+ASSIGNMENT = re.compile(r"(\s*(?:[Nn]\d+\s*)?)\$(\w+)\[([^\]]*)\](\s*=\s*)([^;]*?)(\s*(?:;.*)?)", re.ASCII)
+HEADER = re.compile(r"%_N_(\w+)_(?:INI|SPF|MPF)\s*", re.ASCII)
 ENDS = re.compile(r"\s*(?:N\d+\s*)?M(?:17|0?2|30)\s*(?:;.*)?", re.IGNORECASE)
 HARMLESS = re.compile(r"\s*(?:METRIC|CHANDATA\(\d+\)|M0?0)?\s*(?:;.*)?", re.IGNORECASE)
 VALUE_FILES = {"eec": b"$AA_ENC_COMP"}

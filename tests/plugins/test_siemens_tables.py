@@ -376,10 +376,12 @@ def test_good_files_are_not_remarked_on(content: bytes) -> None:
     assert not CONTROL.lint({"a.INI": content})
 
 
-def test_a_file_that_lists_each_table_only_once() -> None:
-    """`axes` may be bare or in brackets; METRIC and comments do no harm; the order of lines is free."""
-    lines = list(ONE.splitlines(keepends=True)[::-1])
-    mixed = HEAD + b"METRIC\n; anything\n\n" + b"".join(lines).replace(b"(AX2)", b"AX2 ; base") + b"M17 ; end\n"
+def test_files_may_look_otherwise() -> None:
+    """Axes may be bare or in brackets; METRIC, comments and numbers do no harm; the order of lines is free."""
+    lines = b"".join(ONE.splitlines(keepends=True)[::-1])
+    lines = lines.replace(b"(AX2)", b"AX2 ; base").replace(b"$AN_CEC_STEP", b"N10 $an_cec_step")
+    mixed = HEAD + b"METRIC\n; anything\n\n" + lines
+    mixed = mixed.replace(b"_CEC_INI", b"_CEC_SPF") + b"M0\n\nN99 M17 ; end\n"
     assert not CONTROL.lint({"a.INI": mixed})
     assert at({"a.INI": mixed}, Y=-75)[0] == pytest.approx(-0.002)
 
