@@ -74,3 +74,23 @@ def test_noise_is_told_from_repeats():
     assert seen.noise_known
     # 270 degrees of freedom: the standard deviation of a standard deviation is 4 %
     assert abs(seen.sigma[0] - 2e-3) < 4 * 0.043 * 2e-3
+
+
+def test_a_simulated_scale_bar_is_as_long_as_its_certificate():
+    """Otherwise gains would be estimated from a bar that is not the one that was measured."""
+    known = machine("wCAYFXZSt")
+    poses = plan(known, "probe", 60).with_header("distance", "1 2 150.000 0.0010")
+    data = simulate(poses, known, Faults(noise_um=0.1), seed=3)
+    seen = observe(data, known)
+    left = seen.values - seen.predict(known, fitted(seen))
+    assert abs(left[-1]) < 2e-3
+    assert np.abs(left[:-1]).max() < 2e-3
+
+
+def fitted(seen):
+    """The set-up by least squares, the machine known."""
+    guess = seen.unknowns.start
+    for _ in range(5):
+        rest = (seen.values - seen.predict(seen.machine, guess)) / seen.sigma
+        guess = guess + np.linalg.lstsq(seen.unknown_design(guess) / seen.sigma[:, None], rest, rcond=None)[0]
+    return guess

@@ -113,6 +113,16 @@ class Probing(Observation):
                 columns[each, :, first + 3 * self.tool_index + k] = carried[:, :, k]
         return np.concatenate([columns.reshape(3 * n, -1), self._lengths_design(unknowns)])
 
+    def with_bars(self, unknowns: Array, random: np.random.Generator) -> Array:
+        """The unknowns with the second ball of each calibrated distance as far away as its certificate has it."""
+        moved = unknowns.copy()
+        for first, second, length, uncertainty in self.distances:
+            balls = self._balls(moved)
+            way = balls[second] - balls[first]
+            true = length + uncertainty / COVERAGE * random.standard_normal()
+            balls[second] = balls[first] + way * (true / float(np.linalg.norm(way)))
+        return moved
+
     def _balls(self, unknowns: Array) -> Array:
         return unknowns[: 3 * len(self.balls)].reshape(-1, 3)
 

@@ -14,6 +14,7 @@ from ncfix.machine import Machine
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
+from ncfix.measure.probing import Probing
 
 ROUNDS = 50
 SETTLED = 1e-12
@@ -42,8 +43,11 @@ def simulate(plan: Measurement, machine: Machine, faults: Faults | None = None, 
     """The plan filled in as this machine would have it, shape as the plan; the same seed gives the same values."""
     faults = Faults() if faults is None else faults
     random = np.random.default_rng(seed)
-    unknowns = observe(_started(plan), machine).unknowns
+    seen = observe(_started(plan), machine)
+    unknowns = seen.unknowns
     setup = unknowns.start + faults.setup * unknowns.spread * random.standard_normal(len(unknowns.start))
+    if isinstance(seen, Probing):
+        setup = seen.with_bars(setup, random)
     filled, model = _settled(plan, machine, setup)
     values = model.predict(machine, setup)[: len(plan) * len(model.components)]
     turns = np.tile(_angles(model), 1 if len(_angles(model)) == len(values) else len(plan))
