@@ -78,3 +78,20 @@ def test_straightness_has_neither_mean_nor_slope_by_construction():
     chosen = {effect.name: effect.basis for effect in select(THREE, "EYX,EXX", knots=3).estimated}
     assert chosen["EYX"] == Truncated((-0.5, 0.0, 0.5), 2, (2,), (-1.0, 1.0))
     assert chosen["EXX"] == Truncated((-0.5, 0.0, 0.5), 2, (1, 2))
+
+
+def test_two_thermal_states_come_back():
+    """The structure follows its temperature fast one way and slowly the other (Soons, section 2.7)."""
+    line = Polynomial(degree=(1,))
+    states = tuple(
+        Effect("EXS", (size,), line, center=20.0, input="temp_structure", time_constant_s=constant)
+        for size, constant in ((0.004, 600.0), (-0.006, 6000.0))
+    )
+    time = np.linspace(0, 10 * 3600, 300)
+    warm = 20 + 8 * ((time // 5400) % 2) + 3 * np.sin(time / 4000)
+    poses = plan(THREE, "tcp", 300).with_columns({"time_s": time, "temp_structure": warm})
+    data = simulate(poses, THREE.replace(effects=states), Faults(noise_um=0.5), seed=1).with_header("setup", "rigid")
+    found = calibrate([data], THREE, "warming-X", time_constants=True)
+    for effect, true in zip(found.machine.effects, states, strict=True):
+        assert effect.time_constant_s == pytest.approx(true.time_constant_s, rel=0.03)
+        assert effect.coefficients[0] == pytest.approx(true.coefficients[0], rel=0.03)
