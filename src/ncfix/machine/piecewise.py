@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ncfix.machine import bspline
 from ncfix.machine.basis import Array, Basis, key
 
 BOTH, POSITIVE, NEGATIVE = "both", "positive", "negative"
@@ -114,10 +115,8 @@ class Spline(Basis):
         return self._sum(gains, u)
 
     def _sum(self, gains: Array, u: Array, order: int = 0) -> Array:
-        from scipy.interpolate import BSpline
-
-        spline = BSpline(np.asarray(self.knots), gains.T, self.degree)
-        return np.moveaxis(np.asarray(spline(np.clip(u, *self.domain), nu=order)), -1, 0)
+        evaluated = bspline.slopes if order else bspline.splines
+        return evaluated(np.asarray(self.knots), self.degree, gains, np.clip(u, *self.domain))
 
 
 @dataclass(frozen=True, slots=True)
