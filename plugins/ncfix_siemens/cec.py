@@ -19,6 +19,8 @@ WHOLE = 1e-6
 """How far from a whole number (MAX - MIN) / STEP may be."""
 STEEP = 0.01
 """mm per mm: no machine errs that fast."""
+MOST = 100_000
+"""Points of a table, beyond any control's."""
 CLEARLY = 1.001
 """How much larger than the largest positive value the largest negative one must be to be remarked on."""
 BOTH_WAYS = 0
@@ -154,6 +156,9 @@ def _last(found: _Found, low: float, high: float, step: float, remarks: Remarks)
         remarks.refuse(found.fields["STEP"].line, f"a step of {step:g} from {low:g} to {high:g}")
         return 0
     steps = (high - low) / step
+    if steps > MOST:
+        remarks.refuse(found.fields["STEP"].line, f"(MAX - MIN) / STEP is {steps:.6g}: no control has so many points")
+        return 0
     if abs(steps - round(steps)) > WHOLE:
         text = f"(MAX - MIN) / STEP is {steps:.6g}, not a whole number: the control would move the end"
         remarks.refuse(found.fields["STEP"].line, text)

@@ -13,6 +13,7 @@ from ncfix_siemens.table import PLACES, Table, number
 FIELDS = ("STEP", "MIN", "MAX", "IS_MODULO")
 VALUE = "AA_ENC_COMP"
 WHOLE = 1e-6
+MOST = 100_000
 
 
 def eec_text(table: Table, heads: Iterable[str]) -> bytes:
@@ -69,7 +70,7 @@ def _table(
     step, low, high = (float(fields[field].value) for field in FIELDS[:3])
     line = fields["STEP"].line
     steps = (high - low) / step if step > 0 else 0.0
-    if steps <= 0 or abs(steps - round(steps)) > WHOLE:
+    if not 0 < steps < MOST or abs(steps - round(steps)) > WHOLE:
         remarks.refuse(line, f"(MAX - MIN) / STEP is {steps:.6g}, not a whole number above zero")
         return None
     last = round(steps)

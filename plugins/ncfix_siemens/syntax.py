@@ -5,6 +5,7 @@ Function Manual Extended Functions, chapter K3: assignments to system variables,
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -40,8 +41,9 @@ class Assignment:
 
     @property
     def number(self) -> float | None:
-        """The value, if it is a number."""
-        return float(self.value) if NUMBER.fullmatch(self.value) else None
+        """The value, if it is a finite number."""
+        found = float(self.value) if NUMBER.fullmatch(self.value) else math.inf
+        return found if math.isfinite(found) else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load
@@ -374,6 +376,32 @@ def test_an_axis_corrected_in_two_places() -> None:
 )
 def test_good_files_are_not_remarked_on(content: bytes) -> None:
     assert not CONTROL.lint({"a.INI": content})
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(st.text())
+def test_any_text_is_written_again_as_it_was_read(text: str) -> None:
+    assert written(parsed(text)) == text
+
+
+SLIPS = [b"", b"0", b"1e999", b"-", b"1e-300", b"$", b"[", b"]", b"=", b"\n", b";", b",", b"AX3", b"7"]
+
+
+@settings(derandomize=True, max_examples=300, deadline=None)
+@given(st.sampled_from([GOOD, PAIR, EEC]), st.data())
+def test_damaged_files_are_refused_or_run_but_nothing_breaks(content: bytes, data: st.DataObject) -> None:
+    start = data.draw(st.integers(0, len(content)))
+    stop = data.draw(st.integers(start, min(start + 12, len(content))))
+    words = st.sampled_from(
+        [b"", b"0", b"1e999", b"-", b"1e-300", b"$", b"[", b"]", b"=", b"\n", b";", b",", b"AX3", b"7"]
+    )
+    damaged = content[:start] + data.draw(words | st.binary(max_size=4)) + content[stop:]
+    found = CONTROL.lint({"a.INI": damaged})
+    if any(message.code == "NCF491" for message in found):
+        with pytest.raises(ConfigError):
+            CONTROL.read({"a.INI": damaged})
+    else:
+        assert np.isfinite(at({"a.INI": damaged}, X=-50, Y=-50, Z=50)).all()
 
 
 def test_files_may_look_otherwise() -> None:
