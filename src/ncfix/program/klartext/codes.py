@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ncfix.program.klartext.control import RETRACTED, Control
-from ncfix.program.klartext.paths import Step
+from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words
 
 SUSPENDING = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ncfix.program.klartext.control import Control
-from ncfix.program.klartext.paths import Step, refuse
+from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
 from ncfix.program.klartext.tilting import cycle_19
 from ncfix.program.moves import Kind

@@ -7,14 +7,15 @@ import re
 from collections.abc import Mapping
 
 from ncfix.diagnostics import Place, SourceError
-from ncfix.program.klartext import cycles, paths, tilting
+from ncfix.program.klartext import cycles, lines, tilting
 from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
-from ncfix.program.klartext.paths import Step
+from ncfix.program.klartext.paths import PATHS
 from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.statements import statement
+from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words, axis_letters, set_pole
 from ncfix.program.klartext.tools import call_tool, define_tool
 from ncfix.program.klartext.units import Unit
@@ -268,15 +269,15 @@ class Interpreter:
         if calls and step.name.endswith("pat"):
             control.refuse_here("a pattern of holes (CYCL CALL PAT)")
         elif plan.moves and step.codes & {91, 92}:
-            paths.at_machine(control, step)
+            lines.at_machine(control, step)
         elif calls or (cycles.executes(control, step) and (plan.moves or 99 in step.codes)):
             cycles.call(control, step)
         elif step.name.startswith("appr "):
-            paths.approach(control, step)
+            lines.approach(control, step)
         elif step.name.startswith("dep "):
-            paths.departure(control, step)
+            lines.departure(control, step)
         elif plan.moves or step.name in ("ln",):
-            paths.PATHS[step.name](control, step)
+            PATHS[step.name](control, step)
         else:
             return
         control.path.corner = False

@@ -1,0 +1,180 @@
+"""Straight motions: L, LN, LP, blocks of words alone, machine coordinates, approach and departure.
+
+Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellaneous functions for coordinate data".
+"""
+
+import math
+
+from ncfix.program.klartext.control import RETRACTED, Control
+from ncfix.program.klartext.posture import angles_for
+from ncfix.program.klartext.step import Step, refuse, with_increments
+from ncfix.program.klartext.targets import (
+    Words,
+    command_of,
+    destination,
+    in_machine,
+    led,
+    polar,
+    polar_axes,
+)
+from ncfix.program.klartext.tilting import check_normal
+from ncfix.program.klartext.transformations import unit
+from ncfix.program.moves import Kind
+from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.control import Unknown
+from ncfix.program.rs274.coordinates import Vector, dot
+
+MACHINE_COORDINATES = "machine coordinates ({})"
+NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
+ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
+TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
+OFF = "a rapid after a retract (M140)"
+DEPARTURE = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
+FLAT = 1e-9
+
+
+def straight(control: Control, step: Step) -> None:
+    """L, LN, and blocks of words alone."""
+    control.use()
+    target, unknown = destination(control, step.words)
+    if not {"TX", "TY", "TZ"} & step.words.values.keys():
+        run(control, step, target, unknown, step.words.axes)
+        return
+    way = None if step.words.runtime else pointed(control, step.words)
+    if way is None:
+        refuse(control, ORIENTED)
+        return
+    control.points = True
+    for index, angle in way.items():
+        target[index] = angle
+        unknown.pop(index, None)
+    run(control, step, target, unknown, step.words.axes | sum(1 << index for index in way))
+
+
+def pointed(control: Control, words: Words) -> dict[int, float] | None:
+    """The rotary positions that point the tool along TX TY TZ, the nearest; None if that is not known."""
+    vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
+    if vector is None or not control.m128:
+        return None
+    x, y, z = (dot(row, vector) for row in control.rotation)
+    ways = angles_for(control, (x, y, z))
+    return ways[0] if ways else None
+
+
+def straight_polar(control: Control, step: Step) -> None:
+    """LP."""
+    control.use()
+    where, _ = polar(control, step.words)
+    axes = polar_axes(control, step.words)
+    target, unknown = command_of(control, where, axes)
+    run(control, step, target, unknown, axes, follows=True)
+
+
+def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
+    """A straight motion to a command."""
+    turned = any(control.rotary[index] and axes >> index & 1 for index in control.machine)
+    if turned and control.transformations.tilted and not control.m128:
+        turn_under_tilt(control, step, target, unknown, axes)
+        return
+    if control.shortest:
+        take_short_way(control, target, axes)
+    before = control.position, control.unknown
+    off = step.kind == Kind.RAPID and control.lost_to(RETRACTED, unknown)
+    with_increments(control, follows or step.words.incremental)
+    code = 0 if step.kind == Kind.RAPID else 10
+    control.move(step.kind, axes, target, unknown, code, refusal=check_normal(control), passing=OFF if off else "")
+    with_increments(control, False)
+    keep_tangent(control, *before)
+
+
+def keep_tangent(control: Control, start: Vector, unknown: Unknown) -> None:
+    """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
+    if any(index in unknown or index in control.unknown for index in range(3) if index in control.machine):
+        control.path.tangent = None
+        return
+    way = [b - a for a, b in zip(start[:3], control.position[:3], strict=True)]
+    length = math.hypot(*way)
+    if length > FLAT:
+        control.path.tangent = (way[0] / length, way[1] / length, way[2] / length)
+
+
+def take_short_way(control: Control, target: Vector, axes: int) -> None:
+    """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so."""
+    for index in control.machine:
+        if control.rotary[index] and axes >> index & 1 and index not in control.unknown:
+            turns = round((target[index] - control.position[index]) / (2 * math.pi))
+            control.position[index] += 2 * math.pi * turns
+
+
+def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int) -> None:
+    """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
+    linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
+    tcp.switch(control, control.offsets.tool, False)
+    control.refresh()
+    for index in control.machine:
+        if not control.rotary[index]:
+            target[index] = control.position[index]
+            unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
+    code = 0 if step.kind == Kind.RAPID else 10
+    refusal, passing = (MIXED_UNDER_TILT, "") if linear else ("", TURNS_UNDER_TILT)
+    control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing)
+    if linear:
+        control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
+    control.switch_tip()
+    control.path.tangent = None
+
+
+def own(unknown: Unknown, index: int) -> Unknown:
+    """The entry of one axis."""
+    return {index: unknown[index]} if index in unknown else {}
+
+
+def at_machine(control: Control, step: Step) -> None:
+    """A motion in machine coordinates: M91, or M92."""
+    target, unknown = in_machine(control, step.words)
+    code = "M91" if 91 in step.codes else "M92"
+    if code == "M92":
+        unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
+    was = control.tcp
+    if was:
+        tcp.switch(control, control.offsets.tool, False)
+        control.refresh()
+        target, unknown = in_machine(control, step.words)
+    control.move(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code))
+    if was:
+        control.switch_tip()
+    control.path.tangent = None
+
+
+# -- approach and departure -------------------------------------------------------------------------------------------
+
+
+def approach(control: Control, step: Step) -> None:
+    """APPR: to the first point of the contour, which its words give; the control makes the way there."""
+    control.use()
+    where = polar(control, step.words)[0] if " p" in step.name else led(control, step.words)
+    axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
+    target, unknown = command_of(control, where, axes)
+    control.path.corner = True
+    with_increments(control, step.words.incremental or " p" in step.name)
+    control.move(Kind.FEED, axes, target, unknown, 10)
+    with_increments(control, False)
+    control.path.tangent = None
+
+
+def departure(control: Control, step: Step) -> None:
+    """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it."""
+    if step.name.endswith("lct"):
+        approach(control, step)
+        return
+    tangent, control.path.tangent = control.path.tangent, None
+    plane = control.path.plane
+    lost: Unknown = {i: DEPARTURE for i in (plane.first, plane.second) if i in control.machine}
+    target = control.position[:]
+    if step.name == "dep lt" and tangent is not None and "LEN" in step.words.values and not step.words.runtime:
+        length = control.modal.unit * step.words.values["LEN"]
+        target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
+        lost = {}
+    axes = 1 << plane.first | 1 << plane.second
+    control.move(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing="departure from the contour (DEP)")
