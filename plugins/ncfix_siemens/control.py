@@ -55,7 +55,7 @@ class Siemens(Control):
 
     def write(self, request: Request) -> Written:
         """`NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
-        settings = checked(self.settings(request.settings), request.machine.axis_names)
+        settings = checked(self.settings(request.settings), request.machine)
         scheme = _scheme(request, settings)
         own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
         others = [term for term in scheme.tables.terms if not (settings.eec and _own(term))]
@@ -73,7 +73,7 @@ class Siemens(Control):
 
     def probe(self, request: Request) -> Written:
         """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
-        settings = checked(request.settings, request.machine.axis_names)
+        settings = checked(request.settings, request.machine)
         ranges = {
             axis.name: (low / axis.unit, high / axis.unit)
             for axis, (low, high) in zip(request.machine.axes, request.space.tolist(), strict=True)

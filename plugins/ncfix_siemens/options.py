@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ncfix.diagnostics import RefusedError, UsageError
+from ncfix.machine import Machine
 from ncfix.tables.control import Option
 from ncfix.tables.scheme import Limits
 from ncfix_siemens.cec import Style
-from ncfix_siemens.combine import TERMS
+from ncfix_siemens.combine import LETTERS, TERMS
 
 MODELS = {"840D": (40, 1000), "828D": (8, 200), "802D": (2, 350)}
 """Tables and points of each. 828D and 802D sl from the manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
@@ -55,8 +56,8 @@ class Settings:
         return self.limits.own_free
 
 
-def checked(given: Mapping[str, str], names: tuple[str, ...]) -> Settings:
-    """The settings for a machine with axes `names`; raises `UsageError` NCF485, `RefusedError` NCF484."""
+def checked(given: Mapping[str, str], machine: Machine) -> Settings:
+    """The settings for a machine; raises `UsageError` NCF485, `RefusedError` NCF484."""
     model = _one_of(given, "model", tuple(MODELS))
     tables, points = MODELS[model]
     eec = _one_of(given, "positioning", ("cec", "eec")) == "eec"
@@ -73,16 +74,20 @@ def checked(given: Mapping[str, str], names: tuple[str, ...]) -> Settings:
         model,
         limits,
         _one_of(given, "rotary", ("auto", "correct", "keep")),
-        machine_axes(given["axes"], names),
+        machine_axes(given["axes"], machine),
         style,
     )
 
 
-def machine_axes(given: str, names: tuple[str, ...]) -> dict[str, str]:
-    """Axis letter -> machine axis."""
-    odd = [name for name in names if name not in ORDER]
+def machine_axes(given: str, machine: Machine) -> dict[str, str]:
+    """Axis letter -> machine axis. The letter tells whether a position is in degree, so it must be one of its kind."""
+    names = machine.axis_names
+    odd = [axis.name for axis in machine.axes if axis.name not in ORDER or (axis.name in LETTERS) != axis.rotary]
     if odd:
-        raise RefusedError.of("NCF484", f"axes {' '.join(odd)}: letters {' '.join(ORDER)} are known")
+        text = f"axes {' '.join(odd)}: linear axes are X Y Z U V W, rotary axes A B C"
+        raise RefusedError.of(
+            "NCF484", text, hint="name them so in the machine file, or correct its programs: ncfix fix"
+        )
     if not given:
         return {name: f"AX{number}" for number, name in enumerate(sorted(names, key=ORDER.index), 1)}
     pairs = [pair.strip().partition(":")[::2] for pair in given.split(",")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -453,6 +454,15 @@ def test_wrong_settings(settings: dict[str, str]) -> None:
     with pytest.raises(UsageError) as caught:
         made(single_error("EXX"), **settings)
     assert caught.value.code == "NCF485"
+
+
+def test_letters_that_do_not_tell_degrees_from_millimetres() -> None:
+    machine = single_error("EXX")
+    axes = (replace(machine.axes[0], name="A"), *machine.axes[1:])
+    other = machine.replace(axes=axes, effects=(), topology="w F A Y Z t")
+    with pytest.raises(RefusedError, match="rotary axes A B C") as caught:
+        made(other)
+    assert caught.value.code == "NCF484"
 
 
 def test_a_scheme_that_takes_more_tables_than_there_are() -> None:
