@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -59,10 +60,11 @@ def test_the_schemes_have_the_tables_that_their_names_say(scheme: str, tables: i
 
 
 def test_forward_inverse_tables_are_for_their_chain_only() -> None:
-    machine = work.HU40
-    with pytest.raises(RefusedError) as caught:
-        fixed(Job(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "fik20")
-    assert caught.value.code == "NCF484"
+    moved = tuple(replace(axis, workpiece_side=axis.name in "CA") for axis in work.KOLIBRI.axes)
+    for machine in (work.HU40, work.KOLIBRI.replace(axes=moved, topology="w C A F Y X Z t")):
+        with pytest.raises(RefusedError) as caught:
+            fixed(Job(machine, ranges_of(machine), 0.0, 1e-3, Limits(40, 500)), "fik20")
+        assert caught.value.code == "NCF484"
 
 
 def test_trigonometric_tables_need_a_rotary_axis() -> None:

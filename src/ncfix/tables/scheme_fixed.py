@@ -113,7 +113,8 @@ def _trigo(machine: Machine, pivot: int) -> Form:
 
 
 def _forward_inverse(machine: Machine, name: str) -> Form:
-    if machine.axis_names != CHAIN:
+    sides = [axis.workpiece_side for axis in machine.axes]
+    if machine.axis_names != CHAIN or sides != [True, True, True, False, False]:
         text = f"{name} is for the chain w C A Y F X Z t; this machine is {machine.topology}"
         raise RefusedError.of("NCF484", text, hint="scheme=auto is for any machine")
     index = {letter: place for place, letter in enumerate(CHAIN)}
