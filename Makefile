@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy tables hidden ci clean
+.PHONY: demo test lint format accuracy bench tables hidden ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -21,6 +21,9 @@ format:
 
 accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." of it
 	OMP_NUM_THREADS=1 $(PYTHON) tests/validation/accuracy.py $(STUDIES)
+
+bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="100000 1000000" RUNS=5 LONG=10000000
+	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(SIZES),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG))
 
 tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
 	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py

@@ -21,7 +21,7 @@ from ncfix.cli.options import (
     subprograms,
     tolerance_option,
 )
-from ncfix.cli.parts import LONG, Fixed, Outlet, Source, outlet_for, part_bytes, source_of
+from ncfix.cli.parts import Fixed, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import STREAM, Target, shown, targets
 from ncfix.diagnostics import ExitCode, Message, NcfixError, Place, UsageError
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 @click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
 @click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
+@click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
 @click.option(
     "--jobs",
     type=click.IntRange(1),
@@ -120,9 +121,9 @@ class Job:
     def fixed(self, target: Target) -> Iterator[Fixed]:
         """The corrected program; a long one is corrected while it is read, if it can be."""
         with source_of(target.source) as source:
-            head = source.looked_into()
-            if len(head) < LONG or self.options.flatten:
-                yield self._whole(source, head if len(head) < LONG else source.everything())
+            head, long = source.looked_into()
+            if not long or self.options.flatten:
+                yield self._whole(source, source.everything() if long else head)
                 return
             dialect = dialect_of(head, shown(target.source), self.dialect, self.machine)
             with self._outlet(source, target, dialect) as (stream, outlet):

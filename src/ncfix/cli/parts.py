@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
     from ncfix.compensate.stream import Stamp
 
-LONG = 1 << 22
-"""Bytes from which on a program is long; a shorter one is read as a whole."""
+LONG = 4
+"""Parts from which on a program is long; a shorter one is read as a whole."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""
 
@@ -66,10 +66,11 @@ class Source:
     kept: IO[bytes] | None
     head: bytes = b""
 
-    def looked_into(self) -> bytes:
-        """The first `LONG` bytes, which `read` gives once more."""
-        self.head = self._read(LONG)
-        return self.head
+    def looked_into(self) -> tuple[bytes, bool]:
+        """The first bytes, which `read` gives once more, and whether there are so many that the program is long."""
+        many = LONG * part_bytes()
+        self.head = self._read(many)
+        return self.head, len(self.head) == many
 
     def read(self, size: int) -> bytes:
         """The next bytes, up to `size`; none at the end."""

@@ -1,0 +1,204 @@
+"""Times ncfix, LinuxCNC's interpreter and plain Lark in turn on the same files, and writes docs/performance.md.
+
+    make bench                         10^5 and 10^6 blocks, five runs each
+    make bench SIZES="100000" RUNS=3   other sizes, other numbers of runs
+    make bench LONG=10000000           and one run of a long file, for memory and scaling
+
+A figure is the median of whole processes: start of Python, imports, reading, following, correcting, proof and writing.
+CPU time is what is compared: it depends less on what else the machine does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import programs
+
+HERE = Path(__file__).resolve().parent
+PAGE = HERE.parent / "docs" / "performance.md"
+MACHINE = HERE / "five_axis.toml"
+MARK = "<!-- figures: written by `make bench` -->"
+LARK_LINES = 20_000
+"""Plain Lark is timed on so many lines, and the time scaled."""
+
+INI = """[RS274NGC]
+PARAMETER_FILE = {folder}/parameters.var
+RS274NGC_STARTUP_CODE = G21 G90 G17 G40 G49 G80 G94
+[TRAJ]
+LINEAR_UNITS = mm
+ANGULAR_UNITS = degree
+COORDINATES = X Y Z A B C
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One process: CPU and wall time, s, and peak memory, MB."""
+
+    cpu: float
+    wall: float
+    memory: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contender:
+    """A command, and by how much its times are to be multiplied."""
+
+    name: str
+    command: list[str]
+    environment: dict[str, str]
+    scale: float = 1.0
+
+    def run(self) -> Run:
+        """Run it once; raises CalledProcessError if it fails."""
+        begin = perf_counter()
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", **self.environment}
+        process = subprocess.Popen(
+            self.command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+        )
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        wall = perf_counter() - begin
+        if process.returncode:
+            raise subprocess.CalledProcessError(process.returncode, self.command)
+        return Run(self.scale * (usage.ru_utime + usage.ru_stime), self.scale * wall, usage.ru_maxrss / 1024)
+
+
+def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
+    """What is timed on a program."""
+    ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
+    output = folder / "out.nc"
+    fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(output), "--force", "--dialect", "linuxcnc"]
+    fix += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
+    found = [
+        Contender("ncfix, plain", fix, {"NCFIX_NO_FAST": "1"}),
+        Contender("ncfix, plain, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": "1"}),
+    ]
+    if has_numba():
+        found += [
+            Contender("ncfix, `fast`", fix, {"NCFIX_NO_FAST": ""}),
+            Contender("ncfix, `fast`, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": ""}),
+            Contender("ncfix, `fast`, two jobs", [*fix, "--jobs", "2"], {"NCFIX_NO_FAST": ""}),
+        ]
+    if shutil.which("rs274"):
+        ini, tools = folder / "bench.ini", folder / "tools.tbl"
+        ini.write_text(INI.format(folder=folder))
+        tools.write_text("T1 P1 Z0 ;\n")
+        (folder / "parameters.var").write_text("5220\t1.0\n")
+        command = ["rs274", "-g", "-n", "2", "-i", str(ini), "-t", str(tools), "-v", str(folder / "parameters.var")]
+        found.insert(0, Contender("rs274", [*command, str(program), os.devnull], {"HOME": str(folder)}))
+    lark = [sys.executable, str(HERE / "plain_lark.py"), str(program), str(LARK_LINES)]
+    return [*found, Contender("Lark alone, reads only", lark, {}, blocks / LARK_LINES)]
+
+
+def has_numba() -> bool:
+    """Whether the `fast` extra is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("numba") is not None
+
+
+def timed(program: Path, folder: Path, blocks: int, runs: int) -> dict[str, Run]:
+    """The median of each contender, which take turns; after one run that does not count."""
+    teams = contenders(program, folder, blocks)
+    results: dict[str, list[Run]] = {team.name: [] for team in teams}
+    for number in range(runs + 1):
+        for team in teams:
+            run = team.run()
+            if number:
+                results[team.name].append(run)
+                print(f"{program.name} {team.name}: {run.cpu:.2f} s CPU, {run.memory:.0f} MB", flush=True)
+    return {
+        name: Run(*(median(getattr(run, key) for run in each) for key in ("cpu", "wall", "memory")))
+        for name, each in results.items()
+    }
+
+
+def table(blocks: int, style: str, results: dict[str, Run]) -> list[str]:
+    """The figures of one file."""
+    reference = results.get("rs274")
+    rows = [f"### {spaced(blocks)} blocks, {style}", ""]
+    rows += ["| | CPU s | wall s | blocks/s CPU | times rs274 | peak MB |", "|---|---|---|---|---|---|"]
+    for name, run in results.items():
+        ratio = f"{reference.cpu / run.cpu:.2f}" if reference else ""
+        times, speed = f"{run.cpu:.2f} | {run.wall:.2f}", f"{blocks / run.cpu / 1000:.0f} k"
+        rows.append(f"| {name} | {times} | {speed} | {ratio} | {run.memory:.0f} |")
+    return [*rows, ""]
+
+
+def spaced(number: int) -> str:
+    """A large number with its digits in threes."""
+    return f"{number:,}".replace(",", " ")
+
+
+def main() -> None:
+    """Run all, and put the figures into the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sizes", type=int, nargs="*", default=[100_000, 1_000_000])
+    parser.add_argument("--styles", nargs="*", default=list(programs.STYLES))
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--long", type=int, default=0)
+    given = parser.parse_args()
+    text = [
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}, "
+    ]
+    text[0] += f"load {os.getloadavg()[0]:.1f} when it began; median of {given.runs}."
+    text.append("")
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        for blocks in given.sizes:
+            for style in given.styles:
+                path = folder / f"{style}.nc"
+                programs.write(path, blocks, style)
+                text += table(blocks, style, timed(path, folder, blocks, given.runs))
+        if given.long:
+            text += long_file(given.long, folder)
+        if given.sizes:
+            text += stages(folder)
+    page = PAGE.read_text()
+    PAGE.write_text(page[: page.index(MARK) + len(MARK)] + "\n\n" + "\n".join(text).rstrip() + "\n")
+
+
+def long_file(blocks: int, folder: Path) -> list[str]:
+    """One run each of a file and of one that is ten times as long."""
+    rows = ["### Ten times as long", "", "| blocks | CPU s | wall s | peak MB |", "|---|---|---|---|"]
+    times = []
+    for count in (blocks // 10, blocks):
+        path = folder / "long.nc"
+        programs.write(path, count, "full")
+        team = next(each for each in reversed(contenders(path, folder, count)[:-1]) if "jobs" not in each.name)
+        run = team.run()
+        times.append(run.cpu)
+        rows.append(f"| {spaced(count)} | {run.cpu:.1f} | {run.wall:.1f} | {run.memory:.0f} |")
+    return [*rows, "", f"Ratio of the times: {times[1] / times[0]:.2f}.", ""]
+
+
+def stages(folder: Path) -> list[str]:
+    """Where the time goes, from inside one run."""
+    path = folder / "stages.nc"
+    programs.write(path, 200_000, "full")
+    command = [sys.executable, str(HERE / "stages.py"), str(path)]
+    found = subprocess.run(
+        command, capture_output=True, text=True, check=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
+    )
+    return ["### Share of time of each stage, 200 000 blocks, full words", "", *found.stdout.splitlines(), ""]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""Long programs are corrected while they are read: the same bytes as a short one's, from files and through pipes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.diagnostics import ExitCode
+
+PART = 1000
+
+
+@pytest.fixture
+def long_program(tmp_path: Path) -> Path:
+    path = tmp_path / "long.ngc"
+    lines = [f"N{k} G1 X{10 + k % 70:.3f} Y{20 + k % 9:.3f} Z5. B{k % 11}. C{k % 13}." for k in range(400)]
+    path.write_text(
+        "\n".join(["%", "(LONG)", "G21 G90 G94 G54 G17 F900.", "G0 X10. Y20. Z5. B0. C0.", *lines, "M2", "%", ""])
+    )
+    return path
+
+
+@pytest.fixture
+def fix(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """`fix(part, arguments)`: in parts of so many bytes."""
+
+    def call(part: int, *arguments: object, stdin: bytes = b"") -> Any:
+        monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+        monkeypatch.setenv("NCFIX_NO_FAST", "1")
+        machine = root / "benchmarks" / "five_axis.toml"
+        offsets = ("--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc")
+        return ncfix("fix", *arguments, "-m", machine, *offsets, stdin=stdin)
+
+    return call
+
+
+def test_a_file(long_program: Path, fix: Any, tmp_path: Path) -> None:
+    outputs, parts = [], (1 << 20, PART, 5000)
+    for part in parts:
+        output = tmp_path / f"{part}.ngc"
+        result = fix(part, long_program, "-o", output)
+        assert result.code == ExitCode.DONE, result.err
+        outputs.append((output.read_bytes(), result.err.replace(str(output), "")))
+    assert outputs[0] == outputs[1] == outputs[2]
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "long.ngc",
+        *(f"{part}.ngc" for part in (1 << 20, PART, 5000)),
+    }
+
+
+def test_a_pipe(long_program: Path, fix: Any) -> None:
+    whole = fix(1 << 20, "-", stdin=long_program.read_bytes())
+    parts = fix(PART, "-", stdin=long_program.read_bytes())
+    assert (whole.code, parts.code) == (ExitCode.DONE, ExitCode.DONE)
+    assert whole.out == parts.out != long_program.read_bytes()
+
+
+def test_zero_is_assumed_further_down(long_program: Path, fix: Any) -> None:
+    source = long_program.read_bytes().replace(b"N300 ", b"G55 ")
+    whole = fix(1 << 20, "-", "--assume-zero", stdin=source)
+    parts = fix(PART, "-", "--assume-zero", stdin=source)
+    assert b"assumed zero: work offset G55" in whole.out
+    assert whole.out == parts.out
+
+
+def test_what_cannot_be_done_in_parts_is_done_as_a_whole(long_program: Path, fix: Any, tmp_path: Path) -> None:
+    source = long_program.read_bytes().replace(b"M2\n", b"o1 if [1]\nG1 X12.5\no1 endif\nM2\n")
+    assert fix(PART, "-", stdin=source).out == fix(1 << 20, "-", stdin=source).out
+    long_program.write_bytes(source)
+    assert fix(PART, long_program, "-o", tmp_path / "out.ngc").code == ExitCode.DONE
+    assert (tmp_path / "out.ngc").read_bytes() == fix(1 << 20, "-", stdin=source).out
+
+
+def test_a_refusal_writes_nothing(long_program: Path, fix: Any, tmp_path: Path) -> None:
+    long_program.write_bytes(long_program.read_bytes().replace(b"N200 G1 X", b"N200 G1 X9"))
+    result = fix(PART, long_program, "-o", tmp_path / "out.ngc", "--json")
+    assert result.code == ExitCode.REFUSED
+    assert [each["line"] for each in result.json()["files"][0]["refused"]][:1] == [205]
+    assert not (tmp_path / "out.ngc").exists()
+
+
+def test_a_pipe_cannot_be_taken_back(long_program: Path, fix: Any) -> None:
+    lines = b"".join(b"X%d.\n" % (10 + k % 50) for k in range(900))
+    source = long_program.read_bytes().replace(b"M2\n", lines + b"G91 G1 X9000.\nG90\nM2\n")
+    result = fix(PART, "-", "--allow-refused", stdin=source)
+    assert result.code != ExitCode.DONE
+    assert "NCF438" in result.err
+
+
+def test_writing_begins_before_the_input_ends(long_program: Path, root: Path) -> None:
+    command = [sys.executable, "-m", "ncfix", "fix", "-", "-m", str(root / "benchmarks" / "five_axis.toml")]
+    command += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc"]
+    environment = {**os.environ, "NCFIX_PART_BYTES": str(PART), "NCFIX_NO_FAST": "1"}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "env": environment}
+    source = long_program.read_bytes()
+    with subprocess.Popen(command, **pipes) as process:  # type: ignore[call-overload]
+        process.stdin.write(source[:8000])
+        process.stdin.flush()
+        first = process.stdout.read(500)
+        process.stdin.write(source[8000:])
+        process.stdin.close()
+        rest = process.stdout.read()
+    assert process.returncode == ExitCode.DONE
+    assert first.startswith(b"%\n(ncfix ")
+    assert rest.endswith(b"M2\n%\n")
+
+
+def test_figures_may_be_left_out(long_program: Path, fix: Any) -> None:
+    result = fix(PART, "-", "--no-figures", stdin=long_program.read_bytes())
+    assert result.out == fix(PART, "-", stdin=long_program.read_bytes()).out
+    assert "tip error" not in result.err
