@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ncfix.program.fanuc import polar, system
+from ncfix.program.fanuc.arithmetic import variable_number
 from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.flow import MacroFlow
@@ -20,7 +21,7 @@ from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
-from ncfix.program.tree import Literal, Opaque, Program, Template, Word
+from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 
 G15, G16, G20, G21 = 150, 160, 200, 210
 G65, G66, G66_1, G67 = 650, 660, 661, 670
@@ -57,7 +58,7 @@ class MacroInterpreter(Interpreter):
     ) -> None:
         super().__init__(control, program, resolve, max_blocks)
         self.modal_calls: list[ModalCall] = []
-        self.reduced: dict[tuple[int, frozenset[str]], Plan] = {}
+        self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
         self.moved = False
 
     def prepared(self) -> MacroFlow:
@@ -110,15 +111,16 @@ class MacroInterpreter(Interpreter):
 
     def without_vacant(self, plan: Plan) -> Plan:
         """The plan without the words whose value is a vacant variable: they count as not written."""
-        if not plan.computed:
+        if not plan.computed and not plan.code_words:
             return plan
-        vacant = frozenset(letter for letter, function, _ in plan.computed if math.isnan(function(self.control)))
-        if not vacant:
+        spans = [span for _, function, span in plan.computed if math.isnan(function(self.control))]
+        spans += [word.span for word, function in plan.code_words if math.isnan(function(self.control))]
+        if not spans:
             return plan
-        key = id(plan), vacant
+        key = id(plan), frozenset(spans)
         if key not in self.reduced:
             items = plan.template.items
-            kept = tuple(item for item in items if not (isinstance(item, Word) and item.address in vacant))
+            kept = tuple(item for item in items if not (isinstance(item, Word) and item.span in spans))
             self.reduced[key] = plan_of(Template(kept, plan.template.n_numbers), self.control.rules)
         return self.reduced[key]
 
@@ -157,7 +159,7 @@ class MacroInterpreter(Interpreter):
         for target, function, span in plan.assignments:
             self.span = span
             parameters.touched = False
-            number = whole(target(self.control), "the number of a variable") if callable(target) else int(target)
+            number = variable_number(target(self.control)) if callable(target) else int(target)
             parameters.check_writable(number)
             value = function(self.control)
             runtime = parameters.touched

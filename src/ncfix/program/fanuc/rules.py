@@ -11,6 +11,7 @@ from dataclasses import replace
 from ncfix.program.fanuc import data, polar, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
+from ncfix.program.fanuc.variables import is_system
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.groups import ISO_G, Rules, grouped
 from ncfix.program.rs274.settings import unfollowed
@@ -76,6 +77,7 @@ FANUC = Rules(
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
     takes=frozenset({40, 100, 270, 531, 650, 660, 661, 670}),
+    system=is_system,
     compiled=compiled,
 )
 

@@ -102,6 +102,7 @@ class Rules:
     m_groups    the group of every M code that is followed
     steps       G code -> what is done for it instead of what `order` says
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    system      whether a numbered parameter is one of the control's own, so that setting it does something
     compiled    (expression, the address it stands behind) -> the function that computes it
     """
 
@@ -111,6 +112,7 @@ class Rules:
     m_groups: Mapping[int, str] = field(default_factory=lambda: LINUXCNC_M)
     steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
     takes: frozenset[int] = frozenset()
+    system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
 
 

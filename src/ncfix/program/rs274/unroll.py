@@ -7,6 +7,7 @@ and the holes of a cycle with increments or repeats get a block each, in absolut
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -19,7 +20,7 @@ from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import RUNTIME_BRANCH
 from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
-from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Word
+from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
 
 if TYPE_CHECKING:
     from ncfix.program.rs274.interpreter import Interpreter
@@ -31,7 +32,7 @@ CALL_WORDS = frozenset("PLQ")
 KEPT = frozenset({"program name", "control character", "command"})
 """Opaque text that a flat program keeps."""
 
-OTHER_DECIMALS = 4
+OTHER_DECIMALS, VARIABLE_DECIMALS = 4, 6
 LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
 
 
@@ -134,11 +135,23 @@ class Recorder:
         match item:
             case Word():
                 return self.of_word(unit, index, item, codes, block)
-            case Assignment() | Flow():
+            case Assignment():
+                return self.of_assignment(unit, index, item)
+            case Flow():
                 return self.removal(unit, index, item)
             case Opaque(kind, _) if kind not in KEPT:
                 return self.removal(unit, index, item)
         return None
+
+    def of_assignment(self, unit: Unit, index: int, item: Assignment) -> Change:
+        """An assignment falls away, unless the control does something with what it sets: offsets, for one."""
+        target = item.target
+        if isinstance(target, Parameter) and isinstance(target.index, Literal):
+            number = round(float(unit.program.values_of(index)[target.index.slot]))
+            if self.control.rules.system(number):
+                value = self.control.parameters.numbers.values[number]
+                return Change(*unit.program.span(index, item.span), f"#{number}={trimmed(value, VARIABLE_DECIMALS)}")
+        return self.removal(unit, index, item)
 
     def of_word(self, unit: Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
         """What becomes of a word."""
@@ -167,6 +180,8 @@ class Recorder:
             dropped = round(10 * word.value.value) in DROPPED_CODES[word.address]
             return self.removal(unit, index, word) if dropped else None
         value = self.control.rules.compiled(word.value, word.address)(self.control)
+        if math.isnan(value):
+            return self.removal(unit, index, word)
         return Change(*unit.program.span(index, word.value_span), f"{value:g}")
 
     def removal(self, unit: Unit, index: int, item: Item) -> Change:
@@ -217,7 +232,8 @@ class Recorder:
         stop = end_of_words(unit, index)
         incremental = self.control.modal.incremental
         plane, level = self.control.modal.plane, self.control.modal.cycle.level / self.control.modal.unit
-        over = "".join(LETTERS[i] for i in (plane.first, plane.second) if LETTERS[i] in self.steps)
+        known = [i for i in (plane.first, plane.second) if block.axes >> i & 1 or i not in self.control.unknown]
+        over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
         named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
         letters = over + named.replace(LETTERS[plane.across], "") + LETTERS[plane.across]
         first = (" G90" if incremental else "") + self.place(holes[0], letters) + " R" + self.number_at("R", level)
