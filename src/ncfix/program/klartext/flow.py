@@ -67,6 +67,8 @@ class FlowControl:
         found = self.find(name)
         if found is None:
             raise Fault(NO_PROGRAM, f"the program {name} is not found", "put its file beside the program")
+        if found.mm != self.unit.mm:
+            raise Fault(NO_PROGRAM, f"the program {name} is written in another unit of length")
         self.push(outside=True)
         self.unit, self.block = found, found.begin
 

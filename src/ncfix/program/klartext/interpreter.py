@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from typing import Protocol
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.klartext import cycles, lines, tilting
-from ncfix.program.klartext.calculate import Evaluate
+from ncfix.program.klartext.calculate import Evaluate, Scope
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
@@ -30,6 +31,7 @@ ENDLESS = "NCF233"
 NO_END = "NCF234"
 SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
+WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
 NOT_KLARTEXT = "this line is not Klartext; the control stops at it"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
@@ -37,6 +39,13 @@ NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "
 """Addresses in motion blocks that lead nowhere."""
 
 CORNERS = frozenset({"rnd", "chf"})
+
+
+class Recorder(Protocol):
+    """Takes note of blocks that are executed; see `unroll`."""
+
+    def note(self, unit: Unit, block: int, scope: Scope, row: int) -> None:
+        """A block is about to be executed; `row` is the block of the main program that led to it."""
 
 
 class Interpreter:
@@ -49,6 +58,7 @@ class Interpreter:
         self.files: dict[str, Unit | None] = {}
         self.program = program
         self.flow: FlowControl | None = None
+        self.recorder: Recorder | None = None
         self.span: Span | None = None
         control.locate = self.place
 
@@ -98,6 +108,8 @@ class Interpreter:
                 control.row_block = block
             if plan.skip and self.is_skipped():
                 continue
+            if self.recorder is not None:
+                self.recorder.note(unit, block, control.scope, control.row_block)
             if self.execute(plan, flow):
                 return
         control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
@@ -168,8 +180,9 @@ class Interpreter:
         parameters.touched = False
         met = plan.test(self.control.scope) != 0.0
         if parameters.touched:
+            code = AT_RUN_TIME if self.recorder is None else WRITTEN_AT_RUN_TIME
             text = f"where the program goes on depends on {parameters.lacking}, which is known only at run time"
-            raise Fault(AT_RUN_TIME, text, f'variables."{parameters.lacking}" in the setup file gives it a value')
+            raise Fault(code, text, f'variables."{parameters.lacking}" in the setup file gives it a value')
         return met
 
     def assign(self, plan: Plan) -> None:

@@ -1,0 +1,125 @@
+"""A Klartext program written out flat: every block as it is executed, numbers for formulas, no labels, calls or jumps.
+
+Blocks that hold nothing but plain words go out as they stand, without their number. What is known only at run time
+stays as it is; a jump that depends on it cannot be written out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ncfix.program.flatten import TOO_LONG, FlatLine
+from ncfix.program.klartext.calculate import Scope, compiled
+from ncfix.program.klartext.interpreter import Interpreter
+from ncfix.program.klartext.number_text import Style
+from ncfix.program.klartext.units import Unit
+from ncfix.program.number_style import decimals_for
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.tree import Assignment, Constant, Expression, Literal, Opaque, Program, Span, Text, Word
+
+LEAST = 4
+"""Digits after the point of positions, as the control takes them; more where the least increment asks for it."""
+
+OTHERS = 6
+"""Of angles of planes, factors and Q parameters."""
+
+UNSIGNED = "FS"
+"""Addresses whose numbers have no sign."""
+
+NOT_WRITTEN = ("CALL PGM", "FN 14")
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Writes down blocks as they are executed.
+
+    main   the program that is written out
+    steps  axis letter -> least increment
+    limit  lines that may be written
+    style  of numbers
+    lines  those written so far
+    """
+
+    main: Program
+    steps: Mapping[str, float]
+    limit: int
+    style: Style
+    lines: list[FlatLine] = field(default_factory=list)
+
+    def note(self, unit: Unit, block: int, scope: Scope, row: int) -> None:
+        """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
+        plan = unit.plans[block]
+        if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
+            return
+        text = self.flat_text(unit.program, block, scope)
+        line = unit.program.line(block) if not unit.name else self.line_of_call(row)
+        for offset, part in enumerate(text.splitlines()):
+            self.lines.append(FlatLine(part.rstrip(), line + (offset if not unit.name else 0)))
+        if len(self.lines) > self.limit:
+            raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines")
+
+    def line_of_call(self, row: int) -> int:
+        """The line of the main program from which another one was called."""
+        return self.main.line(row)
+
+    def is_left_out(self, unit: Unit, block: int) -> bool:
+        """Whether a statement is not written: program ends, and what only makes sense with labels and calls."""
+        statement = unit.plans[block].statement
+        assert statement is not None
+        text = " ".join(unit.program.slice(block, statement[1]).upper().split())
+        return statement[0] == "program" or text.startswith(NOT_WRITTEN)
+
+    def flat_text(self, program: Program, block: int, scope: Scope) -> str:
+        """The text of a block with numbers for its formulas, and without its number."""
+        start, stop = (int(edge) for edge in program.blocks[block])
+        edits: list[tuple[int, int, str]] = []
+        for item in program.items_of(block):
+            if isinstance(item, Word) and item.address == "N":
+                edits.append((*program.span(block, item.span), ""))
+            elif isinstance(item, Word) and not isinstance(item.value, (Literal, Constant, Text)):
+                found = self.number(program, block, item.value_span, item.value, scope, self.digits(item.address))
+                edits += [(a, b, text.lstrip("+") if item.address[0] in UNSIGNED else text) for a, b, text in found]
+            elif isinstance(item, Assignment) and not isinstance(item.value, (Literal, Text)):
+                found = self.number(program, block, item.span, item.value, scope, OTHERS)
+                name = program.slice(block, item.span).split("=")[0].strip()
+                edits += [(a, b, f"{name} = {text}") for a, b, text in found]
+        text = program.source[start:stop].decode("latin-1")
+        for begin, end, new in sorted(edits, reverse=True):
+            text = text[: begin - start] + new + text[end - start :]
+        return text.lstrip(" \t")
+
+    def digits(self, address: str) -> int:
+        """Digits after the point of a word."""
+        step = self.steps.get(address.removeprefix("I"))
+        return OTHERS if step is None else max(LEAST, decimals_for(step))
+
+    def number(
+        self, program: Program, block: int, span: Span, value: Expression, scope: Scope, digits: int
+    ) -> list[tuple[int, int, str]]:
+        """The edit that puts a number in the place of a formula; none where it is known only at run time."""
+        scope.parameters.touched = False
+        found = compiled(value)(scope)
+        if scope.parameters.touched:
+            return []
+        text = self.style.number(found, digits)
+        return [(*program.span(block, span), text if digits != OTHERS else text.rstrip("0").rstrip(".,"))]
+
+
+def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int, comma: bool) -> Sequence[FlatLine]:
+    """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
+    recorder = Recorder(interpreter.program, steps, limit, Style(comma))
+    interpreter.recorder = recorder
+    interpreter.run()
+    program = interpreter.program
+    first = next(block for block in program if "BEGIN" in program.text_of(block).upper())
+    last = len(program) - 1
+    names = [
+        program.slice(block, item.span)
+        for block in (first, last)
+        for item in program.items_of(block)
+        if isinstance(item, Opaque) and item.kind == "program"
+    ]
+    head = FlatLine(names[0], program.line(first))
+    tail = FlatLine(names[0].upper().replace("BEGIN", "END", 1), program.line(last))
+    return [head, *recorder.lines, tail]
