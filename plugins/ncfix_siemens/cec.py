@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from ncfix.tables.lines import Remarks
+from ncfix_siemens.assigned import Assigned
 from ncfix_siemens.syntax import Assignment, Line, assignments
 from ncfix_siemens.table import PLACES, Table, number
 
 FIELDS = ("INPUT_AXIS", "OUTPUT_AXIS", "STEP", "MIN", "MAX", "DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
 NEEDED = FIELDS[:5]
 VALUE = "AN_CEC"
-WHOLE = 1e-6
-"""How far from a whole number (MAX - MIN) / STEP may be."""
 STEEP = 0.01
 """mm per mm: no machine errs that fast."""
-MOST = 100_000
-"""Points of a table, beyond any control's."""
 CLEARLY = 1.001
 """How much larger than the largest positive value the largest negative one must be to be remarked on."""
 BOTH_WAYS = 0
-Key = TypeVar("Key", int, str)
 FLIPPED = "ncfix writes it positive; a sign that is turned in both factors of a pair turns nothing"
 LARGE = 1.0
 """mm or degree: no machine is that wrong; most likely the unit is."""
@@ -61,17 +56,9 @@ def _assigned(table: Table, style: Style) -> Iterator[str]:
         yield f"$AN_CEC_{field}[{table.index}]={value}"
 
 
-@dataclass(slots=True)
-class _Found:
-    """The assignments of one table."""
-
-    fields: dict[str, Assignment]
-    values: dict[int, Assignment]
-
-
 def read_cec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     """The tables of a file, by index, with remarks; a table that is not complete is left out."""
-    found: dict[int, _Found] = {}
+    found: dict[int, Assigned] = {}
     for each in assignments(lines, remarks):
         _sort(each, found, remarks)
     tables = [_table(index, found[index], remarks) for index in sorted(found)]
@@ -80,7 +67,7 @@ def read_cec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     return good
 
 
-def _sort(each: Assignment, found: dict[int, _Found], remarks: Remarks) -> None:
+def _sort(each: Assignment, found: dict[int, Assigned], remarks: Remarks) -> None:
     name = each.name.upper()
     field = name.removeprefix(f"{VALUE}_")
     wanted = 2 if name == VALUE else 1
@@ -90,42 +77,28 @@ def _sort(each: Assignment, found: dict[int, _Found], remarks: Remarks) -> None:
     if len(each.indices) != wanted or not all(index.strip().isdecimal() for index in each.indices):
         remarks.refuse(each.line, f"${each.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets")
         return
-    numbers = [int(index) for index in each.indices]
-    table = found.setdefault(numbers[0], _Found({}, {}))
-    if name == VALUE:
-        _put(table.values, numbers[1], each, remarks)
+    index, *number = (int(text) for text in each.indices)
+    place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
+    table = found.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
+    if number:
+        table.put_value(number[0], each)
     else:
-        _put(table.fields, field, each, remarks)
+        table.put_field(field, each)
 
 
-def _put(place: dict[Key, Assignment], key: Key, each: Assignment, remarks: Remarks) -> None:
-    if key in place:
-        remarks.doubt(each.line, "is assigned twice: the control keeps the last", "a slip?")
-    place[key] = each
-
-
-def _table(index: int, found: _Found, remarks: Remarks) -> Table | None:
+def _table(index: int, found: Assigned, remarks: Remarks) -> Table | None:
     before = len(remarks.wrong)
-    gone = [field for field in NEEDED if field not in found.fields]
-    if gone:
-        first = next(iter([*found.values.values(), *found.fields.values()]))
-        names = ", ".join(f"$AN_CEC_{field}[{index}]" for field in gone)
-        remarks.refuse(first.line, f"table {index + 1} has no {names}: the control keeps what it had")
+    if found.lacks(NEEDED):
         return None
-    axes = [_axis(found.fields[field], remarks) for field in ("INPUT_AXIS", "OUTPUT_AXIS")]
-    step, low, high = (_number(found.fields[field], remarks) for field in ("STEP", "MIN", "MAX"))
-    direction, multiply, modulo = (_whole(found.fields.get(field), remarks) for field in FIELDS[5:])
-    if len(remarks.wrong) == before:
-        last = _last(found, low, high, step, remarks)
-        values = _values(index, found, last, remarks) if last else {}
-        _look_at_switches(found, direction, modulo, remarks)
-    if len(remarks.wrong) > before:
+    source, output = (_axis(found.fields[field], remarks) for field in NEEDED[:2])
+    direction = found.choice("DIRECTION", (0, 1, -1))
+    multiply = found.choice("MULT_BY_TABLE")
+    modulo = bool(found.choice("IS_MODULO", (0, 1)))
+    values = found.curve(modulo)
+    if values is None or len(remarks.wrong) > before:
         return None
-    table = Table(index, axes[0], axes[1], low, step, np.array([values[n] for n in range(last + 1)]))
-    table = Table(index, axes[0], axes[1], low, step, table.values, direction, multiply, bool(modulo))
-    if modulo and abs(table.values[0] - table.values[-1]) > 1e-6:
-        remarks.doubt(found.values[last].line, f"table {index + 1} repeats, but ends on another value than it begins")
-    return table
+    low, step = found.number("MIN"), found.number("STEP")
+    return Table(index, source, output, low, step, values, direction, multiply, modulo)
 
 
 def _axis(each: Assignment, remarks: Remarks) -> str:
@@ -135,58 +108,7 @@ def _axis(each: Assignment, remarks: Remarks) -> str:
     return name.upper()
 
 
-def _number(each: Assignment, remarks: Remarks) -> float:
-    if each.number is None:
-        comma = "a decimal comma" if "," in each.value else f"{each.value!r} is not a number"
-        remarks.refuse(each.line, comma, "a decimal point")
-        return 0.0
-    return each.number
-
-
-def _whole(each: Assignment | None, remarks: Remarks) -> int:
-    value = 0.0 if each is None else _number(each, remarks)
-    if each is not None and value != int(value):
-        remarks.refuse(each.line, f"{each.value} is not a whole number")
-    return int(value)
-
-
-def _last(found: _Found, low: float, high: float, step: float, remarks: Remarks) -> int:
-    """k = (MAX - MIN) / STEP, 0 if there is none."""
-    if step <= 0 or high <= low:
-        remarks.refuse(found.fields["STEP"].line, f"a step of {step:g} from {low:g} to {high:g}")
-        return 0
-    steps = (high - low) / step
-    if steps > MOST:
-        remarks.refuse(found.fields["STEP"].line, f"(MAX - MIN) / STEP is {steps:.6g}: no control has so many points")
-        return 0
-    if abs(steps - round(steps)) > WHOLE:
-        text = f"(MAX - MIN) / STEP is {steps:.6g}, not a whole number: the control would move the end"
-        remarks.refuse(found.fields["STEP"].line, text)
-        return 0
-    return round(steps)
-
-
-def _values(index: int, found: _Found, last: int, remarks: Remarks) -> dict[int, float]:
-    beyond = [each for place, each in sorted(found.values.items()) if place > last]
-    if beyond:
-        text = f"table {index + 1} has values 0 to {last} by its MIN, MAX and STEP; this one is ignored"
-        remarks.refuse(beyond[0].line, text, "one value too many, or MAX too small")
-    gone = [place for place in range(last + 1) if place not in found.values]
-    if gone:
-        line = found.fields["STEP"].line
-        text = f"{len(gone)} of {last + 1} values of table {index + 1} are missing, first $AN_CEC[{index},{gone[0]}]"
-        remarks.refuse(line, f"{text}: the control keeps what it had there")
-    return {place: _number(each, remarks) for place, each in found.values.items()}
-
-
-def _look_at_switches(found: _Found, direction: int, modulo: int, remarks: Remarks) -> None:
-    if direction not in (-1, 0, 1):
-        remarks.refuse(found.fields["DIRECTION"].line, f"direction {direction}", "0 both, 1 positive, -1 negative")
-    if modulo not in (0, 1):
-        remarks.refuse(found.fields["IS_MODULO"].line, f"modulo {modulo}", "0 or 1")
-
-
-def _look_at_products(tables: Iterable[Table], found: Mapping[int, _Found], remarks: Remarks) -> None:
+def _look_at_products(tables: Iterable[Table], found: Mapping[int, Assigned], remarks: Remarks) -> None:
     by_number = {table.index + 1: table for table in tables}
     pointed = {table.multiply for table in by_number.values() if table.multiply}
     for own, table in by_number.items():
@@ -213,7 +135,7 @@ def _look_at_pair(table: Table, other: Table | None, line: int, remarks: Remarks
         remarks.doubt(line, f"the largest value of the multiplier, table {table.multiply}, is negative", FLIPPED)
 
 
-def _look_at_sizes(table: Table, found: _Found, remarks: Remarks) -> None:
+def _look_at_sizes(table: Table, found: Assigned, remarks: Remarks) -> None:
     """A value that no machine needs, or a jump from one to the next; of tables that are added."""
     largest = int(np.argmax(np.abs(table.values)))
     if abs(table.values[largest]) > LARGE:
