@@ -47,7 +47,7 @@ from program.tracing import KNOWN, ends, follow, last, reasons
         "M98<NAME>",
         "X1.5;",
         "G68.2X1.Y2.Z3.I0J30.K0",
-        "CALL OO88",
+        "TOOLCHANGE 5",
     ],
 )
 def test_blocks_of_the_family_can_be_read(text: str) -> None:
@@ -67,6 +67,8 @@ def test_blocks_of_the_family_can_be_read(text: str) -> None:
         ("DEF REAL A", "NCF103"),
         ("o100 sub", "NCF103"),
         ('CGTECH_MACRO "A" "B"', "NCF103"),
+        ("G15 H1", "NCF103"),
+        ("CALL OO88", "NCF103"),
     ],
 )
 def test_what_is_not_of_the_family_is_refused_by_line(text: str, code: str) -> None:
@@ -103,10 +105,10 @@ def test_detection(source: bytes, expected: str) -> None:
 
 
 def test_a_command_that_is_not_known_is_kept_and_refuses_what_follows() -> None:
-    program = read(b"G0X1.\nCALL OO88\nG0X2.\nM30\n", dialect="fanuc")
+    program = read(b"G0X1.\nTOOLCHANGE 5\nG0X2.\nM30\n", dialect="fanuc")
     assert isinstance(program.items_of(1)[0], Opaque)
     found = trace(program, KNOWN, ("X", "Y", "Z"), frozenset())
-    assert reasons(found) == ["", "the command CALL is not known, and may move axes or change coordinates"]
+    assert reasons(found) == ["", "the command TOOLCHANGE is not known, and may move axes or change coordinates"]
 
 
 # -- the decimal point ------------------------------------------------------------------------------------------------

@@ -53,6 +53,7 @@ def flat(text: str, dialect: str, **options: object) -> str:
         ),
         ("fanuc", "G65P9A1.\nM30\nO9\nG0X#1\r\nM99\n", "G0X1.\nM30\n"),
         ("fanuc", "G0X1\nM30\n", "G0X1\nM30\n"),
+        ("fanuc", "G#1 G0X1.\nM30\n", "G0X1.\nM30\n"),
         ("linuxcnc", "#1=2\no1 sub\nG0 X#1 Y[#2]\no1 endsub\no1 call [3] [4]\nM2\n", "G0 X3. Y4.\nM2\n"),
         (
             "linuxcnc",
@@ -127,3 +128,10 @@ def test_generated_programs_of_linuxcnc_mean_the_same(seed: int) -> None:
     except NcfixError:
         return
     flatten(program, KNOWN, axes, rotary, dict.fromkeys(axes, 0.001))
+
+
+def test_offsets_that_the_program_sets_are_set_in_the_flat_program_too() -> None:
+    text = "#5221=[1+1]\n#1=3\nG0X#1\nM30\n"
+    program = read(text.encode(), "part", "fanuc")
+    found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), STEPS)
+    assert found.program.source.decode() == "#5221=2.\nG0X3.\nM30\n"

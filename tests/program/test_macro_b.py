@@ -91,6 +91,7 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
     "work offsets are variables": ("#5221=10.\nG0X1.\nG0X[#5221]", [[11, 0, 0], [20, 0, 0]]),
     "modes are variables": ("G91G0X1.\n#3=#4003\nG90X[#3]\nX#4001", [[1, 0, 0], [91, 0, 0], [0, 0, 0]]),
     "computed codes": ("#1=1\nG#1X5.F100.\nG[#1-1]X6.", [[5, 0, 0], [6, 0, 0]]),
+    "a vacant code is no code": ("G1X5.F100.\nG#9X6.", [[5, 0, 0], [6, 0, 0]]),
     "system alarms are no motion": ("IF[#1NE#0]GOTO5\n#3000=1(NO TOOL)\nN5G0X1.", [[1, 0, 0]]),
 }
 

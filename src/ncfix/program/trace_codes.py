@@ -72,6 +72,13 @@ TRACE_CODES: dict[str, Code] = {
         "Numbered parameters are #1 to #5602.",
         "Check the number, or the expression that computes it.",
     ),
+    "NCF214": Code(
+        "Tool length without a Z word",
+        "G43 or G49 stands in a block without Z. Some controls of the Fanuc family move the axis by the length then, "
+        "others (parameter TOS) only shift its coordinate, as ncfix takes it. Blocks up to the next Z word are "
+        "corrected for that height.",
+        "State Z in the block.",
+    ),
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",

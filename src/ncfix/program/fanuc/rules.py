@@ -67,6 +67,7 @@ FANUC = Rules(
         150: polar.switch,
         160: polar.switch,
         270: data.nothing,
+        **dict.fromkeys((430, 434, 435, 440, 490, 491), data.tool_offset),
         500: unfollowed,
         531: tilt.align,
         680: tilt.rotate,
