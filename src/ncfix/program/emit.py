@@ -358,9 +358,14 @@ def _last_pieces(pieces: Pieces) -> NDArray[np.intp]:
 
 
 def _jumps(moves: Moves) -> NDArray[np.bool_]:
-    """(n, n_axes) where a motion does not start where the one before ended."""
+    """(n, n_axes) where a motion does not start where the one before ended.
+
+    Where tool-centre-point control goes on or off, linear axes stand elsewhere as soon as the rotary axes are not quite
+    at zero any more, though the program may have left them there.
+    """
     jumps = np.zeros(moves.start.shape, dtype=bool)
     jumps[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
+    jumps[1:] |= (moves.tcp[1:] != moves.tcp[:-1])[:, None] & ~moves.rotary
     return jumps
 
 

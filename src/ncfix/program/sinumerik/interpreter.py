@@ -53,6 +53,7 @@ class Interpreter:
             or not {"AP", "RP"} & {each.address for each in plan.settings}
             for plan in plans
         )
+        control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
         for parameter in self.units[0].parameters:
             control.variables.scopes[0].kinds[parameter.name] = ""
 

@@ -28,6 +28,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     code = control.modal.motion
     if code in (0, 10):
         control.modal.straight = code
+    words.whole = words.block in control.solitary or control.modes.modal_cycle is not None
     oriented(control, words)
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if machine:

@@ -76,7 +76,7 @@ def by_vector(control: Sinumerik, words: Words) -> str:
         words.axes |= 1 << index
     control.points = True
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
-    words.whole = not even and stray(pointing, here, ways[0]) > FAR
+    words.whole |= not even and stray(pointing, here, ways[0]) > FAR
     return ""
 
 

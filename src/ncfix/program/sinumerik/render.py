@@ -46,9 +46,16 @@ class SinumerikRenderer(BlockRenderer):
         for word in self.layout.polar.values():
             self._remove(word)
         position = super()._first_piece(position, end)
+        if self.layout.polar and not self.added and not self.layout.axes:
+            self._stay_in_words(position)
         if self.layout.vector:
             self._turned_tool(position, end)
         return position
+
+    def _stay_in_words(self, position: FloatArray) -> None:
+        """A motion that leads nowhere keeps a word, since the modal code alone moves nothing."""
+        column = self.target.letters.index("X")
+        self._add("X", f"{0.0 if self.target.incremental else position[column]:.{self.target.decimals[column]}f}")
 
     def _polar_stays(self, end: FloatArray) -> bool:
         near = np.abs(end - self.target.nominal) < self.half

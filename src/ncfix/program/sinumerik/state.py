@@ -110,6 +110,7 @@ class Sinumerik(Control):
     over  rotary axes that the last motion took past a full turn
     edge  cutting edge in force (D), 0 for none
     whole  the motion must not be split
+    solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
     """
 
@@ -128,6 +129,7 @@ class Sinumerik(Control):
         self.edge = 0
         self.points = False
         self.whole = False
+        self.solitary: frozenset[int] = frozenset()
         self.variables = Variables.given(setup.variables)
         self.named = Named()
         super().__init__(setup, axes, rotary, dialect, kinematics)

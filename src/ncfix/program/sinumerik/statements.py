@@ -53,8 +53,11 @@ SETTINGS: dict[int, Handler] = {
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | {"pos"}
 """What with an axis as index lets it move on its own, `POS[X]=100`."""
 
-MOVING = frozenset({"AP", "RP", "AR", "TURN", *VECTOR}) | OTHERS
+MOVING = frozenset({"AP", "RP", *VECTOR}) | OTHERS
 """Words that make a block move even where no axis is named."""
+
+CIRCLE = frozenset({"I", "J", "K", "AR", "TURN"})
+"""Those that do it while G2 or G3 is in force."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
@@ -247,15 +250,15 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         turn.special.add("meas")
     if turn.used:
         return
-    if plan.axes or words.values.keys() & MOVING or is_full_circle(control, words):
+    if plan.axes or words.values.keys() & MOVING or is_circle(control, words):
         motion.moved(control, words, frozenset(turn.special))
         if control.modes.modal_cycle is not None and not turn.special:
             drill(control, control.modes.modal_cycle)
 
 
-def is_full_circle(control: Sinumerik, words: Words) -> bool:
-    """An arc with no end point: it ends where it began."""
-    return control.modal.motion in (20, 30) and bool(words.values.keys() & {"I", "J", "K"})
+def is_circle(control: Sinumerik, words: Words) -> bool:
+    """An arc with no end point: it ends where it began, or where its angle leads."""
+    return control.modal.motion in (20, 30) and bool(words.values.keys() & CIRCLE)
 
 
 def codes(control: Sinumerik, turn: Turn) -> None:

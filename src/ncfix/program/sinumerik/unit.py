@@ -16,6 +16,7 @@ from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.unit import view
 from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
 from ncfix.program.tree import Constant, Literal, Program, Word
+from ncfix.program.tree import Text as Label
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
@@ -173,6 +174,15 @@ class Unit:
         if word is None or not isinstance(word.value, Literal | Constant):
             return None
         return float(self.text.numbers[self.text.first[block]])
+
+    def solitary(self) -> Iterator[int]:
+        """The blocks that REPEATB repeats, or with which a section of REPEAT ends."""
+        for block in range(self.begin, self.stop) if self.labels else ():
+            for step in self.branchings(block):
+                if step.keyword == "repeatb":
+                    yield from self.blocks_of(step.label)
+                elif step.keyword == "repeat" and step.written and isinstance(step.written[0], Label):
+                    yield from self.blocks_of(step.written[0].value)
 
     # -- the procedure ------------------------------------------------------------------------------------------------
 
