@@ -34,6 +34,7 @@ FANUC = Dialect(
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*98[ \t]*<",
     ),
     foreign=(*FOREIGN, VERICUT, OKUMA, O_WORDS),
+    upper_case=True,
     closure_mm=0.01,
     language="ncfix.program.fanuc.language:FANUC",
     semantics="fanuc",

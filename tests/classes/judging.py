@@ -103,7 +103,7 @@ def by_line(case: Case, fixed: Fixed, before: Moves, after: Moves, refused: set[
     """Line by line."""
     lines, new = case.text.splitlines(), fixed.text.decode().splitlines()
     if fixed.changed:
-        stamp = next(n for n, line in enumerate(new) if "ncfix" in line)
+        stamp = next(n for n, line in enumerate(new) if "ncfix" in line.lower())
         del new[stamp]
     if len(lines) != len(new):
         return {0: f"{len(lines)} lines became {len(new)}"}

@@ -29,6 +29,7 @@ class Dialect:
     foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
     line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
+    upper_case          comments are written in upper case: older controls know no other letters
     closure_mm          an arc whose start and end radii differ by more is refused by the control
     closure_relative    the same relative to the radius (both must be exceeded)
     block_skip_executed blocks with `/` run unless the operator asks otherwise
@@ -51,6 +52,7 @@ class Dialect:
     foreign: tuple[tuple[str, bytes], ...] = ()
     line_limit: int = 0
     comment: str = "({})"
+    upper_case: bool = False
     closure_mm: float = 0.0283
     closure_relative: float = 0.001
     block_skip_executed: bool = True

@@ -24,7 +24,8 @@ def find(program: Program) -> int | None:
 
 def insertion(program: Program, text: str) -> Edit:
     """The edit that puts the stamp where the dialect allows: after `%` and the program's number, before all else."""
-    comment = program.dialect.comment.format(text.replace("(", "[").replace(")", "]"))
+    words = text.upper() if program.dialect.upper_case else text
+    comment = program.dialect.comment.format(words.replace("(", "[").replace(")", "]"))
     before = 0
     for block in program:
         if _is_head(program, block):
@@ -43,18 +44,24 @@ def insertion(program: Program, text: str) -> Edit:
 def _is_head(program: Program, block: int) -> bool:
     """A tape mark, program number or program name: what must stay in front."""
     items = program.items_of(block)
-    if not items or any(isinstance(item, Flow) for item in items):
-        return False
-    head = all(
+    head = bool(items) and all(
         isinstance(item, (Tape, Comment)) or (isinstance(item, Opaque) and "program" in item.kind) or _is_number(item)
         for item in items
     )
-    return head and not all(isinstance(item, Comment) for item in items)
+    return head and not all(isinstance(item, Comment) or _is_line_number(item) for item in items)
 
 
 def _is_blank(program: Program, block: int) -> bool:
     return all(isinstance(item, Comment) for item in program.items_of(block))
 
 
+def _is_line_number(item: object) -> bool:
+    return isinstance(item, Word) and item.address == "N"
+
+
 def _is_number(item: object) -> bool:
-    return isinstance(item, Word) and item.address == "O"
+    return (
+        _is_line_number(item)
+        or (isinstance(item, Word) and item.address == "O")
+        or (isinstance(item, Flow) and item.keyword == "program")
+    )
