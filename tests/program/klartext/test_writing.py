@@ -1,0 +1,100 @@
+"""How corrected Klartext looks: what changes, what stays, what is put in."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.program.reader import read
+from ncfix.program.writer import apply
+from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
+
+
+def lines(body: str, **more: object) -> list[str]:
+    """The blocks of the corrected program without its first, its stamp and its last."""
+    text = fixed(body, **more).text.decode("latin-1").splitlines()  # type: ignore[arg-type]
+    return [line for line in text if "ncfix" not in line and " PGM " not in line]
+
+
+def test_words_keep_their_manner() -> None:
+    found = lines("12 L X+100,5 Y50 Z-.25 R0 FMAX M3 ; note\n13 L  X101.  F500")
+    assert re.fullmatch(r"12 L X\+100,51\d* Y50[.,]00\d* Z-\.24\d* R0 FMAX M3 ; note", found[0])
+    assert re.match(r"13 L  X101\.01\d*  ", found[1])
+
+
+def test_new_words_have_a_sign_and_the_mark_of_the_program() -> None:
+    assert re.search(r" Y\+0,00\d\d| Y-0,00\d\d", lines("L X+100,0 Y+0,0 Z+0,0 FMAX\nL X+300,0 F500")[1])
+    assert re.search(r" Y[+-]0\.00\d\d", lines("L X+100.0 Y+0.0 Z+0.0 FMAX\nL X+300.0 F500")[1])
+
+
+def test_the_stamp_follows_the_first_block() -> None:
+    for text in (program("L X+100 FMAX"), b"0 BEGIN PGM 5 MM\r\n1 L X+100 FMAX\r\n2 END PGM 5 MM\r\n"):
+        found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(verify=False)).text.splitlines()
+        assert found[0] == text.splitlines()[0]
+        assert found[1].startswith(b"; ncfix ")
+
+
+def test_blocks_that_are_put_in_have_the_number_of_theirs() -> None:
+    found = lines("10 L X-300 Y+0 Z+0 FMAX\n20 L X+300 F500 M9\n30 L Y+5")
+    assert len(found) > 3
+    assert all(line.startswith("20 L ") for line in found[1:-1])
+    assert [("M9" in line) for line in found[1:-1]] == [False] * (len(found) - 3) + [True]
+    assert "F500" in found[1]
+
+
+def test_an_arc_becomes_one_by_its_radius() -> None:
+    found = lines("L X+100 Y+0 Z+0 FMAX\nCC X+100 Y+10\nC X+108.66 Y+5 DR+ F500")
+    assert found[1] == "CC X+100 Y+10"
+    assert (
+        re.fullmatch(r"(CR|CP) .*DR\+ F500", found[-1] if found[-1].startswith("C") else found[2]) or "CP" in found[3]
+    )
+
+
+def test_the_old_pole_comes_back_after_one_that_was_put_in() -> None:
+    found = lines("L X+100 Y+0 Z+0 FMAX\nCC X+100 Y+10\nC X+100 Y+20 DR+ F500\nLP PR+5 PA+90")
+    poles = [line for line in found if line.startswith("CC")]
+    assert poles[0] == "CC X+100 Y+10"
+    assert poles[-1] == "CC X+100.0000 Y+10.0000"
+    assert len(poles) >= 3
+
+
+def test_polar_lines_become_cartesian() -> None:
+    found = lines("L X+100 Y+0 Z+0 FMAX\nCC X+100 Y+10\nLP PR+10 PA+0 F500\nLP IPA+45")
+    assert re.fullmatch(r"L X\+110\.01\d* Y\+10\.00\d*.* F500", found[2])
+    assert not any("PA" in line for line in found)
+
+
+@pytest.mark.parametrize("body", ["L Z+100 FMAX M91", "CC X+1 Y+1", "TOOL CALL 3 Z S500", "LBL 5\nLBL 0"])
+def test_what_does_not_move_in_the_workpiece_keeps_its_bytes(body: str) -> None:
+    text = program("L X+100 Y+0 Z+0 FMAX\n" + body)
+    found = fix_program(read(text, "t.h"), THREE, KNOWN, FixOptions(verify=False)).text
+    assert all(line.encode() in found for line in body.splitlines())
+
+
+def test_a_corner_gets_no_word_of_the_tool_axis() -> None:
+    found = lines("L X+0 Y+0 Z+0 FMAX\nL X+100 F500\nRND R5\nL Y+150\nL X+0")
+    assert "Z" not in found[1]
+    assert "Z" not in found[3]
+    assert found[2] == "RND R5"
+
+
+def test_a_repeated_section_is_refused() -> None:
+    report = fixed("L X+0 Y+0 Z+0 FMAX\nLBL 1\nL IX+50 F100\nL Y+20\nCALL LBL 1 REP 3").report
+    assert {refusal.code for refusal in report.refused} == {"NCF433"}
+
+
+def test_without_a_correction_nothing_changes() -> None:
+    text = program("L X+1 ;note~\nand more\n7 C X5,0")
+    assert apply(read(text, "t.h").source, []) == text
+
+
+def test_a_corrected_program_is_not_corrected_again() -> None:
+    once = fixed("L X+100 Y+0 Z+0 FMAX")
+    assert once.changed
+    assert follow("L X+100 Y+0 Z+0 FMAX").stamp == ""
+    from ncfix.diagnostics import RefusedError
+
+    with pytest.raises(RefusedError, match="NCF430"):
+        fix_program(read(once.text, "t.h"), THREE, KNOWN)
