@@ -38,7 +38,7 @@ SIEMENS = Dialect(
         "CT, splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes",
         "A2 B2 C2, LEAD and TILT, vectors under ORIMKS; CYCLE800 by solid or projected angles",
         "holes and pockets that a cycle makes up; everything after a block or synchronized action not understood",
-        "blocks executed from several states",
+        "blocks executed from several states, without --flatten",
     ),
     language="ncfix.program.sinumerik.language:SINUMERIK",
 )

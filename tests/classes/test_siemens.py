@@ -86,6 +86,24 @@ FLOW = [
 ]
 
 
+FLAT = [
+    Case("a loop", f"{HEAD}FOR R1=1 TO 3\nG1 X=R1*2 Y=IC(R1) F100\nENDFOR\nX9\nM30\n", {0: R}, flat=True),
+    Case("a section repeated", f"{HEAD}G91\nMARK: G1 X1 F100\nREPEATB MARK P=3\nG90 X9\nM30\n", {0: R}, flat=True),
+    Case(
+        "a subprogram from two places",
+        f"{HEAD}SUB1(5)\nSUB1(7)\nM30\n%_N_SUB1_SPF\nPROC SUB1(REAL WIDE)\nG91 G1 X=WIDE F100\nG90\nM17\n",
+        {0: R},
+        flat=True,
+    ),
+]
+"""What is executed several times, with --flatten."""
+
+
+@pytest.mark.parametrize("each", FLAT, ids=lambda each: each.name)
+def test_flat_programs(each: Case) -> None:
+    assert judged(each, "siemens") == each.expected
+
+
 @pytest.mark.parametrize("each", [*WORDS, *ARCS, *FRAMES, *FLOW], ids=lambda each: each.name)
 def test_classes_of_siemens(each: Case) -> None:
     assert judged(each, "siemens") == each.expected

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 
 from ncfix.diagnostics import Place, SourceError
+from ncfix.program.flatten import RUNTIME, FlatLine
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.rs274.faults import Fault
@@ -15,8 +16,9 @@ from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.statements import BY_THEMSELVES, Turn, act, call_word, finish_block, let_axis_go, say
-from ncfix.program.sinumerik.sweep import demoted, sweep
+from ncfix.program.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix.program.sinumerik.unit import Unit, units_of
+from ncfix.program.sinumerik.unroll import Recorder
 from ncfix.program.tree import Program, Span
 
 ENDLESS = "NCF233"
@@ -45,6 +47,7 @@ class Interpreter:
         self.course = Course(control, self.units[0], self.units[0].begin)
         self.span: Span | None = None
         self.again: int | None = None
+        self.recorder: Recorder | None = None
         control.locate = self.place
         plans = self.units[0].text.plans
         self.at_once = not any(60 in plan.m for plan in plans)
@@ -86,6 +89,18 @@ class Interpreter:
             raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
         return demoted(self.control.builder.moves(), self.again)
 
+    def unrolled(self, recorder: Recorder) -> list[FlatLine]:
+        """The blocks of the program as they are executed; raises SourceError NCF237 where that is not known before."""
+        self.recorder = recorder
+        try:
+            self.walk()
+        except AtRuntimeError:
+            raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+        return recorder.lines
+
     def walk(self) -> None:
         """Block after block."""
         course, control = self.course, self.control
@@ -112,6 +127,8 @@ class Interpreter:
     def lane_is_open(self) -> bool:
         """Whether plain motions may go many at a time."""
         control = self.control
+        if self.recorder is not None:
+            return False
         quiet = not (control.modes.modal_cycle or control.lost or control.over or self.course.sections)
         return quiet and control.modes.diameter != "DIAM90"
 
@@ -152,6 +169,9 @@ class Interpreter:
         self.span = None
         if turn.subprogram is None:
             call_word(turn, self.find)
+        if self.recorder is not None:
+            main, line = not course.calls, self.place().line
+            self.recorder.record(control, unit, index, turn, main=main, line=line)
         finish_block(control, turn)
         return self.go_on(plan, turn)
 

@@ -72,7 +72,7 @@ class Turn:
     at_once     T itself changes the tool
     special     what applies to this block only: `supa`, `g53`, `meas`, `soft`
     frame       the name of a frame instruction, which takes the axis words
-    subprogram  what is called after the block, with its arguments, so many times
+    subprogram  what is called after the block, with its arguments, so many times; `called` is the name that does it
     modal       MCALL stands in the block
     ends        RET stands in the block
     used        something takes the axis words for itself
@@ -84,6 +84,7 @@ class Turn:
     special: set[str] = field(default_factory=set)
     frame: str = ""
     subprogram: Unit | None = None
+    called: Calling | None = None
     arguments: tuple[Evaluate, ...] = ()
     written: tuple[Expression | None, ...] = ()
     times: int = 1
@@ -210,7 +211,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     """A subprogram, or a cycle of the machine's builder."""
     unit = find(step.name)
     if unit is not None:
-        turn.subprogram, turn.arguments, turn.written = unit, step.arguments, step.written
+        turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
         turn.times = round(turn.words.get("P", 1.0))
         return
     if turn.modal:

@@ -1,0 +1,162 @@
+"""Blocks of SINUMERIK written down as they are executed, for a flat program.
+
+A block goes out as it stands, without its number and labels. Expressions give way to their values; assignments,
+definitions, control structures, calls of subprograms and their heads fall away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
+from ncfix.program.number_style import decimals_for
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.plans import Calling
+from ncfix.program.sinumerik.render import FORM
+from ncfix.program.sinumerik.statements import Turn
+from ncfix.program.sinumerik.unit import Unit
+from ncfix.program.sinumerik.values import Scope
+from ncfix.program.sinumerik.vocabulary import FORMS, HARMLESS
+from ncfix.program.tree import (
+    Assignment,
+    Call,
+    Command,
+    Constant,
+    Expression,
+    Flow,
+    Item,
+    Literal,
+    Opaque,
+    Span,
+    Text,
+    Unary,
+    Word,
+)
+
+OTHER_DECIMALS = 5
+"""Of words that are no axes."""
+
+MORE_DECIMALS = 2
+"""More than the least increment needs, so that increments do not add up to one."""
+
+ENDS = frozenset({2.0, 17.0, 30.0})
+"""M codes with which a subprogram ends."""
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Writes blocks down.
+
+    steps  axis letter -> least increment of its axis, mm or degree
+    limit  lines that may be written
+    """
+
+    steps: Mapping[str, float]
+    limit: int
+    lines: list[FlatLine] = field(default_factory=list)
+
+    def record(self, scope: Scope, unit: Unit, block: int, turn: Turn, *, main: bool, line: int) -> None:
+        """Write a block down as it is executed."""
+        if len(self.lines) >= self.limit:
+            raise Fault(TOO_LONG, f"the flat program would have more than {self.limit} lines")
+        text = unit.program.text_of(block)
+        start = int(unit.program.blocks[block, 0])
+        changes = []
+        for item in unit.plan(block).template.items:
+            new = self.rewritten(scope, item, turn, main=main)
+            if new is None:
+                continue
+            span, words = new
+            first, last = (place - start for place in unit.program.span(block, span))
+            changes.append((first, last, words if words is not None else self.number(item, turn, text[first:last])))
+        for first, last, words in sorted(changes, reverse=True):
+            text = text[:first] + words + text[last:]
+        text = text.strip()
+        if text.split(";")[0].strip() or (main and text):
+            self.lines.append(FlatLine(text, line))
+
+    def rewritten(self, scope: Scope, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
+        """The stretch of an item that changes and what it becomes (None: a number); None where the item stays."""
+        match item:
+            case Assignment() | Flow():
+                return item.span, ""
+            case Word():
+                return self.word(item, turn, main=main)
+            case Command():
+                return self.command(scope, item, turn)
+            case Opaque() if item.kind in ("program head", "external") and not (main and is_head(turn)):
+                return item.span, ""
+        return None
+
+    def word(self, word: Word, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
+        """What becomes of a word."""
+        repeats = any(getattr(step, "keyword", "").startswith("repeat") for step in turn.plan.steps)
+        dropped = word.address in ("N", ":") or (word.address == "P" and (turn.subprogram is not None or repeats))
+        dropped |= word.address == "L" and turn.subprogram is not None
+        dropped |= word.address == "M" and not main and isinstance(word.value, Constant) and word.value.value in ENDS
+        if dropped:
+            return word.span, ""
+        return None if is_plain(word.value) else (word.value_span, None)
+
+    def number(self, item: Item, turn: Turn, text: str) -> str:
+        """The value of a computed word as it is written, within its brackets if it has a form."""
+        assert isinstance(item, Word)
+        if item.address in turn.words.texts:
+            return f'"{turn.words.texts[item.address]}"'
+        value = turn.words.values.get(item.address)
+        if value is None:
+            raise Fault(RUNTIME, f"the value of {item.address} is known only at run time")
+        step = self.steps.get(item.address)
+        digits = OTHER_DECIMALS if step is None else decimals_for(step) + MORE_DECIMALS
+        shown = written(value, digits)
+        found = FORM.match(text) if isinstance(item.value, Call) and item.value.name in FORMS else None
+        return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
+
+    def command(self, scope: Scope, command: Command, turn: Turn) -> tuple[Span, str | None] | None:
+        """What becomes of a name."""
+        if command.name in ("def", "ret") or (turn.called is not None and turn.called.span == command.span):
+            return command.span, ""
+        if all(part is None or is_plain(part) for part in command.arguments):
+            return None
+        step = next(step for step in turn.plan.steps if isinstance(step, Calling) and step.span == command.span)
+        values = [
+            None if part is None else value(scope) for value, part in zip(step.arguments, step.written, strict=True)
+        ]
+        unknown = any(value is None and part is not None for value, part in zip(values, step.written, strict=True))
+        if unknown and command.name in HARMLESS:
+            return command.span, ""
+        if unknown:
+            raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
+        return command.span, f"{command.name.upper()}({','.join(map(argument, values))})"
+
+
+def is_plain(value: Expression) -> bool:
+    """Whether a value is written as a number or text, in brackets perhaps."""
+    match value:
+        case Literal() | Constant() | Text():
+            return True
+        case Unary(operator, operand):
+            return operator in "+-" and is_plain(operand)
+        case Call(name, arguments, False):
+            return name in FORMS and all(part is not None and is_plain(part) for part in arguments)
+    return False
+
+
+def is_head(turn: Turn) -> bool:
+    """Whether the block is the first line of a program of an archive, and no PROC."""
+    return not turn.plan.steps
+
+
+def argument(value: float | str | None) -> str:
+    """An argument as it is written."""
+    if value is None:
+        return ""
+    return f'"{value}"' if isinstance(value, str) else written(value, OTHER_DECIMALS)
+
+
+def written(value: float, digits: int) -> str:
+    """A number without superfluous zeros."""
+    text = re.sub(r"\.?0+$", "", f"{value:.{digits}f}") if digits else f"{value:.0f}"
+    return "0" if text in ("-0", "") else text
