@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -148,3 +150,19 @@ def test_the_skeleton_comes_from_the_planned_side():
     text = skeleton(Measurement("tcp", (), columns), known)
     assert "G53 G0 X8 Y0 Z0" in text
     assert "G53 G0 X10 Y0 Z0" in text
+
+
+@pytest.mark.parametrize(("name", "kind"), [("wCBXFZYSt", "tcp"), ("wCAYFXZSt", "probe")])
+def test_the_skeleton_stays_within_the_travels(name, kind):
+    """Also where an axis goes back before it comes from the wanted side."""
+    known = machine(name)
+    text = skeleton(candidates(known, kind, 400, ROOM, seed=3), known)
+    for axis in known.axes:
+        if np.isfinite(axis.range).all():
+            words = np.array(
+                [float(value) for value in re.findall(rf"^G53 .*\b{axis.name}(-?[\d.]+)", text, re.MULTILINE)]
+            )
+            low, high = (limit / axis.unit for limit in axis.range)
+            assert len(words) > 300
+            assert words.min() >= low - 1e-9
+            assert words.max() <= high + 1e-9

@@ -23,6 +23,8 @@ CORNERS = 0.4
 """Share of candidates of which each axis stands near one of its ends or the middle."""
 NEAR = 0.03
 """How near, as a share of the travel: not at the same place each time, or the places would have a common step."""
+APPROACH = {"linear": 2.0, "rotary": 1.0}
+"""mm and degree: how far an axis goes back before it comes from the wanted side."""
 TRIES = 20
 """How often more poses are drawn where few of them are within reach."""
 UNLIMITED_MM = 100.0
@@ -93,11 +95,19 @@ def _drawn(machine: Machine, count: int, room: Room, random: np.random.Generator
     for axis, share in zip(machine.axes, _spread(len(machine.axes), count, random).T, strict=True):
         low, high = room.of(axis)
         columns[axis.name] = np.round(low + (high - low) * share, DECIMALS)
-    columns |= {f"dir_{axis.name}": random.choice([-1.0, 1.0], count) for axis in machine.axes}
+    for axis in machine.axes:
+        columns[f"dir_{axis.name}"] = _sides(axis, columns[axis.name], random.choice([-1.0, 1.0], count), room)
     columns["tool_length"] = random.choice(np.asarray(room.tool_lengths, dtype=np.float64), count)
     for name, (low, high) in room.inputs.items():
         columns[name] = np.round(low + (high - low) * _spread(1, count, random)[:, 0], DECIMALS)
     return columns
+
+
+def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
+    """From which side the axis comes: as wanted, but from the inside where there is no room beyond."""
+    low, high = room.of(axis)
+    step = APPROACH["rotary" if axis.rotary else "linear"]
+    return np.where(position - low < step, -1.0, np.where(high - position < step, 1.0, wanted))
 
 
 def _reached(machine: Machine, columns: Mapping[str, Array], room: Room) -> NDArray[np.bool_]:
@@ -137,6 +147,9 @@ def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np
     if inside.sum() < 2:
         raise UsageError.of("NCF636", "no ball can be reached within the travels", hint="--ball NAME=X,Y,Z, --range")
     columns |= dict(zip(("mx", "my", "mz"), np.round(q[:, linear], DECIMALS).T, strict=True))
+    for k, read in zip(linear, ("mx", "my", "mz"), strict=True):
+        axis = machine.axes[k]
+        columns[f"dir_{axis.name}"] = _sides(axis, columns[read], columns[f"dir_{axis.name}"], room)
     kept = {name: values[inside] for name, values in columns.items() if name not in "XYZ"}
     return Measurement("probe", (), kept, {"ball": tuple(keys[k] for k in which[inside])})
 

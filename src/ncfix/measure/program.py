@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.machine import Machine
+from ncfix.measure.candidates import APPROACH
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.writer import number
 
 READ = dict(zip("XYZ", ("mx", "my", "mz"), strict=True))
-APPROACH = {"linear": 2.0, "rotary": 1.0}
-"""mm and degree: how far an axis goes back before it comes from the wanted side."""
 
 
 def skeleton(plan: Measurement, machine: Machine) -> str:
