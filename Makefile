@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench tables hidden ci clean
+.PHONY: demo test lint format accuracy bench tables hidden metamorphic refusals ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -30,6 +30,12 @@ tables:          ## all controls on all shipped machines into docs/controllers.m
 
 hidden:          ## the hidden-effect benchmark into docs/accuracy.md (an hour); FINAL=1 for the final seeds
 	$(PYTHON) -m tests.hidden --command $(dir $(PYTHON))ncfix $(if $(FINAL),--final) --table docs/accuracy.md
+
+metamorphic:     ## 500 pairs of programs for each relation of tests/metamorphic (an hour)
+	NCFIX_PAIRS=500 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/metamorphic
+
+refusals:        ## what becomes of the motion blocks of the corpus, all folders, also flat (half an hour)
+	NCFIX_CORPUS=1 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/classes/test_accounting.py
 
 ci:              ## what the server runs
 	.ci/run

@@ -148,7 +148,7 @@ def test_what_depends_on_the_machine_is_refused(text: str, reason: str) -> None:
 
 
 def test_reading_a_position_is_said() -> None:
-    found = follow("G0X1.\n#1=#5041\nG0Y2.", dialect="fanuc")
+    found = follow("G21G0X1.\n#1=#5041\nG0Y2.", dialect="fanuc")
     assert [message.code for message in found.messages] == ["NCF241"]
     assert reasons(found) == ["", ""]
 

@@ -79,6 +79,12 @@ TRACE_CODES: dict[str, Code] = {
         "corrected for that height.",
         "State Z in the block.",
     ),
+    "NCF215": Code(
+        "No unit",
+        "The program moves and has said neither G20 nor G21. What holds then is set on the control; ncfix takes "
+        "millimetres. If it is inches, positions are 25.4 times as large, and the corrections are for another place.",
+        "Put G20 or G21 at the beginning of the program.",
+    ),
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",

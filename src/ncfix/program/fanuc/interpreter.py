@@ -27,6 +27,7 @@ G15, G16, G20, G21 = 150, 160, 200, 210
 G65, G66, G66_1, G67 = 650, 660, 661, 670
 DRILLING = frozenset("KLQ")
 SCALED = frozenset("XYZABCUVWIJKRQ")
+NO_UNIT = "NCF215"
 CORNER = frozenset((",R", ",C", ",A"))
 ROUNDED_CORNER = "the control rounds or breaks the corner (,R ,C) by itself"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
@@ -60,6 +61,7 @@ class MacroInterpreter(Interpreter):
         self.modal_calls: list[ModalCall] = []
         self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
         self.moved = False
+        self.unit_said = False
 
     def prepared(self) -> MacroFlow:
         """Give the control its own variables; where execution begins."""
@@ -129,6 +131,7 @@ class MacroInterpreter(Interpreter):
         block = super().evaluate(plan, index)
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         if codes & {G20, G21}:
+            self.unit_said = True
             self.control.modal.unit = INCH if G20 in codes else 1.0
             self.control.refresh()
         for letter in plan.pointless:
@@ -170,6 +173,9 @@ class MacroInterpreter(Interpreter):
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""
         before = self.control.builder.count
+        if not self.unit_said:
+            text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
+            self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
         super().move(block, codes, motion)
         self.moved = self.control.builder.count > before
 
