@@ -49,6 +49,13 @@ if TYPE_CHECKING:
 @setup_options
 @click.option("--split-rapids", is_flag=True, help="Hold the tolerance along rapids too, not only at their ends.")
 @click.option("--flatten", is_flag=True, help="Write loops, subprograms and cycles out where they cannot be corrected.")
+@click.option(
+    "--block-numbers",
+    type=click.Choice(["same", "none", "renumber"]),
+    default="same",
+    show_default=True,
+    help="Klartext: of blocks that are put in, or all blocks anew.",
+)
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
 @click.option(

@@ -25,6 +25,7 @@ from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
 from ncfix.program import stamp
 from ncfix.program.emit import Reading
+from ncfix.program.language import language_of
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
@@ -61,6 +62,7 @@ def fix_program(
     refuse_stamped(program, options)
     if machine.is_perfect:
         return _untouched(program)
+    program = replace(program, dialect=replace(program.dialect, block_numbers=options.block_numbers))
     on_machine = placed(machine, setup)
 
     def follow(source: Program) -> Trace:
@@ -75,7 +77,14 @@ def fix_program(
     proof = proven(program, attempt, follow)
     errors = _errors(on_machine, proof.settled) if options.verify else None
     report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
-    return Fixed(proof.text, proof.text != program.source, report)
+    changed = proof.text != program.source
+    return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
+
+
+def _numbered(program: Program, text: bytes) -> bytes:
+    """The text with its blocks numbered anew, if that is asked for and the language has block numbers."""
+    renumber = language_of(program.dialect).renumber
+    return text if renumber is None or program.dialect.block_numbers != "renumber" else renumber(text)
 
 
 def refuse_stamped(program: Program, options: FixOptions) -> None:

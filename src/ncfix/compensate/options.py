@@ -15,6 +15,7 @@ class FixOptions:
     force          correct a program that carries a stamp
     split_rapids   hold the tolerance along rapids too, not only at their ends
     flatten        write the program out flat where blocks are executed from several states (`compensate.flat`)
+    block_numbers  of blocks that are put in, in languages that number all: "same", "none", or "renumber" for all anew
     verify         simulate the written program along the whole path (before and after figures)
     """
 
@@ -24,6 +25,7 @@ class FixOptions:
     force: bool = False
     split_rapids: bool = False
     flatten: bool = False
+    block_numbers: str = "same"
     verify: bool = True
 
     @property

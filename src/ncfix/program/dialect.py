@@ -30,6 +30,8 @@ class Dialect:
     line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
     upper_case          comments are written in upper case: older controls know no other letters
+    block_numbers       of blocks that are put in, where every block has one: "same" as the block that they belong to,
+                        "none", or "renumber": all blocks anew
     closure_mm          an arc whose start and end radii differ by more is refused by the control
     closure_relative    the same relative to the radius (both must be exceeded)
     block_skip_executed blocks with `/` run unless the operator asks otherwise
@@ -53,6 +55,7 @@ class Dialect:
     line_limit: int = 0
     comment: str = "({})"
     upper_case: bool = False
+    block_numbers: str = "same"
     closure_mm: float = 0.0283
     closure_relative: float = 0.001
     block_skip_executed: bool = True

@@ -86,6 +86,7 @@ class Language:
     arc_pieces  `render` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
+    renumber  a text with its blocks numbered anew; None where blocks need no numbers
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
     follower  as `follow`, but for a program that comes in parts; takes a dialect and then the arguments of `trace`
     """
@@ -100,6 +101,7 @@ class Language:
     lenient: bool = False
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
+    renumber: Callable[[bytes], bytes] | None = None
     unroll: Unroll | None = None
     follower: Callable[..., Follower] | None = None
 

@@ -98,3 +98,18 @@ def test_a_corrected_program_is_not_corrected_again() -> None:
 
     with pytest.raises(RefusedError, match="NCF430"):
         fix_program(read(once.text, "t.h"), THREE, KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("choice", "numbers"), [("same", ["10", "20", "20", "20"]), ("none", ["10", "20", "L", "L"]), ("renumber", [])]
+)
+def test_block_numbers_as_asked_for(choice: str, numbers: list[str]) -> None:
+    text = b"5 BEGIN PGM T MM\n10 L X-300 Y+0 Z+0 FMAX\n20 L X+300 F500\n\n/7 L Y+5\n9 END PGM T MM\n"
+    options = FixOptions(block_numbers=choice, verify=False)
+    found = fix_program(read(text, "t.h"), THREE, KNOWN, options).text.decode().splitlines()
+    moves = [line.split()[0] for line in found if " L " in f" {line}"]
+    if choice == "renumber":
+        assert [int(line.removeprefix("/").split()[0]) for line in found if line] == list(range(len(found) - 1))
+        assert found[-2].startswith("/")
+    else:
+        assert moves[:4] == numbers

@@ -12,6 +12,7 @@ from ncfix.program.klartext.blocks import parse_block
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.interpreter import Interpreter
 from ncfix.program.klartext.layout import layout_of, uses_comma
+from ncfix.program.klartext.numbering import renumbered
 from ncfix.program.klartext.render import render
 from ncfix.program.klartext.shapes import scan, split, whole_text
 from ncfix.program.klartext.unroll import unrolled
@@ -70,5 +71,6 @@ KLARTEXT = Language(
     layout=layout_of,
     render=render,
     arc_pieces=True,
+    renumber=renumbered,
     unroll=unroll,
 )

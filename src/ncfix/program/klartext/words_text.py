@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,6 +151,8 @@ class WordWriter:
         start = int(self.program.blocks[self.block, 0])
         at = self.program.position(self.block, self.layout.starts_at)
         text = self.program.source[start:at].decode("latin-1")
+        if self.program.dialect.block_numbers == "none":
+            text = re.sub(r"\d+[ \t]*", "", text)
         return "" if "\n" in text else text
 
     def _move_late_codes(self) -> None:
