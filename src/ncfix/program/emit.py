@@ -182,10 +182,7 @@ class _Emitter:
             self.position = np.where(jump, read[row], self.position)
 
     def _retract(self, row: int) -> None:
-        """After a canned cycle the control stands where it started along the axes along which it went back.
-
-        An earlier attempt may have shown otherwise (a height of the cycle's own): then that is believed.
-        """
+        """After a canned cycle the control stands where it started, unless an attempt has shown that it does not."""
         if row + 1 == len(self.moves) or self.reading.start is not None:
             return
         moves = self.moves
