@@ -126,6 +126,15 @@ def test_the_example_plugin_installs_and_works(root: Path, tmp_path: Path) -> No
     assert checked["files"][0]["dialect"] == "grbl"
 
 
+def test_the_example_with_tables_installs_and_works(root: Path, tmp_path: Path) -> None:
+    folder = install(root / "examples" / "third_party_tables", tmp_path / "site")
+    machine = str(root / "examples" / "machines" / "three_axis.toml")
+    found = run(["export", "weihong", "-m", machine, "-o", "tables"], tmp_path, folder)
+    assert found["class"] == "L-POS"
+    assert found["residual_um"]["after"]["rms"] < found["residual_um"]["before"]["rms"]
+    assert (tmp_path / "tables" / "axeserr.dat").exists()
+
+
 def test_the_core_depends_on_little(root: Path) -> None:
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
     names = {requirement.split(">")[0] for requirement in project["dependencies"]}

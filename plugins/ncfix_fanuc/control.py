@@ -15,6 +15,7 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.grid import Array
 from ncfix.tables.mesh import search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.volume import Volume
@@ -111,10 +112,13 @@ class Fanuc(Control):
             raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
         area = settings["fit"] == "area"
         volume = Volume(request.machine, AXES, request.space, request.tool_length, area)
-        mesh = search(volume, request.target, [SIDE] * 3, SIDE**3)
+        rounding = _magnification(volume.grid([4] * 3).values, style.largest * unit) * unit / 2
+        mesh = search(volume, max(request.target - rounding, request.target / 2), [SIDE] * 3, SIDE**3)
+        if not mesh.reached:
+            mesh = search(volume, request.target, [SIDE] * 3, SIDE**3)
         order = [mesh.grid.outputs.index(axis) for axis in AXES]
         values = mesh.grid.values[..., order]
-        magnification = max(1, math.ceil(float(np.abs(values).max()) / (style.largest * unit) - 1e-9))
+        magnification = _magnification(values, style.largest * unit)
         if magnification > MOST_MAGNIFICATION:
             text = f"a value of {float(np.abs(values).max()):.3f} mm needs a magnification of {magnification}"
             hint = f"the control takes {MOST_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
@@ -128,6 +132,8 @@ class Fanuc(Control):
             f"Grid {counts}: {mesh.grid.points} points; it misses {1e3 * mesh.left:.2f} um at most between them.",
             f"Magnification {magnification}: a value is rounded by up to {500 * magnification * unit:.2f} um.",
         ]
+        if magnification * unit / 2 > request.target:
+            notes.append("The rounding is larger than the target: a smaller detection unit would help.")
         if not mesh.reached:
             notes.append(f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis.")
         if request.machine.rotary.any():
@@ -154,6 +160,10 @@ def _sign(text: str) -> int:
     if text not in ("correction", "error"):
         raise UsageError.of("NCF485", f"sign={text}", hint="correction or error; FANUC-1 says how to find out")
     return 1 if text == "correction" else -1
+
+
+def _magnification(values: Array, largest: float) -> int:
+    return max(1, math.ceil(float(np.abs(values).max()) / largest - 1e-9))
 
 
 def _style(settings: Mapping[str, str]) -> Style:

@@ -13,7 +13,7 @@ from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
-from ncfix_heidenhain.com import Com, old_text, read_com
+from ncfix_heidenhain.com import LARGE, Com, old_text, read_com
 from ncfix_heidenhain.control import MOST, axes_of, choice, sign_of, unit_of, whole
 from ncfix_heidenhain.described import Component, component, rows
 
@@ -103,6 +103,9 @@ class KinematicsComp(Control):
         files, tables = {TABLE: kinematics_text(chain)}, {}
         for each in components:
             com = _com(each, axes, sense, angle)
+            if any(np.abs(values).max() > LARGE for values in com.columns.values()):
+                text = f"an error of {each.axis} beyond {LARGE} mm or degree"
+                raise RefusedError.of("NCF484", text, hint="is the error in mm and rad?")
             if com.columns:
                 tables[each.axis] = f"AXIS-{each.axis}.COM"
                 files[tables[each.axis]] = old_text(tables[each.axis], com, 7)

@@ -11,6 +11,8 @@ from ncfix.tables.grid import Array
 ARRIVED = 1e-7
 """mm: nearer to the intended tip than any control can resolve."""
 PASSES = 20
+ANEW = 5
+"""Passes for which a Jacobian is good: each takes the gap down by the gradient of the errors, a thousandth or so."""
 
 
 def linear_axes(machine: Machine) -> list[int]:
@@ -31,13 +33,15 @@ def exact_correction(machine: Machine, q: Array, state: State, start: Array | No
     columns = linear_axes(machine)
     correction = np.zeros_like(q) if start is None else start.copy()
     target = machine.tip(q, state.tool_length)
-    for _ in range(PASSES):
+    jacobian = np.empty((0, 3, 3))
+    for number in range(PASSES):
         gap = target - machine.actual_tip(q + correction, state)
         if not np.isfinite(gap).all():
             break
         if np.abs(gap).max(initial=0.0) < ARRIVED:
             return correction
-        jacobian = machine.axis_jacobian(q + correction, state.tool_length)[..., :3, columns]
+        if number % ANEW == 0:
+            jacobian = machine.axis_jacobian(q + correction, state.tool_length)[..., :3, columns]
         correction[:, columns] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
     raise RefusedError.of(
         "NCF482", "no correction found that brings the tip where it should be", hint="the error model may have a jump"

@@ -31,12 +31,23 @@ def positioning(machine: Machine, space: Array, tool_length: float, most: int, t
     for axis in sorted(range(len(space)), key=lambda index: not machine.rotary[index]):
         limit = target / 200 if machine.rotary[axis] else target
         done = Compensation(tuple(terms))
+        nodes = _nodes(machine, space, tool_length, axis, most, limit, done)
         for way in (1, -1):
-            grid = _table(machine, space, tool_length, axis, way, most, limit, done)
+            grid = _table(machine, space, tool_length, axis, way, nodes, limit, done)
             terms.append(Term((grid,), (machine.axis_names[axis], way)))
         if not any(term.factors[0].values.any() for term in terms[-2:]):
             del terms[-2:]
     return Compensation(tuple(terms))
+
+
+def _nodes(
+    machine: Machine, space: Array, tool_length: float, axis: int, most: int, limit: float, done: Compensation
+) -> Array:
+    """Where a table has its nodes: as many as the mean of both ways needs."""
+    low, high = space[axis].tolist()
+    fine = np.linspace(low, high, FINE)
+    count = nodes_needed(fine, _mean(machine, space, tool_length, axis, 0, fine, done), most, limit)
+    return np.linspace(low, high, count)
 
 
 def _table(
@@ -45,15 +56,11 @@ def _table(
     tool_length: float,
     axis: int,
     way: int,
-    most: int,
+    nodes: Array,
     limit: float,
     done: Compensation,
 ) -> Grid:
-    """One column: fewest nodes for both ways are not sought, a count serves both since it comes from the mean."""
-    low, high = space[axis]
-    fine = np.linspace(low, high, FINE)
-    count = nodes_needed(fine, _mean(machine, space, tool_length, axis, 0, fine, done), most, limit)
-    nodes = np.linspace(low, high, count)
+    """One column."""
     values = _mean(machine, space, tool_length, axis, way, nodes, done)
     values[np.abs(values) < 1e-3 * limit] = 0.0
     name = machine.axis_names[axis]
