@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from measure.poses import machine, plan
 from ncfix.machine import load
+from ncfix.measure.synthetic import Faults, simulate
+from ncfix.measure.writer import dumps
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +98,32 @@ def test_a_plan_says_what_it_cannot_do(ncfix, root, tmp_path):
     done = ncfix(*plan, "--effects", "load-X,EXX", *limits)
     assert done.code == 0, done.err
     assert ",load_kg" in (tmp_path / "p.csv").read_text()
+
+
+def test_ball_bars_and_direct_readings_have_figures_of_their_standards(ncfix, root, tmp_path):
+    path = root / "examples" / "machines" / "three_axis.toml"
+    known = machine("three_axis")
+    for kind, key, said in (("bar", "ball_bar", "ball-bar set 1: size"), ("axis", "positioning", "ISO 230-2: ")):
+        data = tmp_path / f"{kind}.csv"
+        data.write_text(dumps(simulate(plan(known, kind, 120), known, Faults(noise_um=1.0))))
+        found = ncfix(
+            "calibrate", data, "-m", path, "-o", tmp_path / f"{kind}.toml", "--effects", "EXX", "--json"
+        ).json()
+        assert found[key]
+        assert found["prediction"]["worst_um"] > found["prediction"]["rms_um"] > 0
+        done = ncfix("calibrate", data, "-m", path, "-o", tmp_path / f"{kind}.toml", "--effects", "EXX", "--force")
+        assert said in done.err
+        assert "sigma of the tip error over the travels" in done.err
+
+
+def test_knots_and_time_constants_are_options(ncfix, measured, tmp_path):
+    path, _, data = measured
+    options = ("-m", path, "-o", tmp_path / "m.toml", "--force")
+    bare = tmp_path / "bare.toml"
+    bare.write_text(path.read_text()[: path.read_text().index("[[effect]]")])
+    knotted = ncfix(
+        "calibrate", data, "-m", bare, "-o", tmp_path / "k.toml", "--effects", "EXX", "--knots", "2", "--json"
+    )
+    assert [row["name"] for row in knotted.json()["parameters"]][2:] == ["EXX above -0.333333", "EXX above 0.333333"]
+    done = ncfix("calibrate", data, *options, "--effects", "EXX", "--time-constants")
+    assert (done.code, "NCF639" in done.err) == (2, True)
