@@ -137,6 +137,24 @@ def test_numbers_without_a_point(text: str, no_point: str, expected: list[float]
     assert last(found) == [pytest.approx(value, abs=1e-9) for value in expected]
 
 
+@pytest.mark.parametrize("no_point", ["IS-B", "calculator"])
+def test_many_blocks_mean_what_single_ones_do(no_point: str) -> None:
+    """Stretches of plain motions are taken many at once; not where their numbers count increments."""
+    lines = [f"X{n * 10}Y{n}.5" for n in range(1, 60)]
+    found = ends(follow("G1F100.\n" + "\n".join(lines), dialect="fanuc", no_point=no_point))
+    size = 0.001 if no_point == "IS-B" else 1.0
+    assert found == [[pytest.approx(n * 10 * size), pytest.approx(n + 0.5), 0] for n in range(1, 60)]
+
+
+def test_polar_words_and_macro_calls_come_block_by_block() -> None:
+    lines = "\n".join(f"X10.Y{n}." for n in range(0, 90, 3))
+    found = ends(follow(f"G1F100.\nG16\n{lines}", dialect="fanuc"))
+    assert [math.hypot(x, y) for x, y, _ in found] == pytest.approx([10.0] * 30)
+    lines = "\n".join(f"X{n}." for n in range(1, 31))
+    called = follow(f"G1F100.\nG66P7\n{lines}\nG67\nM30\nO7\nG91Z1.\nG90\nM99", dialect="fanuc")
+    assert last(called)[2] == 30
+
+
 def test_rotary_words_count_their_own_increments() -> None:
     assert last(follow("G0A90500X1000", "XYZA", dialect="fanuc", no_point="IS-B")) == pytest.approx([1, 0, 0, 90.5])
 

@@ -88,11 +88,12 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
         "G66P1A3.\nG0X1.\nX2.\nF5\nG67\nX3.\nM30\nO1\nG0Z#1\nG0Z0.\nM99",
         [[1, 0, 0], [1, 0, 3], [1, 0, 0], [2, 0, 0], [2, 0, 3], [2, 0, 0], [3, 0, 0]],
     ),
+    "work offsets are in the unit of the program": ("G20\n#5221=1.\nG0X1.Y#5221", [[50.8, 25.4, 0]]),
     "work offsets are variables": ("#5221=10.\nG0X1.\nG0X[#5221]", [[11, 0, 0], [20, 0, 0]]),
     "modes are variables": ("G91G0X1.\n#3=#4003\nG90X[#3]\nX#4001", [[1, 0, 0], [91, 0, 0], [0, 0, 0]]),
     "computed codes": ("#1=1\nG#1X5.F100.\nG[#1-1]X6.", [[5, 0, 0], [6, 0, 0]]),
     "a vacant code is no code": ("G1X5.F100.\nG#9X6.", [[5, 0, 0], [6, 0, 0]]),
-    "system alarms are no motion": ("IF[#1NE#0]GOTO5\n#3000=1(NO TOOL)\nN5G0X1.", [[1, 0, 0]]),
+    "system alarms are no motion": ("IF[#1EQ#0]GOTO5\n#3000=1(NO TOOL)\nN5#3006=1(LOOK)\nG0X1.", [[1, 0, 0]]),
 }
 
 
@@ -112,6 +113,7 @@ STOPS = {
     "GOTO77": "NCF242",
     "WHILE[1EQ1]DO1\nG0X1.": "NCF242",
     "END1": "NCF242",
+    "IF[#1EQ#0]THEN#3000=5": "NCF216",
     "M98P7": "NCF231",
     "G65P7": "NCF231",
     "M98P1\nM30\nO1\nG0X1.\nO2\nM99": "NCF242",

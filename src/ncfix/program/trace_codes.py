@@ -85,6 +85,12 @@ TRACE_CODES: dict[str, Code] = {
         "millimetres. If it is inches, positions are 25.4 times as large, and the corrections are for another place.",
         "Put G20 or G21 at the beginning of the program.",
     ),
+    "NCF216": Code(
+        "Alarm of the program",
+        "The program sets #3000: the control stops with an alarm. It gets there with the offsets, tools and variables "
+        "that are given here.",
+        "Give the variables that the program checks, as variables in the setup file.",
+    ),
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",

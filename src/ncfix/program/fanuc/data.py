@@ -27,8 +27,6 @@ AFTER_ENGRAVING = "where the axis {} stands after engraving (G47) is not followe
 LENGTHS = (10,)
 UNFOLLOWED = {
     11: "tool wear (G10 L11)",
-    12: "tool radii (G10 L12)",
-    13: "tool radii (G10 L13)",
     50: "parameters of the control (G10 L50)",
     52: "parameters of the control (G10 L52)",
 }
@@ -55,7 +53,7 @@ def extended(control: Control, block: Block, code: int) -> None:
 
 def engrave(control: Control, block: Block, code: int) -> None:
     """G47 of Haas: the control writes a text by itself."""
-    unknown = dict(control.unknown) | {i: AFTER_ENGRAVING for i in (X, Y, Z) if i in control.machine}
+    unknown = control.unknown | {i: AFTER_ENGRAVING for i in (X, Y, Z) if i in control.machine}
     control.move(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal="engraving of text (G47)")
 
 

@@ -18,14 +18,18 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
 from ncfix.program.rs274.coordinates import INCH
 from ncfix.program.rs274.expressions import Evaluate
+from ncfix.program.rs274.groups import NON_MODAL
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
+from ncfix.program.rs274.order import DWELL
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 
 G15, G16, G20, G21 = 150, 160, 200, 210
 G65, G66, G66_1, G67 = 650, 660, 661, 670
+SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 DRILLING = frozenset("KLQ")
+"""K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 SCALED = frozenset("XYZABCUVWIJKRQ")
 NO_UNIT = "NCF215"
 CORNER = frozenset((",R", ",C", ",A"))
@@ -70,6 +74,10 @@ class MacroInterpreter(Interpreter):
         control.parameters.live = system.getters(control)
         control.parameters.position = self.position_read
         return MacroFlow(control, self.main, self.find)
+
+    def takes_stretches(self) -> bool:
+        """Not while a macro is called after every motion, or words are polar."""
+        return not self.modal_calls and self.control.polar is None
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
@@ -151,7 +159,7 @@ class MacroInterpreter(Interpreter):
             return False
         if codes is None:
             return letter not in DRILLING
-        if codes.g.get("non-modal") == 40:
+        if codes.g.get(NON_MODAL) == DWELL:
             return False
         cycle = (self.control.modal.motion if codes.motion is None else codes.motion) in ALL_CYCLES
         return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
@@ -185,15 +193,14 @@ class MacroInterpreter(Interpreter):
         """What a block does last: M2, M30, calls and returns. True if the program ends."""
         if codes.stop in PROGRAM_ENDS:
             return True
-        match codes.call:
-            case 980 | 1980:
-                self.subprogram(block)
-            case 970:
-                self.flow.enter_local(whole(block.get("P"), "P of M97"), whole(block.get("L", 1.0), "L of M97"))
-            case 990:
-                return self.returned(block)
-            case _:
-                self.call_modal()
+        if codes.call == RETURN:
+            return self.returned(block)
+        if codes.call in SUBPROGRAM:
+            self.subprogram(block)
+        elif codes.call == LOCAL_SUBPROGRAM:
+            self.flow.enter_local(whole(block.get("P"), "P of M97"), whole(block.get("L", 1.0), "L of M97"))
+        else:
+            self.call_modal()
         return False
 
     def returned(self, block: Block) -> bool:

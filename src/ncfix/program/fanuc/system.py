@@ -12,6 +12,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.systems import activate, before_persistent
+
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
 
@@ -23,6 +26,9 @@ OFFSETS = range(5221, 5327)
 LENGTHS = range(11001, 12000)
 """Tool lengths (geometry). What #2001 and #10001 are, lengths or their wear, depends on the kind of offset memory."""
 
+SPATIAL = range(3)
+ALARM, ALARM_RAISED = 3000, "NCF216"
+
 HARMLESS = (range(1000, 2000), range(3000, 3030), range(12001, 14000))
 """Interface signals, alarms and messages, clocks, and tool radii."""
 
@@ -31,13 +37,13 @@ SYSTEM_CODES = {1: 54, 2: 55, 3: 56, 4: 57, 5: 58, 6: 59, 0: 54.1}
 
 def getters(control: MacroControl) -> dict[int, Getter]:
     """Variables that the control computes when they are read."""
-    return positions(control) | modes(control)
+    return positions(control) | modes(control) | offsets(control)
 
 
 def positions(control: MacroControl) -> dict[int, Getter]:
     """End of the block before (5001), machine position (5021), present position (5041), by axis of the machine."""
     found: dict[int, Getter] = {}
-    for place, index in enumerate(control.machine):
+    for place, index in enumerate(sorted(control.machine)):
         found[5001 + place] = found[5041 + place] = partial(control.coordinate, index)
         found[5021 + place] = partial(machine_position, control, index)
     return found
@@ -47,6 +53,19 @@ def machine_position(control: MacroControl, index: int) -> float:
     """Where an axis stands in machine coordinates, program units."""
     control.settle((index,))
     return control.position[index] / control.unit_of(index)
+
+
+def offsets(control: MacroControl) -> dict[int, Getter]:
+    """Work offsets of X, Y and Z in program units; which number a rotary axis has depends on the machine."""
+    return {number: partial(offset, control, number) for number in OFFSETS if (number - OFFSETS.start) % 20 in SPATIAL}
+
+
+def offset(control: MacroControl, number: int) -> float:
+    """A work offset; it has to be given."""
+    before_persistent(control, number)
+    store = control.parameters.numbers
+    control.parameters.touched |= number in store.runtime
+    return store.values.get(number, 0.0) / control.modal.unit
 
 
 def modes(control: MacroControl) -> dict[int, Getter]:
@@ -72,10 +91,12 @@ def modes(control: MacroControl) -> dict[int, Getter]:
 
 def was_set(control: MacroControl, number: int, value: float, runtime: bool) -> None:
     """The program has set a variable of the control."""
-    if number in OFFSETS and (number - 5221) % 20 < len(control.machine):
-        from ncfix.program.rs274.systems import activate
-
-        if control.modal.system == 1 + (number - 5221) // 20:
+    if number == ALARM:
+        raise Fault(ALARM_RAISED, "the program raises an alarm here (#3000)", "the control stops")
+    system, place = divmod(number - OFFSETS.start, 20)
+    if number in OFFSETS and place in SPATIAL:
+        control.parameters.numbers.assign(number, control.modal.unit * value, runtime)
+        if control.modal.system == 1 + system:
             activate(control, control.modal.system)
     elif number in LENGTHS:
         set_length(control, number, value, runtime)

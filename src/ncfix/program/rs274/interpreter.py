@@ -106,7 +106,7 @@ class Interpreter:
                 self.at_end_of_text()
                 return
             plan = flow.unit.plan(flow.block)
-            if plan.lane is not None:
+            if plan.lane is not None and self.takes_stretches():
                 done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main)
                 if done:
                     if self.recorder:
@@ -119,6 +119,10 @@ class Interpreter:
             self.spend(1)
             if self.execute(plan):
                 return
+
+    def takes_stretches(self) -> bool:
+        """Whether plain motions may be taken many at once: nothing is done between them."""
+        return True
 
     def spend(self, blocks: int) -> None:
         """Count executed blocks; raises `Fault` when there are too many."""

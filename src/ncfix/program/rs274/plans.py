@@ -230,6 +230,8 @@ def lane_of(plan: Plan) -> Lane | None:
     plain = all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
     if not plain or plan.unread or plan.command or codes is None or plan.computed or not plan.letters <= LANE_LETTERS:
         return None
+    if any(letter in INDEX for letter in plan.pointless):
+        return None
     if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or codes.motion not in (None, 0, 10):
         return None
     axes = tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX)

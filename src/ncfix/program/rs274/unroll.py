@@ -149,7 +149,7 @@ class Recorder:
         if isinstance(target, Parameter) and isinstance(target.index, Literal):
             number = round(float(unit.program.values_of(index)[target.index.slot]))
             if self.control.rules.system(number):
-                value = self.control.parameters.numbers.values[number]
+                value = self.control.parameters.numbered(number)
                 return Change(*unit.program.span(index, item.span), f"#{number}={trimmed(value, VARIABLE_DECIMALS)}")
         return self.removal(unit, index, item)
 
