@@ -111,11 +111,11 @@ def _positions(remarks: Remarks, table: TextTable, path: str) -> Array:
             remarks.refuse(1, f"the unit is {match[2]}", "ncfix reads MM")
         if not table.ended:
             remarks.refuse(len(remarks.rows), "[END] is missing: the file may have been cut short")
-        nodes: Array = _values(remarks, table, POSITION)
+        nodes = _values(remarks, table, POSITION)
     else:
         match = OLD_BEGIN.fullmatch(table.begin)
         step = float(match[3]) if match else 0.0
-        nodes = (float(match[2]) if match else 0.0) + step * np.arange(len(table.rows))
+        nodes = (float(match[2]) if match else 0.0) + step * np.arange(len(table.rows), dtype=np.float64)
         if match and step <= 0:
             remarks.refuse(1, f"DISTANCE:{match[3]}", "a distance above zero")
     if not match:

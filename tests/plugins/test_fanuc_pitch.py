@@ -18,7 +18,7 @@ from ncfix.tables.export import export
 from ncfix.tables.lines import Remarks
 from ncfix.tables.poses import ranges_of
 from ncfix.testing import AXES, check_control, single_error
-from ncfix_fanuc.pitch import diffused
+from ncfix_fanuc.increments import diffused
 from ncfix_fanuc.pitch_text import Pitch, pitch_text, read_increments, read_records, records_text
 
 CONTROL = get_control("fanuc-pitch")
