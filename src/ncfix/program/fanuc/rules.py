@@ -77,6 +77,7 @@ FANUC = Rules(
         690: tilt.rotate,
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
+    cycles=ALL_CYCLES,
     takes=frozenset({40, 100, 270, 531, 650, 660, 661, 670}),
     system=is_system,
     compiled=compiled,

@@ -101,6 +101,7 @@ class Rules:
     harmless_g  G codes that are passed over
     m_groups    the group of every M code that is followed
     steps       G code -> what is done for it instead of what `order` says
+    cycles      G codes of canned cycles
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
     system      whether a numbered parameter is one of the control's own, so that setting it does something
     compiled    (expression, the address it stands behind) -> the function that computes it
@@ -111,6 +112,7 @@ class Rules:
     harmless_g: frozenset[int]
     m_groups: Mapping[int, str] = field(default_factory=lambda: LINUXCNC_M)
     steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
+    cycles: frozenset[int] = frozenset(CYCLES)
     takes: frozenset[int] = frozenset()
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)

@@ -15,7 +15,6 @@ from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import Course, FlowControl
-from ncfix.program.rs274.groups import CYCLES
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
@@ -298,7 +297,7 @@ class Interpreter:
             step = self.control.rules.steps.get(motion) or MOTIONS[motion]
             with self.polar_words(block):
                 step(self.control, block, motion)
-        if motion not in CYCLES:
+        if motion not in self.control.rules.cycles:
             self.control.modal.cycle.initial = None
 
     def after(self, codes: Codes, block: Block) -> bool:

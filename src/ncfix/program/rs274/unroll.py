@@ -101,7 +101,7 @@ class Recorder:
         if block.values.keys() & POLAR:
             self.polar(unit, index, made)
             return
-        drills = holes and self.is_cycle(motion) and not codes.takes
+        drills = holes and motion in self.control.rules.cycles and not codes.takes
         if drills and (len(holes) > 1 or self.control.modal.incremental):
             self.cycle(unit, index, plan, block, made, holes)
         else:
@@ -216,10 +216,6 @@ class Recorder:
         return decimals_for(self.steps.get(letter, min(self.steps.values())) / unit)
 
     # -- cycles -------------------------------------------------------------------------------------------------------
-
-    def is_cycle(self, motion: int) -> bool:
-        """Whether a motion code is a canned cycle."""
-        return motion in range(730, 900) and motion != 800
 
     def cycle(
         self, unit: Unit, index: int, plan: Plan, block: Block, changes: list[Change], holes: list[Vector]
