@@ -115,13 +115,14 @@ def has_numba() -> bool:
 
 
 def timed(program: Path, folder: Path, blocks: int, runs: int) -> dict[str, Run]:
-    """The median of each contender, which take turns; after one run that does not count."""
+    """The median of each contender, which take turns; of several runs one before them does not count."""
     teams = contenders(program, folder, blocks)
     results: dict[str, list[Run]] = {team.name: [] for team in teams}
-    for number in range(runs + 1):
+    warmup = int(runs > 1)
+    for number in range(warmup + runs):
         for team in teams:
             run = team.run()
-            if number:
+            if number >= warmup:
                 results[team.name].append(run)
                 print(f"{program.name} {team.name}: {run.cpu:.2f} s CPU, {run.memory:.0f} MB", flush=True)
     return {

@@ -21,7 +21,7 @@ PER_BEND = 8
 """Nodes for each time that the error may bend."""
 PER_PIECE = 32
 """Nodes to each piece expected; a piece is longest to one part in so many."""
-FEW = 20
+FEW = 14
 """Pieces with fewer nodes on average are worth a finer grid."""
 REFINEMENTS = 3
 INSTANT = 1e-7

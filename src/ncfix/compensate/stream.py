@@ -42,7 +42,7 @@ from ncfix.program.trace import MAX_BLOCKS
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
 
-PART_BYTES = 1 << 20
+PART_BYTES = 3 << 18
 """How much text is a part: the columns of a part take about thirty times as much memory."""
 MOST_PENDING = 64
 """Parts that may be put together before one of them ends where it may."""
