@@ -128,7 +128,7 @@ def written_pole(arc: PieceOfArc, middle: FloatArray, style: Style, digits: int)
 def helix(arc: PieceOfArc, style: Style, sense: str) -> ArcText:
     """CP with IPA about a pole that is equally far from both ends; the control works the end out."""
     begin, end = arc.begin[arc.columns], arc.end[arc.columns]
-    pole, words = written_pole(arc, equally_far(begin, end, arc.middle), style, POLE_DIGITS)
+    pole, words = written_pole(arc, equally_far(begin, end, arc.middle), style, max(POLE_DIGITS, arc.digits))
     angle = swept(arc, pole, begin, end)
     if arc.turn is not None:
         angle += 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.klartext.arc_text import ArcText, PieceOfArc, arc_text
+from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
 from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
 from ncfix.program.klartext.layout import Layout, poles_move
 from ncfix.program.klartext.number_text import value_of
@@ -246,7 +246,8 @@ class Renderer(WordWriter):
     def _old_pole(self) -> str:
         """The pole that was in force, which later blocks may rely on."""
         target = self.target
+        digits = max(POLE_DIGITS, int(target.decimals[target.spatial[target.plane[0]]]))
         pairs = sorted((index, float(target.original_centre[index])) for index in target.plane[:2])
         return "CC" + "".join(
-            f"{self.layout.blank}{'XYZ'[index]}{self.style.number(value, 4)}" for index, value in pairs
+            f"{self.layout.blank}{'XYZ'[index]}{self.style.number(value, digits)}" for index, value in pairs
         )
