@@ -155,6 +155,12 @@ def test_reading_a_position_is_said() -> None:
     assert reasons(found) == ["", ""]
 
 
+def test_a_skipped_condition_sets_nothing() -> None:
+    text = "IF[1EQ1]THEN#1=1.\n/IF[1EQ1]THEN#1=2.\nG0X#1"
+    assert last(follow(text, dialect="fanuc", no_point="calculator", block_skip=True)) == [1, 0, 0]
+    assert last(follow(text, dialect="fanuc", no_point="calculator")) == [2, 0, 0]
+
+
 def test_programs_beside_it_are_found_by_number_and_name() -> None:
     files = {"O0007": "O7\nG0X7.\nM99\n", "PART": "G0Y3.\nM99\n"}
     found = follow("M98P7\nM98<PART>", dialect="fanuc", files=files)

@@ -88,7 +88,7 @@ class MacroInterpreter(Interpreter):
 
     def execute(self, plan: Plan) -> bool:
         """Execute the block before `flow.block`; True if the program ends there."""
-        block = self.flow.block
+        block, self.flow.passed = self.flow.block, False
         ended = super().execute(plan)
         if plan.flow is not None and plan.flow.keyword == "if then" and self.flow.passed and self.flow.block == block:
             return self.execute_words(plan, block - 1)
