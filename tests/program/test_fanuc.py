@@ -269,6 +269,7 @@ def test_g53_in_increments_is_passed_and_loses_its_axes() -> None:
 def test_additional_work_offsets_of_haas() -> None:
     setup = Setup(work_offsets={"G54.1P3": {"X": 5.0, "Y": 0.0, "Z": 0.0}}, initial=dict.fromkeys("XYZ", 0.0))
     assert last(follow("G154P3\nG0X1.", setup=setup, dialect="haas")) == [6, 0, 0]
+    assert last(follow("G112\nG0X1.", setup=setup, dialect="haas")) == [6, 0, 0]
     assert last(follow("M97P50L2\nM30\nN50G91G0X1.\nM99", dialect="haas")) == [2, 0, 0]
 
 

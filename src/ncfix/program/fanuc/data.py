@@ -21,6 +21,7 @@ from ncfix.program.rs274.systems import (
 )
 
 WORK_OFFSETS = 6
+FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
 LENGTH_ALONE = "NCF214"
 ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
 AFTER_ENGRAVING = "where the axis {} stands after engraving (G47) is not followed"
@@ -47,8 +48,9 @@ def nothing(control: Control, block: Block, code: int) -> None:
 
 
 def extended(control: Control, block: Block, code: int) -> None:
-    """G154 Pn of Haas: an additional work offset."""
-    extended_system(control, block)
+    """G154 Pn of Haas, and G110 (P1) to G129 (P20): an additional work offset."""
+    number = (code - FIRST_EXTENDED) / 10 + 1 if code < ALL_EXTENDED else block.get("P", 1.0)
+    extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
 
 
 def engrave(control: Control, block: Block, code: int) -> None:

@@ -83,10 +83,13 @@ FANUC = Rules(
     compiled=compiled,
 )
 
+HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
+"""G154 P, and its first twenty by their own names G110 to G129."""
+
 HAAS = replace(
     FANUC,
-    g_groups=FANUC_G | {1540: groups.SYSTEM, 470: groups.NON_MODAL},
-    steps={**FANUC.steps, 1540: data.extended, 470: data.engrave},
+    g_groups=FANUC_G | {470: groups.NON_MODAL} | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
+    steps={**FANUC.steps, 470: data.engrave, **dict.fromkeys(HAAS_OFFSETS, data.extended)},
     takes=FANUC.takes | {470},
 )
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), and engraves texts."""
