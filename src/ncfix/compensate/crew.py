@@ -41,7 +41,7 @@ class Task:
 
     def errors(self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask) -> PathError:
         """The tip errors of motions `rows` (n,) before and after; without those of each motion."""
-        found = path_error(self.machine, moves, pieces, start, state=state, rows=rows)
+        found = path_error(self.machine, moves, pieces, start, state=state, rows=rows, tilts=False)
         nothing = np.empty(0)
         return PathError(found.before, found.after, nothing, nothing, found.samples, found.way)
 

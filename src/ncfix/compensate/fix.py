@@ -116,7 +116,7 @@ def _errors(machine: Machine, settled: Settled) -> PathError:
     """Tip errors before and after, with the numbers as the control will understand them."""
     emission = settled.emission
     pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
-    return path_error(machine, settled.moves, pieces, emission.start)
+    return path_error(machine, settled.moves, pieces, emission.start, tilts=False)
 
 
 def _figures(figures: Figures) -> dict[str, float | int | None]:

@@ -92,6 +92,7 @@ def path_error(
     rows: Mask | None = None,
     density: float = DENSITY,
     least: int = 2,
+    tilts: bool = True,
 ) -> PathError:
     """Tip errors of the real machine along the whole path, by simulation.
 
@@ -100,22 +101,27 @@ def path_error(
     rows     (n,) motions to look at; all that are not kept if not given
     density  samples for each time that the error model may bend
     least    fewest samples inside a piece over which the error may bend at all
+    tilts    find the tilts of the tool, too; else they are 0
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
     tally = _Tally(len(moves))
-    for part in samples(written, np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move]), density, least):
+    for part in samples(
+        written, np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move]), density, least, tilts
+    ):
         tally.add(part)
     return tally.result()
 
 
-def samples(written: Written, which: Index, density: float = DENSITY, least: int = 2) -> Iterator[Samples]:
+def samples(
+    written: Written, which: Index, density: float = DENSITY, least: int = 2, tilts: bool = True
+) -> Iterator[Samples]:
     """Look at pieces `which`, in batches."""
     counts, along = _counts(written, which, density, least)
     uneasy = uneasy_starts(written.intent, _kept_motions(written))
     for batch in batches(counts + 1, BATCH):
         piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
-        yield _looked_at(written, piece, fraction)
+        yield _looked_at(written, piece, fraction, tilts)
 
 
 def _counts(written: Written, which: Index, density: float, least: int) -> tuple[Index, Mask]:
@@ -148,7 +154,7 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     return which[owners(many)], fraction
 
 
-def _looked_at(written: Written, piece: Index, fraction: Array) -> Samples:
+def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> Samples:
     intent = written.intent
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
     lengths, states = intent.lengths(move), intent.states(move, at)
@@ -156,10 +162,12 @@ def _looked_at(written: Written, piece: Index, fraction: Array) -> Samples:
     tip = intent.machine.tip(intended, lengths)
     before = np.linalg.norm(intent.machine.actual_tip(intended, states) - tip, axis=1)
     after = np.linalg.norm(intent.machine.actual_tip(done, states) - tip, axis=1)
+    if not tilts:
+        return Samples(move, at, before, after, _way(written, piece), 0.0, 0.0)
     ends = np.flatnonzero(fraction == 1.0)
     meant = intent.machine.nominal(intended[ends], lengths if np.ndim(lengths) == 0 else lengths[ends])
-    tilts = [_tilt(intent.machine, q[ends], rows_of(states, ends), meant) for q in (intended, done)]
-    return Samples(move, at, before, after, _way(written, piece), *tilts)
+    found = [_tilt(intent.machine, q[ends], rows_of(states, ends), meant) for q in (intended, done)]
+    return Samples(move, at, before, after, _way(written, piece), *found)
 
 
 def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
