@@ -28,6 +28,8 @@ WORDS = [
     case("diameters", "DIAMON\nG1 X5 F100\nDIAMOF\nX7", L4=R, L6=R),
     case("radii beside diameters", "DIAM90\nG1 X6 F100\nG91 X1", L2=N, L4=N, L5=N),
     case("expressions of constants", "R1=5\nDEF REAL DEEP=-2\nG1 X=R1*2 Z=DEEP F100", L5=R),
+    case("a frame variable", "$P_UIFR[1,X,TR]=5\nG54 G1 X5 F100", L4=N),
+    case("tool data", "$TC_DP3[1,1]=100\nG1 X5 F100", L4=N),
     case("a value of the machine", "G1 X=$AA_IW[X]+1 F100\nG1 X5", L3=N, L4=N),
     case("block skip", "/G0 X5\nG0 Y5", L3=R, L4=R),
     case("dwell", "G4 F1\nG1 X5 F100", L4=R),

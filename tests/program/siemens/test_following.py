@@ -114,6 +114,27 @@ def test_a_variable_that_nobody_knows_makes_its_motions_refused() -> None:
     assert "known only at run time" in reasons(followed)[0]
 
 
+@pytest.mark.parametrize(
+    "branch",
+    [
+        'IF NOBODY_KNOWS==1\nMSG("x")\nR5=1\nELSE\nR5=2\nENDIF',
+        "IF NOBODY_KNOWS==1 GOTOF DOWN\nR5=1\nDOWN: R6=1",
+        "IF NOBODY_KNOWS==1\nIF R1==2\nR5=1\nENDIF\nM8\nENDIF",
+    ],
+)
+def test_a_branch_without_motions_needs_no_decision(branch: str) -> None:
+    followed = follow(f"R5=0\nG0 X1\n{branch}\nG0 X2\nG0 X=R5")
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+
+
+def test_the_tool_in_the_spindle_at_the_start_has_its_length() -> None:
+    setup = Setup(work_offsets=KNOWN.work_offsets, tools={0: Tool(50.0)}, initial=ZERO)
+    assert last(follow("G0 Z1", setup=setup))[2] == 51
+    assert last(follow("D0\nG0 Z1", setup=setup))[2] == 1
+    with pytest.raises(UsageError, match="tool that is in the spindle at the start"):
+        follow("G0 Z1", setup=Setup(work_offsets=KNOWN.work_offsets, initial=ZERO))
+
+
 def test_comparisons_without_brackets_are_not_guessed() -> None:
     followed = follow("R1=1\nIF R1==1 AND R2==2\nG0 X1\nENDIF\nG0 X2")
     assert (followed.moves.rule == Rule.REFUSE).all()

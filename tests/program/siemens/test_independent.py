@@ -21,7 +21,7 @@ from ncfix.program.reader import read
 from ncfix.program.trace import trace
 from program.siemens.following import KNOWN
 
-PROGRAMS = 150
+PROGRAMS = 80
 TOLERANCE = 2e-7
 """Relative to the largest number: single precision has 6e-8."""
 

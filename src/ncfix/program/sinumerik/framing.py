@@ -169,11 +169,25 @@ def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
             return
         control.edge = round(words.get("D"))
     if change or at_once or "D" in words.values:
+        control.at_start = False
         set_length(control)
+
+
+def take_up(control: Sinumerik) -> None:
+    """The program moves before it has called a tool or an edge: that in the spindle is in force, with its edge D1."""
+    if not control.at_start:
+        return
+    control.at_start = False
+    vector: Vector = zeros()
+    vector[2] = control.knowledge.tool_length(0)
+    control.tools.offset = 0
+    control.switch_tcp(vector)
 
 
 def set_length(control: Sinumerik) -> None:
     """The length of the tool in force, across the plane: the position stays, its name changes."""
+    if control.at_start:
+        return
     number, edge = control.tools.spindle, control.edge
     length = control.length_of(number, edge) if edge and number else 0.0
     vector: Vector = zeros()

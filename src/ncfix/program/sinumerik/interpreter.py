@@ -11,6 +11,7 @@ from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
+from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
@@ -31,6 +32,9 @@ SAFE_ACTION = re.compile(
     r"MEAWA|SYNFCT|FTOC)\b)",
     re.IGNORECASE,
 )
+
+OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_dp|tc_carr|m[nca]_|aa_off|ac_trans)|toff")
+"""Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 
 class Interpreter:
@@ -129,8 +133,8 @@ class Interpreter:
         control = self.control
         if self.recorder is not None:
             return False
-        quiet = not (control.modes.modal_cycle or control.lost or control.over or self.course.sections)
-        return quiet and control.modes.diameter != "DIAM90"
+        busy = control.at_start or control.modes.modal_cycle or self.course.sections
+        return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90")
 
     def spend(self, blocks: int) -> None:
         """Count executed blocks; raises `Fault` when there are too many."""
@@ -160,7 +164,10 @@ class Interpreter:
             match step:
                 case Letting(name) if name in BY_THEMSELVES:
                     let_axis_go(control, turn, step)
-                case Letting():
+                case Letting(name):
+                    if OF_THE_CONTROL.match(name):
+                        why = f"the program sets {name.upper()}, which may change coordinates or tool lengths"
+                        control.refusal = control.refusal or why
                     course.let(step)
                 case Calling():
                     act(control, turn, step, self.find)
@@ -189,7 +196,7 @@ class Interpreter:
                     raise AtRuntimeError
                 course.repeat(step, round(turn.words.get("P", 1.0)))
             else:
-                course.follow(step, plan.steps)
+                self.follow(step, plan)
             if step.keyword in ("if", "case"):
                 break
         if turn.ends or not PROGRAM_ENDS.isdisjoint(plan.m):
@@ -197,6 +204,14 @@ class Interpreter:
                 return True
             course.finish()
         return False
+
+    def follow(self, step: Branching, plan: Plan) -> None:
+        """Do what a control structure says; raises `AtRuntimeError` where only the control knows, and it matters."""
+        try:
+            self.course.follow(step, plan.steps)
+        except AtRuntimeError:
+            if self.recorder is not None or not bypassed(self.control, self.course, step, plan.steps):
+                raise
 
     def is_skipped(self) -> bool:
         """Whether blocks with `/` are passed over."""

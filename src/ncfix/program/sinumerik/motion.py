@@ -6,6 +6,7 @@ from ncfix.program.moves import Kind
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.sinumerik.circles import arc, through_point
 from ncfix.program.sinumerik.destination import End, Words, destination, machine_destination
+from ncfix.program.sinumerik.framing import take_up
 from ncfix.program.sinumerik.orientation import oriented
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
@@ -28,6 +29,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     code = control.modal.motion
     if code in (0, 10):
         control.modal.straight = code
+    take_up(control)
     words.whole = words.block in control.solitary or control.modes.modal_cycle is not None
     oriented(control, words)
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")

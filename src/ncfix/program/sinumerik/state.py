@@ -109,6 +109,7 @@ class Sinumerik(Control):
     lost  letter index -> why that coordinate of the program's frame is not known
     over  rotary axes that the last motion took past a full turn
     edge  cutting edge in force (D), 0 for none
+    at_start  the tool is still that with which the program began, with its edge D1
     whole  the motion must not be split
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
@@ -127,6 +128,7 @@ class Sinumerik(Control):
         self.lost: Unknown = {}
         self.over: tuple[int, ...] = ()
         self.edge = 0
+        self.at_start = True
         self.points = False
         self.whole = False
         self.solitary: frozenset[int] = frozenset()
@@ -278,6 +280,8 @@ class Sinumerik(Control):
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
         self.lost = end.lost
         refusal, self.whole = refusal or words.refusal, words.whole
+        if not passing and not refusal:
+            self.ask_for_length()
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
         self.whole = False
         self.forget_settled()
@@ -327,6 +331,12 @@ class Sinumerik(Control):
             self.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')
             return 0.0
         return known
+
+    def ask_for_length(self) -> None:
+        """A tool called by name that moves without its length offset: the machine's errors may depend on its length."""
+        number = self.tools.spindle
+        if self.tools.offset is None and self.named.name(number) != str(number) and self.given_length(number) is None:
+            self.length_of(number, 1)
 
     def given_length(self, number: int, edge: int = 1) -> float | None:
         """The length of a tool, mm, if the setup gives it."""
