@@ -103,7 +103,7 @@ def _some(inner: Array) -> Array:
 def _noise(view: View) -> tuple[float, float]:
     """Noise of a plain value, um, and how well it is known."""
     given = all(each.noise[0] is not None for each in view.measurements)
-    return 1e3 * float(np.median(view.problem.sigma)), KNOWN if given else WEAK
+    return view.sigma, KNOWN if given else WEAK
 
 
 def _contrasts(base: Array) -> Array:

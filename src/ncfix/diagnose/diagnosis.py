@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose import addition, checks, gapmap, holdout, mistakes, noise, outliers
+from ncfix.diagnose import addition, checks, gapmap, holdout, mistakes, next_poses, noise, outliers
 from ncfix.diagnose.background import Background, background
 from ncfix.diagnose.catalogue import Candidate, catalogue, without
 from ncfix.diagnose.evidence import Court
@@ -24,6 +24,11 @@ MATERIAL_UM = 0.8
 """An effect that moves the tool tip by less is not worth a name."""
 MOSTLY = 0.5
 """Share of the largest named effect from which on an unknown one decides the verdict."""
+NEAR = 10.0
+"""Log odds within which another name is near enough to ask for poses that tell them apart."""
+ALIKE = 3.0
+"""The same for names that are as likely."""
+RIVALS_MOST = 3
 LACKING = 1e-3
 """Probability of what is left by chance, below which something is missing that has no name."""
 EXCESS_UM = 2.0
@@ -93,6 +98,7 @@ class Diagnosis:
     before: Array = field(default_factory=lambda: np.zeros(0))
     after: Array = field(default_factory=lambda: np.zeros(0))
     mistake: mistakes.Mistake | None = None
+    proposal: next_poses.Proposal | None = None
     court: Court | None = None
 
 
@@ -169,7 +175,7 @@ def _concluded(
     findings = tuple(
         Finding(
             court.groups[members[k].group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
-            tuple(aliases(selected, name)), seen.rms(joint.shown[k], keep), effects, joint.shown[k],
+            tuple(aliases(selected, name, ALIKE)), seen.rms(joint.shown[k], keep), effects, joint.shown[k],
         )
         for (name, k), effects in zip(named, added, strict=True)
     )  # fmt: skip
@@ -202,7 +208,28 @@ def _concluded(
         p_left=p_left,
         view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
         before=joint.before, after=after, court=court,
+        proposal=_proposal(court, selected, named[0], joint, sigma) if named else None,
     )  # fmt: skip
+
+
+def _proposal(
+    court: Court, selected: Selected, first: tuple[str, int], joint: addition.Joint, sigma: float
+) -> next_poses.Proposal | None:
+    """Poses that tell the first name from those that come near it."""
+    name, k = first
+    runners = {n: odds for n, odds in selected.runners[name].items() if n not in UNNAMED}
+    reach = ALIKE if any(runners[n] > selected.odds[name] - ALIKE for n in runners) else NEAR
+    near = [n for n in sorted(runners, key=lambda n: -runners[n]) if runners[n] > selected.odds[name] - reach]
+    owners = {group.owner.name: group.owner for group in court.groups}
+    near = [n for n in near if not owners[n].grows][:RIVALS_MOST]
+    if not near or owners[name].grows:
+        return None
+    others = [member for key, member in selected.members.items() if key != name]
+    evidence = court.heard(others)
+    rivals = [evidence.best(court.forms[n]) for n in near]
+    chosen = court.groups[selected.members[name].group]
+    pairs = [(court.groups[r.group], r.size) for r in rivals]
+    return next_poses.propose(court, chosen, joint.numbers[k], pairs, sigma)
 
 
 def _kind(titles: Sequence[str], unknown_um: float) -> str:

@@ -21,6 +21,8 @@ VISIBLE = 0.05
 NEGLIGIBLE = 3e-3
 """Share of a form's squares that may be dropped."""
 UNSEEN_UM = 1e-9
+LED = 0.5
+"""Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,18 @@ def _form(view: View, candidate: Candidate, loading: Array, design: Array) -> Gr
     used = loading.any(axis=1)
     columns = design[:, used] @ loading[used]
     size = view.rms(np.linalg.norm(columns, axis=1))
-    if size < UNSEEN_UM:
+    if size < UNSEEN_UM or _led(candidate, loading, design) < LED * size**2 * view.count:
         return None
     turned = fewer(columns / size)
     return Group(candidate, loading @ turned / size, columns @ turned / size)
+
+
+def _led(candidate: Candidate, loading: Array, design: Array) -> float:
+    """Squares of what the effect itself shows, without what comes with it; all of it where nothing does."""
+    if not candidate.lead:
+        return np.inf
+    own = slice(0, sum(effect.basis.size for effect in candidate.effects[: candidate.lead]))
+    return float(((design[:, own] @ loading[own]) ** 2).sum())
 
 
 def fewer(columns: Array) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.diagnose.view import UM, is_free
+from ncfix.diagnose.view import UM, is_free, relative_noise
 from ncfix.machine import Effect, Machine
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Measurement
@@ -40,8 +40,9 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
     selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
     problem = Problem.of(measurements, machine, selection)
     free = sum(effect.basis.size for effect in loose)
-    sigma = UM * float(np.median(problem.sigma))
-    relative = UM * problem.sigma / sigma
+    known = [each.sigma for each in problem.observations if each.noise_known]
+    sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
+    relative = relative_noise(problem)
     tight, coefficients = _fitted(problem, relative, sigma, TIGHT_UM, free)
     wide, _ = _fitted(problem, relative, sigma, WIDE_UM, free)
     return Misfit(tight, wide, sigma, coefficients[len(coefficients) - free :] if free else np.zeros(0))

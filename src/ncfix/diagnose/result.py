@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnose.diagnosis import Diagnosis, Finding
+from ncfix.diagnose.next_poses import as_objects
 from ncfix.diagnose.words import why
 from ncfix.machine import Machine
 
@@ -20,7 +21,8 @@ def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
         "unknown": {"share_um": found.unknown_um, "where": found.unknown_kind},
         "gap_um": {name: getattr(found.gap, name) for name in found.gap.__dataclass_fields__},
         "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in found.patterns],
-        "next_measurements": [],
+        "next_measurements": as_objects(found.proposal.plan) if found.proposal and found.proposal.plan else [],
+        "ambiguity": _ambiguity(found),
         "machine": machine,
         "noise": {"sigma_um": found.floor.sigma_um, "source": found.floor.source, "freedom": found.floor.freedom},
         "lack_of_fit": {"before": found.p_lack, "after": found.p_left},
@@ -50,6 +52,13 @@ def _effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
         "aliases": list(finding.aliases),
         "remedy": finding.candidate.remedy,
     }
+
+
+def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
+    if found.proposal is None:
+        return None
+    p = found.proposal
+    return {"rivals": p.rivals, "reason": p.reason, "told_apart": {"now": p.before, "after": p.after}}
 
 
 def _outliers(found: Diagnosis) -> list[dict[str, Any]]:

@@ -22,13 +22,17 @@ def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Mach
     """The machine with its curves at the likeliest other place, and with a control that corrects there."""
     seen = view(data, machine)
     basis = orthonormal(seen.base / seen.relative[:, None])
-    curves = {axis.name: [e for e in machine.effects if _bent(e) and e.signal == axis.name] for axis in seen.reach.linear}
+    curves = {
+        axis.name: [e for e in machine.effects if _bent(e) and e.signal == axis.name] for axis in seen.reach.linear
+    }
     curves = {name: effects for name, effects in curves.items() if effects}
     if not curves:
         return
     ways = {name: _ways(seen.reach.spans[name]) for name in curves}
     shown = {
-        name: np.stack([_left(basis, seen.design(each) @ _values(each) / seen.relative) for each in _at(curves[name], ways[name])])
+        name: np.stack(
+            [_left(basis, seen.design(each) @ _values(each) / seen.relative) for each in _at(curves[name], ways[name])]
+        )
         for name in curves
     }
     own = {name: rows[len(rows) // 2] for name, rows in shown.items()}
@@ -66,7 +70,7 @@ def _left(basis: Array, values: Array) -> Array:
 
 def _found(y: Array, shown: dict[str, Array]) -> dict[str, int]:
     """The place of each axis's curves that leaves least, one axis after another."""
-    chosen = {name: PLACES // 2 for name in shown}
+    chosen = dict.fromkeys(shown, PLACES // 2)
     for _ in range(ROUNDS):
         for name, rows in shown.items():
             rest = y - sum((shown[other][k] for other, k in chosen.items() if other != name), np.zeros(len(y)))
@@ -81,7 +85,9 @@ def _machine(
     if not corrected:
         return machine.replace(effects=tuple(moved.get(id(e), e) for e in machine.effects))
     against = tuple(replace(e, coefficients=tuple(-c for c in e.coefficients)) for e in moved.values())
-    constants = tuple(e if id(e) in moved else replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects)
+    constants = tuple(
+        e if id(e) in moved else replace(e, coefficients=(0.0,) * len(e.coefficients)) for e in machine.effects
+    )
     return machine.replace(effects=(*constants, *against))
 
 

@@ -48,6 +48,12 @@ class View:
     relative: Array
 
     @property
+    def sigma(self) -> float:
+        """Standard deviation of a plain value as the files tell it, um."""
+        known = [each.sigma for each in self.problem.observations if each.noise_known]
+        return UM * float(np.median(np.concatenate(known) if known else self.problem.sigma))
+
+    @property
     def machine(self) -> Machine:
         """The machine file as it was given."""
         return self.problem.machine
@@ -152,7 +158,7 @@ def view(measurements: Sequence[Measurement], machine: Machine) -> View:
     """Fit what is free, and take everything else to first order about it."""
     selection = Selection(machine.effects, tuple(is_free(effect) for effect in machine.effects))
     problem = Problem.of(measurements, machine, selection)
-    relative = problem.sigma / np.median(problem.sigma)
+    relative = relative_noise(problem)
     coefficients, unknowns = selection.start.copy(), problem.start
     for _ in range(STEPS):
         base = UM * np.concatenate([problem.nuisance(unknowns), problem.design], axis=1)
@@ -163,6 +169,18 @@ def view(measurements: Sequence[Measurement], machine: Machine) -> View:
             break
     residual = problem.residual(coefficients, unknowns)
     return View(problem, coefficients, unknowns, UM * residual, base, _rows(problem), relative)
+
+
+def relative_noise(problem: Problem) -> Array:
+    """Standard deviation of each value against that of a plain one; files that do not tell are like those that do."""
+    known = [each.sigma for each in problem.observations if each.noise_known]
+    usual = float(np.median(np.concatenate(known))) if known else float(np.median(problem.sigma))
+    own = [
+        each.sigma if each.noise_known else each.sigma * usual / np.median(each.sigma) for each in problem.observations
+    ]
+    sigma = np.concatenate(own)
+    relative: Array = sigma / np.median(sigma)
+    return relative
 
 
 def damped(columns: Array, y: Array) -> Array:

@@ -34,6 +34,7 @@ class Candidate:
     needs     state columns without which it cannot be seen
     remedy    what can be done about it besides compensation, in words
     grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
+    lead      how many of the effects are the effect itself, the rest only comes with it (0: all); they must be most of it
     """
 
     name: str
@@ -45,6 +46,7 @@ class Candidate:
     needs: tuple[str, ...] = ()
     remedy: str = ""
     grows: bool = False
+    lead: int = 0
 
 
 @dataclass(frozen=True)

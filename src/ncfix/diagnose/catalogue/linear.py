@@ -94,4 +94,4 @@ def _lost(reach: Reach, axis: Axis) -> Iterator[Candidate]:
             title = f"{sort} play of {axis.name} {way} at reversal"
         parts = zero([Effect(each, (), play, **span) for each in (symbol, *swept(component, axis))])
         loading = stacked(weighed(shapes.LOST), *[PIVOT * weighed(shapes.LOST)] * (len(parts) - 1))
-        yield Candidate(name, title, axis.name, family, parts, (loading,), needs, remedy)
+        yield Candidate(name, title, axis.name, family, parts, (loading,), needs, remedy, lead=1)
