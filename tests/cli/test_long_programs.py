@@ -89,7 +89,7 @@ def test_a_pipe_cannot_be_taken_back(long_program: Path, fix: Any) -> None:
     source = long_program.read_bytes().replace(b"M2\n", lines + b"G91 G1 X9000.\nG90\nM2\n")
     result = fix(PART, "-", "--allow-refused", stdin=source)
     assert result.code != ExitCode.DONE
-    assert "NCF438" in result.err
+    assert "NCF013" in result.err
 
 
 def test_writing_begins_before_the_input_ends(long_program: Path, root: Path) -> None:

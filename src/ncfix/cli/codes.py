@@ -56,4 +56,10 @@ CODES = {
         "interrupted",
         "The command was stopped with Ctrl-C. Outputs that were not complete are not there.",
     ),
+    "NCF013": Code(
+        "written to a pipe, and would have to be different",
+        "A long program that goes to a pipe is written while it is read. Further down something was found that changes "
+        "what comes before it: a refusal that reaches far back, or frames that are set where the machine stands.",
+        "Give the program as a file; then it is looked at as a whole before anything is written.",
+    ),
 }

@@ -143,11 +143,11 @@ class Outlet:
         yield from parts
 
     def after(self, text: bytes, path: str) -> bytes:
-        """What is left of a text of which the beginning was sent; raises RefusedError NCF438 if it was another."""
+        """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""
         if hashlib.sha256(text[: self.sent]).digest() != self.digest.digest():
             problem = "what has been written to the pipe already would have to be different"
             raise RefusedError.of(
-                "NCF438", problem, Place(shown(path)), "give the program as a file, not through a pipe"
+                "NCF013", problem, Place(shown(path)), "give the program as a file, not through a pipe"
             )
         return text[self.sent :]
 

@@ -128,12 +128,6 @@ CODES = {
         "`--assume-zero` was given, and the length of this tool is used and not known.",
         "`--tool 12=120.0` gives it.",
     ),
-    "NCF438": Code(
-        "written to a pipe, and would have to be different",
-        "A long program that goes to a pipe is written while it is read. Further down something was found that changes\n"
-        "what comes before it: a refusal that reaches far back, or frames that are set where the machine stands.",
-        "give the program as a file; then it is looked at as a whole before anything is written",
-    ),
     "NCF445": Code(
         "Program written out flat",
         "With --flatten every block is written as often as it is executed, for some need another correction each time. "
