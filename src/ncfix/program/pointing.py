@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+Triple = tuple[float, float, float]
+
 Directions = Callable[[float, float], FloatArray]
 """Angles of the two rotary axes, rad -> the unit vector (3,) from the tip to the spindle in the workpiece."""
 
@@ -34,15 +36,13 @@ POLE = 1e-7
 class Pointing:
     """How a machine with two rotary axes points its tool.
 
-    columns      of the outer axis (its line is fixed in the workpiece) and of the inner one, in positions
-    outer, inner (3,) unit vectors of their lines, the inner one with the outer axis at zero; right-handed
-    tool         (3,) direction of the tool with both at zero
+    columns  of the outer axis (its line is fixed in the workpiece) and of the inner one, in positions
+    lines    unit vectors: of the outer line, of the inner one with the outer axis at zero, both right-handed; and the
+             direction of the tool with both at zero
     """
 
     columns: tuple[int, int]
-    outer: FloatArray
-    inner: FloatArray
-    tool: FloatArray
+    lines: tuple[Triple, Triple, Triple]
 
     @classmethod
     def of(cls, columns: tuple[int, int], directions: Directions) -> Pointing | None:
@@ -52,14 +52,14 @@ class Pointing:
             outer, inner = _line(ask), _line(_swapped(ask), (0.0,))
             if outer is None or inner is None:
                 continue
-            found = cls((pair[0], pair[1]), outer, inner, ask(0.0, 0.0))
+            found = cls((pair[0], pair[1]), (_triple(outer), _triple(inner), _triple(ask(0.0, 0.0))))
             if all(np.abs(found.at(a, b) - ask(a, b)).max() < SAME for a, b in ((0.4, -1.1), (-2.0, 0.8), (2.9, 2.2))):
                 return found
         return None
 
     def at(self, outer: float, inner: float) -> FloatArray:
         """The direction (3,) at these angles, rad."""
-        return _turned(self.outer, outer, _turned(self.inner, inner, self.tool))
+        return np.array(_turned(self.lines[0], outer, _turned(self.lines[1], inner, self.lines[2])))
 
     def direction(self, position: FloatArray) -> FloatArray:
         """The direction (3,) at a position (n_axes,), rad."""
@@ -70,27 +70,41 @@ class Pointing:
 
         Nearest to `near` first; an axis that may stand anywhere stands there. Empty if the machine cannot point there.
         """
-        flat = self.inner * float(self.inner @ self.tool)
-        a, b = float(self.outer @ (self.tool - flat)), float(self.outer @ np.cross(self.inner, self.tool))
-        c, r = float(self.outer @ (direction - flat)), math.hypot(a, b)
+        outer, inner, tool = self.lines
+        wanted = _triple(direction)
+        share = dot(inner, tool)
+        flat = inner[0] * share, inner[1] * share, inner[2] * share
+        a, b = dot(outer, tool) - dot(outer, flat), dot(outer, cross(inner, tool))
+        c, r = dot(outer, wanted) - dot(outer, flat), math.hypot(a, b)
         if abs(c) > r * (1 + SAME):
             return []
         middle, half = math.atan2(b, a), math.acos(min(max(c / r, -1.0), 1.0))
-        inner = {near[1] + wrapped(angle - near[1]) for angle in (middle + half, middle - half)}
-        ways = [(self._outer_angle(angle, direction, near[0]), angle) for angle in inner]
+        found = {near[1] + wrapped(angle - near[1]) for angle in (middle + half, middle - half)}
+        ways = [(self._outer_angle(angle, wanted, near[0]), angle) for angle in found]
         return sorted(ways, key=lambda way: abs(way[0] - near[0]) + abs(way[1] - near[1]))
 
     def at_pole(self, direction: FloatArray) -> bool:
         """Whether the tool would stand along the line of the outer axis."""
-        return float(np.linalg.norm(np.cross(self.outer, direction))) < POLE
+        return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
-    def _outer_angle(self, inner: float, direction: FloatArray, near: float) -> float:
-        start = _across(self.outer, _turned(self.inner, inner, self.tool))
-        stop = _across(self.outer, direction)
-        if min(float(np.linalg.norm(start)), float(np.linalg.norm(stop))) < POLE:
+    def _outer_angle(self, inner: float, wanted: Triple, near: float) -> float:
+        outer = self.lines[0]
+        start = _across(outer, _turned(self.lines[1], inner, self.lines[2]))
+        stop = _across(outer, wanted)
+        if min(math.hypot(*start), math.hypot(*stop)) < POLE:
             return near
-        angle = math.atan2(float(self.outer @ np.cross(start, stop)), float(start @ stop))
+        angle = math.atan2(dot(outer, cross(start, stop)), dot(start, stop))
         return near + wrapped(angle - near)
+
+
+def dot(a: Triple, b: Triple) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Triple, b: Triple) -> Triple:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def wrapped(angle: float) -> float:
@@ -102,13 +116,21 @@ def _swapped(directions: Directions) -> Directions:
     return lambda a, b: directions(b, a)
 
 
-def _turned(axis: FloatArray, angle: float, vector: FloatArray) -> FloatArray:
-    flat = axis * float(axis @ vector)
-    return flat + math.cos(angle) * (vector - flat) + math.sin(angle) * np.cross(axis, vector)
+def _triple(vector: FloatArray) -> Triple:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
-def _across(axis: FloatArray, vector: FloatArray) -> FloatArray:
-    return np.asarray(vector - axis * float(axis @ vector))
+def _turned(axis: Triple, angle: float, vector: Triple) -> Triple:
+    along, sideways = dot(axis, vector), cross(axis, vector)
+    c, s = math.cos(angle), math.sin(angle)
+    x, y, z = (along * k * (1 - c) + c * v + s * w for k, v, w in zip(axis, vector, sideways, strict=True))
+    return x, y, z
+
+
+def _across(axis: Triple, vector: Triple) -> Triple:
+    along = dot(axis, vector)
+    return vector[0] - along * axis[0], vector[1] - along * axis[1], vector[2] - along * axis[2]
 
 
 def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> FloatArray | None:

@@ -7,6 +7,7 @@ Source: Siemens, "SINUMERIK, cycles": CYCLE81 to CYCLE89, CYCLE840 (RTP, RFP, SD
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from ncfix.program.moves import Kind
@@ -20,8 +21,7 @@ DEPTH = "the depth of a cycle ({}) is left as written"
 MADE = "motions that the control makes up ({})"
 MADE_HOLES = "holes whose places the control makes up ({})"
 HEIGHTS = "the heights of the cycle {} are known only at run time"
-MEASURING = len("cycle971")
-"""Measuring cycles have three digits, the first of which is 9."""
+MEASURING = re.compile(r"cycle9[789]\d")
 
 AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
 
@@ -61,7 +61,7 @@ def cycle(control: Sinumerik, block: int, step: Calling, *, modal: bool) -> None
             return
         holes = step.name.startswith(("holes", "cycle80"))
         refuse(control, block, (MADE_HOLES if holes else MADE).format(name))
-        if step.name.startswith("cycle9") and len(step.name) == MEASURING:
+        if MEASURING.fullmatch(step.name):
             control.refusal = control.refusal or f"{name} measures, and may set offsets at run time"
         return
     drilling = Drilling.of(control, block, step)

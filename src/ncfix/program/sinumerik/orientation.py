@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.pointing import Pointing
+from ncfix.program.pointing import Pointing, Triple, dot
 from ncfix.program.rs274.coordinates import DEGREE, LETTERS
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.destination import Words
@@ -64,7 +64,8 @@ def by_vector(control: Sinumerik, words: Words) -> str:
     columns = [control.machine[column] for column in pointing.columns]
     if any(index in control.unknown for index in columns):
         return f"where the axis {LETTERS[columns[0]]} stands before the tool is turned is not known"
-    wanted = direction_of(control, np.array([words.get(address) for address in VECTOR]))
+    a, b, c = (words.get(address) for address in VECTOR)
+    wanted = direction_of(control, (a, b, c))
     here = control.position[columns[0]], control.position[columns[1]]
     ways = pointing.angles(wanted, here)
     if not ways:
@@ -80,12 +81,12 @@ def by_vector(control: Sinumerik, words: Words) -> str:
     return ""
 
 
-def direction_of(control: Sinumerik, vector: FloatArray) -> FloatArray:
+def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:
     """A vector of the program as a unit vector in the workpiece."""
-    size = float(np.linalg.norm(vector))
+    size = math.hypot(*vector)
     if size < 1e-9:
         raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
-    return np.asarray(np.array(control.rotation) @ (vector / size))
+    return np.array([dot(row, vector) / size for row in control.rotation])
 
 
 def note_choice(
