@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ncfix import fast
+from ncfix.cli.parts import long_from
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
@@ -71,6 +73,8 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None)
     from ncfix.program.reader import read as read_source
 
     source = read(path)
+    if len(source) >= long_from():
+        fast.engage()
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
 
 
@@ -80,7 +84,7 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
 
     if name is not None:
         return dialects.get(name)
-    return dialects.detect(head, path, "" if machine is None else machine.control)
+    return dialects.detect(head, path, (machine and machine.control) or "")
 
 
 def subprograms(path: str) -> Callable[[str], bytes | None]:

@@ -33,6 +33,11 @@ def part_bytes() -> int:
     return max(int(os.environ.get("NCFIX_PART_BYTES") or PART_BYTES), 1)
 
 
+def long_from() -> int:
+    """Bytes from which on a program is long, and compiled kernels pay."""
+    return LONG * part_bytes()
+
+
 @dataclass(frozen=True, slots=True)
 class Fixed:
     """A corrected program: what of it is not written yet, whether it differs from the original, and the report."""
@@ -68,7 +73,7 @@ class Source:
 
     def looked_into(self) -> tuple[bytes, bool]:
         """The first bytes, which `read` gives once more, and whether there are so many that the program is long."""
-        many = LONG * part_bytes()
+        many = long_from()
         self.head = self._read(many)
         return self.head, len(self.head) == many
 
