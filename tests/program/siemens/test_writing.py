@@ -1,0 +1,52 @@
+"""Corrected blocks of SINUMERIK, as they are written: each keeps its manner. The machine is off by a constant shift."""
+
+from __future__ import annotations
+
+import pytest
+
+from classes.judging import SETUP, machine
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.program.reader import read
+
+
+def written(body: str) -> str:
+    """The body of a program, corrected by -12.4, 21.3 and 8.5 um."""
+    source = f"G54 G0 X1 Y2 Z50\n{body}\nM30\n".encode()
+    fixed = fix_program(
+        read(source, "part.mpf", "siemens"), machine(), SETUP, FixOptions(tolerance_um=50, verify=False)
+    )
+    assert not fixed.report.refused
+    lines = [line for line in fixed.text.decode().splitlines() if "ncfix" not in line]
+    return "\n".join(lines[1:-1])
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ("G1 X5 Y6 Z7 F100", "G1 X4.988 Y6.021 Z7.008 F100"),
+        ("G1X5Y6.Z-.5F100", "G1X4.988Y6.021Z-.492F100"),
+        ("g1 x5 y6", "g1 x4.988 y6.021"),
+        ("G1 X=5 Y=-6.50 Z = 7", "G1 X=4.988 Y=-6.479 Z = 7.008"),
+        ("G1 X=IC(5) Y=AC(3.)", "G1 X=IC(5) Y=AC(3.021)"),
+        ("G91 G1 X5", "G91 G1 X5"),
+        ("R1=5\nG1 X=R1*2 Y1", "R1=5\nG1 X=9.988 Y1.021"),
+        ("G2 X11 Y12 CR=10", "G2 X10.988 Y12.021 CR=10"),
+        ("G2 X11 Y12 I=AC(11) J=AC(2)", "G2 X10.988 Y12.021 I=AC(10.988) J=AC(2.021)"),
+        ("G3 X11 Y12 AR=90", "G3 X10.988 Y12.021 J10.000"),
+        ("G3 I0 J10 AR=90", "G3 I0 J10 X10.988 Y12.021"),
+        ("CIP X21 Y2 I1=11 J1=12", "CIP X20.988 Y2.021 I1=10.988 J1=12.021"),
+        ("G111 X5 Y5\nG1 AP=30 RP=10", "G111 X5 Y5\nG1 X13.648 Y10.021"),
+        ("G1 X5 RND=2", "G1 X4.988 RND=2"),
+        ("N10 G1 X5 ; note X5", "N10 G1 X4.988 ; note X5"),
+        ("/G1 X5 Y5", "/G1 X4.988 Y5.021"),
+        ("TRANS X3\nG1 X5", "TRANS X3\nG1 X4.988"),
+        ("ROT RPL=90\nG1 X5", "ROT RPL=90\nG1 X5.021"),
+        ("MIRROR X0\nG1 X5", "MIRROR X0\nG1 X5.012"),
+        ("G700\nG1 X1", "G700\nG1 X0.99951 Y0.07958 Z1.96884"),
+        ("SUPA G0 Z0", "SUPA G0 Z0"),
+        ("LABEL: G1 X5 M8", "LABEL: G1 X4.988 M8"),
+        ("MCALL CYCLE81(50,0,2,-20)\nX5\nMCALL", "MCALL CYCLE81(50,0,2,-20)\nX4.988\nMCALL"),
+    ],
+)
+def test_a_corrected_block_keeps_its_manner(body: str, expected: str) -> None:
+    assert written(body) == expected

@@ -1,0 +1,70 @@
+"""How two rotary axes point the tool: found from a machine's kinematics, and turned round."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.following import kinematics_of
+from ncfix.machine import Machine, load
+from ncfix.program.moves import TcpState
+from ncfix.program.pointing import Pointing
+
+MACHINES = ("wCAYFXZSt", "wCBXFZYSt", "dmu50", "angle_head")
+LENGTH = 128.0
+
+
+def pointing_of(machine: Machine) -> tuple[Pointing, list[int]]:
+    """How a machine points, from its own kinematics, and the columns of its rotary axes."""
+    kinematics, names = kinematics_of(machine), list(machine.axis_names)
+    assert kinematics is not None
+    columns = np.flatnonzero(machine.rotary).tolist()
+
+    def ask(first: float, second: float) -> np.ndarray:
+        command = [0.0] * len(names)
+        command[columns[0]], command[columns[1]] = first, second
+        tips = [kinematics(command, TcpState(False, long), TcpState(True, long)) for long in (LENGTH, 0.0)]
+        return np.array([(tips[1][names.index(c)] - tips[0][names.index(c)]) / LENGTH for c in "XYZ"])
+
+    found = Pointing.of((columns[0], columns[1]), ask)
+    assert found is not None
+    return found, columns
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_it_points_as_the_machine_does(root: Path, name: str) -> None:
+    machine = load(str(root / f"examples/machines/{name}.toml"))
+    pointing, columns = pointing_of(machine)
+    rng = np.random.default_rng(7)
+    for angles in rng.uniform(-math.pi, math.pi, (20, 2)):
+        q = np.zeros(len(machine.axis_names))
+        q[columns] = angles
+        direction = machine.nominal(q, 0.0)[:3, :3] @ np.asarray(machine.tool.direction)
+        assert pointing.direction(q) == pytest.approx(direction, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_angles_are_the_inverse_of_directions(root: Path, name: str) -> None:
+    pointing, _ = pointing_of(load(str(root / f"examples/machines/{name}.toml")))
+    rng = np.random.default_rng(8)
+    for outer, inner in rng.uniform(-1.4, 1.4, (20, 2)):
+        ways = pointing.angles(pointing.at(outer, inner), (outer, inner))
+        assert ways[0] == pytest.approx((outer, inner), abs=1e-6)
+        for way in ways:
+            assert pointing.at(*way) == pytest.approx(pointing.at(outer, inner), abs=1e-9)
+
+
+def test_where_the_machine_cannot_point_there_is_no_way(root: Path) -> None:
+    """The B axis of the DMU 50 is tilted by 45 degrees: the tool never points below the table."""
+    pointing, _ = pointing_of(load(str(root / "examples/machines/dmu50.toml")))
+    assert pointing.angles(np.array([0.0, 0.0, -1.0]), (0.0, 0.0)) == []
+
+
+def test_along_the_outer_axis_it_stays_where_it_is(root: Path) -> None:
+    pointing, _ = pointing_of(load(str(root / "examples/machines/wCAYFXZSt.toml")))
+    upright = np.array([0.0, 0.0, 1.0])
+    assert pointing.at_pole(upright)
+    assert pointing.angles(upright, (0.3, 0.1))[0] == pytest.approx((0.3, 0.0))
