@@ -12,6 +12,7 @@ from ncfix.cli.targets import read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
+    from ncfix.cli.targets import Target
     from ncfix.diagnose.diagnosis import Diagnosis
 
 
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 @machine_option
 @click.option("-o", "--output", metavar="FILE", help="Where to write the machine with the effects added (TOML).")
 @click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered; repeatable.")
+@click.option("--next", "next_path", metavar="FILE", help="Write the poses to be measured next: CSV, else a program.")
+@click.option("--report", metavar="FILE", help="Write a report with figures (HTML).")
 @click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
 @force_option
 @json_option
@@ -28,12 +31,15 @@ def diagnose(
     machine_path: str,
     output: str | None,
     without: tuple[str, ...],
+    next_path: str | None,
+    report: str | None,
     check: bool,
     force: bool,
     as_json: bool,
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
     from ncfix.diagnose import result, words
+    from ncfix.diagnose.checks import remarks
     from ncfix.diagnose.diagnosis import NOTHING
     from ncfix.diagnose.diagnosis import diagnose as diagnosed
     from ncfix.machine import dumps
@@ -46,16 +52,48 @@ def diagnose(
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
         found = diagnosed(data, machine, without)
+    console.tell(*remarks(found.view, found.unheard_of))
     written = None
     if target is not None and found.machine is not None:
         target.write(dumps(result.with_provenance(found)).encode())
         written = target.path
+    _extras(found, next_path, report, measured, machine_path, force)
     if as_json:
         console.put_json(**result.as_dict(found, written))
     else:
         console.put(words.text(found))
         _say_written(found, output, written)
     return ExitCode.FINDINGS if check and found.verdict != NOTHING else ExitCode.DONE
+
+
+def _extras(
+    found: Diagnosis,
+    next_path: str | None,
+    report: str | None,
+    measured: tuple[str, ...],
+    machine_path: str,
+    force: bool,
+) -> None:
+    """The plan of the next measurement and the report, where they were asked for."""
+    inputs = (machine_path, *measured[1:])
+    if next_path is not None:
+        _write_next(found, targets([measured[0]], next_path, False, force, inputs)[0])
+    if report is not None:
+        from ncfix.diagnose.page import page
+
+        targets([measured[0]], report, False, force, inputs)[0].write(page(found).encode())
+
+
+def _write_next(found: Diagnosis, target: Target) -> None:
+    from ncfix.measure.program import skeleton
+    from ncfix.measure.writer import dumps
+
+    if found.proposal is None or found.proposal.plan is None:
+        console.say("no further poses are proposed")
+        return
+    plan = found.proposal.plan
+    table = target.path.endswith(".csv")
+    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, found.view.machine)).encode())
 
 
 def _say_written(found: Diagnosis, output: str | None, written: str | None) -> None:

@@ -41,8 +41,10 @@ class Joint:
 
     def only(self, chosen: Sequence[int]) -> Joint:
         """The same with some of the members; what they are stays as it was fitted with all."""
-        parts = (tuple(each[k] for k in chosen) for each in (self.numbers, self.covariances, self.shown))
-        return Joint(self.constants, *parts, self.before, self.after)
+        numbers, covariances, shown = (
+            tuple(each[k] for k in chosen) for each in (self.numbers, self.covariances, self.shown)
+        )
+        return Joint(self.constants, numbers, covariances, shown, self.before, self.after)
 
 
 def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:
@@ -125,7 +127,7 @@ def _trimmed(effect: Effect, values: Array, covariance: Array, own: Array) -> Ef
 
 def _fewer(basis: Basis, own: Array) -> tuple[Basis, Array]:
     if isinstance(basis, Fourier):
-        pairs = own.reshape(-1, 2).any(axis=1)
+        pairs = [bool(pair.any()) for pair in own.reshape(-1, 2)]
         orders = tuple(k for k, kept in zip(basis.order, pairs, strict=True) if kept)
         return replace(basis, order=orders), np.repeat(pairs, 2)
     if isinstance(basis, Polynomial):

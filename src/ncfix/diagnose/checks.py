@@ -4,16 +4,94 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from scipy import stats
+
 from ncfix.diagnose.background import Background
-from ncfix.diagnose.groups import Gathered
+from ncfix.diagnose.misfit import misfit
 from ncfix.diagnose.view import View
+from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.measure.measurement import Measurement
+from ncfix.measure.calibrate import Problem
+from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.selection import Selection
+
+SPARE = 12
+"""Values that must be left beside what is free."""
+NEIGHBOURS = 60
+"""Rows from which on neighbouring poses tell the noise."""
+STRANGE_UM = 300.0
+"""Residuals, rms, that no machine tool has."""
+WORSE = 1.3
+CONTRADICTION = 1e-6
 
 
 def before(measurements: Sequence[Measurement], machine: Machine) -> None:
-    """What can be said before anything is computed."""
+    """Refuse what can be told without computing: one pose, no noise. Raises `UsageError` NCF651, NCF652."""
+    q = np.concatenate([each.positions(machine) for each in measurements])
+    direct = any(each.kind in ("axis", "length") for each in measurements)
+    if not direct and float(np.ptp(q, axis=0).max(initial=0.0)) < 1e-3:
+        raise UsageError.of("NCF651", f"all {len(q)} rows are of one pose", hint="`ncfix plan` proposes poses")
+    seen = Problem.of(measurements, machine, _nothing(machine))
+    if not any(each.noise_known for each in seen.observations) and len(q) < NEIGHBOURS:
+        text = f"neither repeats nor a noise_um line, and {len(q)} rows are too few to tell the noise from neighbours"
+        raise UsageError.of("NCF652", text, hint="repeat ten poses a few times, or state the noise in the header")
 
 
-def after(view: View, ground: Background, gathered: Gathered) -> None:
-    """What can be said once the set-up is fitted."""
+def _nothing(machine: Machine) -> Selection:
+    return Selection(machine.effects, (False,) * len(machine.effects))
+
+
+def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
+    """Refuse what no mistake explains. Raises `UsageError` NCF654, NCF655."""
+    now = misfit(measurements, machine)
+    if now.free > STRANGE_UM:
+        text = f"{now.free:.0f} um rms are left after the set-up was fitted"
+        raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")
+    bare = misfit(measurements, machine.replace(effects=()))
+    if not machine.is_perfect and now.tight > WORSE * bare.tight and bare.tight > 2 * bare.noise:
+        text = f"with its errors the file leaves {now.tight:.1f} um rms, without any {bare.tight:.1f} um"
+        raise UsageError.of("NCF655", text, hint="calibrate the machine anew before anything is added")
+
+
+def enough(view: View) -> None:
+    """Refuse too few values for the unknowns. Raises `UsageError` NCF650."""
+    free = int(np.linalg.matrix_rank(view.base))
+    if len(view.y) < free + SPARE:
+        text = f"{len(view.y)} values for {free} unknowns of set-up and constants"
+        raise UsageError.of("NCF650", text, hint="measure more poses")
+
+
+def agreeing(view: View, ground: Background, residual: Array, sigma: float) -> None:
+    """Refuse files that differ where they measured the same. Raises `UsageError` NCF656."""
+    if len(view.measurements) < 2:
+        return
+    apart, pairs = 0.0, 0
+    q = np.round(view.q, 6)
+    places: dict[tuple[bytes, float, int], list[tuple[int, float]]] = {}
+    length = view.column("tool_length")
+    for value, row, part, weight in zip(residual, view.row, view.component, ground.relative, strict=True):
+        if row >= 0 and weight < 10:
+            key = (q[row].tobytes(), float(length[row]), int(part))
+            places.setdefault(key, []).append((int(view.file[row]), float(value)))
+    for found in places.values():
+        by_file = {file: float(np.mean([v for f, v in found if f == file])) for file, _ in found}
+        if len(by_file) > 1:
+            values = list(by_file.values())
+            apart += (values[0] - values[1]) ** 2 / (2 * sigma**2)
+            pairs += 1
+    if pairs > SPARE and float(stats.chi2.sf(apart, pairs)) < CONTRADICTION and apart > 4 * pairs:
+        text = (
+            f"{pairs} values were measured by two files and differ by {np.sqrt(2 * apart / pairs):.1f} times the noise"
+        )
+        raise UsageError.of("NCF656", text, hint="diagnose the files one by one")
+
+
+def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
+    """What the user should know: directions that never change, names that do not exist."""
+    found = []
+    sides = [name for each in view.measurements for name in each.columns if name.startswith("dir_")]
+    if sides and not any(name.startswith("dir_") for name in view.reach.columns):
+        found.append(Message("NCF653", "every axis came from one side: backlash and play cannot show"))
+    found += [Message("NCF657", f"there is no effect {name!r} in the catalogue of this machine") for name in unheard_of]
+    return found

@@ -111,11 +111,13 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     wrong = mistakes.find(measurements, machine, refused)
     if wrong is not None:
         measurements, machine = wrong.measurements, wrong.machine
+    if wrong is None:
+        checks.sensible(measurements, machine)
     seen = view(measurements, machine)
+    checks.enough(seen)
     candidates, unheard_of = without(catalogue(seen.reach), refused)
     gathered = gather(seen, candidates)
     ground, outlying = _ground(seen, gathered)
-    checks.after(seen, ground, gathered)
     court = Court(ground, (*gathered.groups, *rivals(seen)))
     selected = _gated(court, select(court))
     found = _concluded(court, selected, gathered, candidates, outlying, unheard_of)
@@ -169,6 +171,7 @@ def _concluded(
     joint = addition.fitted(court, members, share)
     keep = ~outlying[np.maximum(seen.row, 0)] & (seen.row >= 0)
     sigma = _sigma(court, selected, share)
+    checks.agreeing(seen, ground, joint.before, sigma)
     floor = noise.floor(seen, ground, sigma, keep)
     named = [(name, k) for k, name in enumerate(selected.members) if name not in UNNAMED]
     machine, added = addition.machine_with(court, [members[k] for _, k in named], joint.only([k for _, k in named]))
@@ -202,7 +205,9 @@ def _concluded(
         floor=floor,
         machine=machine if any(added) else None,
         patterns=tuple(gapmap.patterns(ground, sigma)),
-        clustering=tuple(gapmap.clustering(ground, each, scaled(seen)) for each in (joint.before, after)),  # type: ignore[arg-type]
+        clustering=(
+            gapmap.clustering(ground, joint.before, scaled(seen)), gapmap.clustering(ground, after, scaled(seen)),
+        ),
         outlying=outlying,
         p_lack=noise.lack_of_fit(floor, joint.before[keep], parameters),
         p_left=p_left,

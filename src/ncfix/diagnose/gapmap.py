@@ -91,13 +91,13 @@ def _features(view: View) -> Iterator[tuple[str, Array]]:
                 yield f"grows with {axis.name} ({{}} from the middle to the end)", u[axis.name]
             yield f"is bowed along {axis.name} ({{}})", u[axis.name] ** 2 - 1 / 3
             yield f"is bent like an S along {axis.name} ({{}})", u[axis.name] ** 3 - 0.6 * u[axis.name]
-    for axis in view.machine.axis_names:
-        side = view.column(f"dir_{axis}")
+    for letter in view.machine.axis_names:
+        side = view.column(f"dir_{letter}")
         if np.ptp(side) > 0:
-            yield f"depends on the direction of {axis} ({{}} when it moves in plus)", side
+            yield f"depends on the direction of {letter} ({{}} when it moves in plus)", side
             for other in linear:
                 yield (
-                    f"grows with {other} by the direction of {axis} ({{}} at the end of {other}, {axis} in plus)",
+                    f"grows with {other} by the direction of {letter} ({{}} at the end of {other}, {letter} in plus)",
                     side * u[other],
                 )
     for k, first in enumerate(linear):

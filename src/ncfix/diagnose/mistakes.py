@@ -1,7 +1,8 @@
 """Mistakes of people and software: the machine is as it is, and somebody told the computer otherwise.
 
-Each mistake is undone in turn, and it is looked how well the machine file as it stands, its constants nearly fixed, then
-agrees with the data. A mistake that is real explains nearly all at once, with nothing fitted: no missing effect does.
+Each mistake is undone in turn, and it is looked how well the machine file as it stands, its constants nearly fixed,
+then agrees with the data. A mistake that is real explains nearly all at once, with nothing fitted: no missing effect
+does.
 """
 
 from __future__ import annotations

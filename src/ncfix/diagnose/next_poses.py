@@ -137,7 +137,10 @@ def _contest(
 def _exchanged(contests: Sequence[Contest], count: int) -> tuple[list[int], float]:
     """Start with many random dozens, keep the best, and exchange one pose after another as long as that helps."""
     random = np.random.default_rng(0)
-    worst = lambda rows: min(each.told(rows) for each in contests)  # noqa: E731
+
+    def worst(rows: list[int]) -> float:
+        return min(each.told(rows) for each in contests)
+
     starts = [random.permutation(count)[:COUNT].tolist() for _ in range(STARTS)]
     chosen = max(starts, key=worst)
     value = worst(chosen)

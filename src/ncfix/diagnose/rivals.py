@@ -1,7 +1,8 @@
 """Effects without a name, as rivals of those with one: any smooth field of the pose, any smooth course of time.
 
 They are random Fourier features of Gaussian processes (Rahimi and Recht 2007), over time regular ones (Solin and
-Sarkka 2020), three independent components at the tool tip. Where such a rival explains the data better than every named effect does, the effect is not in the catalogue.
+Sarkka 2020), three independent components at the tool tip. Where such a rival explains the data better than every
+named effect does, the effect is not in the catalogue.
 """
 
 from __future__ import annotations

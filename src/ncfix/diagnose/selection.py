@@ -9,6 +9,7 @@ import numpy as np
 from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import Court, Evidence, Member, log_odds
 from ncfix.diagnose.rivals import RIVALS
+from ncfix.measure.measurement import Array
 
 MOST = 5
 """Effects that are named at most."""
@@ -141,7 +142,7 @@ def noise_alone(court: Court, evidence: Evidence, seed: int = 0) -> Null:
     return Null(float(np.mean(best)) - 0.5772 * scale, scale)
 
 
-def _trial_odds(columns: np.ndarray, projected: np.ndarray, total: np.ndarray, freedom: float) -> np.ndarray:  # type: ignore[type-arg]
+def _trial_odds(columns: Array, projected: Array, total: Array, freedom: float) -> Array:
     eigen, vectors = np.linalg.eigh(columns.T @ columns)
     return log_odds(np.broadcast_to(np.maximum(eigen, 0), projected.shape), (projected @ vectors) ** 2, total, freedom)
 

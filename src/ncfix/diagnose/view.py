@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.diagnose.catalogue.candidate import Reach
 from ncfix.machine import Effect, Machine
@@ -130,7 +131,7 @@ class View:
             f"{each.path} set {name}" if many else f"set {name}" for each in self.measurements for name in each.sets
         )
 
-    def rms(self, values: Array, keep: Array | None = None) -> float:
+    def rms(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
         """Root mean square over rows of the length of what a row shows, um."""
         inside = self.row >= 0 if keep is None else (self.row >= 0) & keep
         rows = len(np.unique(self.row[inside]))

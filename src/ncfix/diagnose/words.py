@@ -28,7 +28,23 @@ def text(found: Diagnosis) -> str:
         lines += ["", f"unknown: {found.unknown_um:.1f} um of {found.unknown_kind}"]
     if found.patterns:
         lines += ["", "where:", *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns)]
+    lines += _next(found)
+    if found.outlying.any():
+        lines += ["", f"{int(found.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
+
+
+def _next(found: Diagnosis) -> list[str]:
+    """What to measure next, or that nothing of this kind would help."""
+    p = found.proposal
+    if p is None:
+        return []
+    if p.plan is None:
+        return ["", f"{', '.join(p.rivals)}: {p.reason}; no measurement of this kind would tell them apart"]
+    poses = (
+        f"{len(p.plan)} more poses raise what tells them apart from {p.before:.1f} to {p.after:.1f} squared noise units"
+    )
+    return ["", f"to tell it from {', '.join(p.rivals)} ({p.reason}): {poses}; --next FILE writes them"]
 
 
 def why(found: Diagnosis, finding: Finding) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Candidate:
     needs     state columns without which it cannot be seen
     remedy    what can be done about it besides compensation, in words
     grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
-    lead      how many of the effects are the effect itself, the rest only comes with it (0: all); they must be most of it
+    lead      how many of the effects are the effect itself, the rest only comes with it; 0: all
     """
 
     name: str
@@ -68,12 +69,12 @@ class Reach:
         low, high = self.spans[axis.name]
         return high - low > (UNTOUCHED_DEG if axis.rotary else UNTOUCHED_MM)
 
-    def scaled(self, axis: Axis) -> dict[str, float]:
+    def scaled(self, axis: Axis) -> dict[str, Any]:
         """`center` and `scale` of an effect, so that u is -1 ... 1 over what was measured."""
         low, high = self.spans[axis.name]
         return {"center": (low + high) / 2, "scale": max((high - low) / 2, 1e-6)}
 
-    def factor(self, axis: Axis) -> dict[str, float | str]:
+    def factor(self, axis: Axis) -> dict[str, Any]:
         """The same for an axis that multiplies."""
         found = self.scaled(axis)
         return {"times": axis.name, "times_center": found["center"], "times_scale": found["scale"]}
@@ -114,7 +115,7 @@ def zero(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(replace(effect, coefficients=(0.0,) * effect.basis.size) for effect in effects)
 
 
-def weighed(variances: Sequence[float]) -> Array:
+def weighed(variances: Sequence[float] | Array) -> Array:
     """A loading of independent coefficients with these variances."""
     return np.diag(np.sqrt(np.asarray(variances, dtype=np.float64)))
 

@@ -59,7 +59,7 @@ def _screw(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     low, high = reach.spans[axis.name]
     pitches = (axis.pitch,) if axis.pitch else tuple(p for p in PITCHES if p < (high - low) / 3)
     waves = [Effect(name, (), Periodic(order=(1, 2, 3), period=pitch)) for pitch in pitches]
-    waves += [replace(wave, **span) for wave in waves]  # type: ignore[arg-type]
+    waves += [replace(wave, **span) for wave in waves]
     if not waves:
         return
     title = f"screw of {axis.name}: an error that repeats with its pitch"

@@ -77,11 +77,7 @@ def _seat(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     others = [each for each in reach.linear if each.workpiece_side == axis.workpiece_side] or list(reach.linear)
     wave = Fourier(order=(1,))
     effects = zero(
-        [
-            Effect(f"E{letter}{axis.name}", (), wave, **reach.factor(other))  # type: ignore[arg-type]
-            for other in others
-            for letter in LETTERS
-        ]
+        [Effect(f"E{letter}{axis.name}", (), wave, **reach.factor(other)) for other in others for letter in LETTERS]
     )
     if effects:
         title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"

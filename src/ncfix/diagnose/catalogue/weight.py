@@ -7,6 +7,7 @@ down is not in a machine file, so every way across an axis is a form of the effe
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from ncfix.measure.measurement import Array
 POWERS = (0, 1, 2, 3, 4)
 FOOT = 30.0
 """mm: how far the point about which a sagging slide turns lies from the reference point stated."""
-LOAD = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
+LOAD: dict[str, Any] = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
 BOW = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, 0, 0.3]])
 """Columns: u^2, u^3, u^4 with their sizes: a bed between its supports."""
 FREE_END = np.array([[1, 0.3], [2, 0.9], [1, 0.9], [0, 0.3], [0, 0]])
@@ -45,10 +46,12 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
 
 def _beam(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     q, family = axis.name, f"{axis.name} weight"
-    sorts = [("bed sag", f"bed of {q} sags under the slide", (BOW,), "re-level the bed")]
+    sorts: list[tuple[str, str, tuple[Array, ...], str]] = [
+        ("bed sag", f"bed of {q} sags under the slide", (BOW,), "re-level the bed")
+    ]
     if not axis.workpiece_side:
-        forms = (FREE_END, MIRROR @ FREE_END)
-        sorts.append(("ram droop", f"ram droop: {q} hangs the further it is out", forms, "a counterweight, or tables"))
+        ends = (FREE_END, MIRROR @ FREE_END)
+        sorts.append(("ram droop", f"ram droop: {q} hangs the further it is out", ends, "a counterweight, or tables"))
     own = along(axis)
     if own is None:
         return
@@ -100,7 +103,7 @@ def _nod(reach: Reach, axis: Axis) -> Iterator[Candidate]:
                 f"E{turn}{axis.name}",
                 *(f"E{x}{axis.name}" for x in LETTERS if TURNS[LETTERS.index(x)] != turn),
             ):
-                effects.append(Effect(name, (), Polynomial(degree=(1, 2)), **common))  # type: ignore[arg-type]
+                effects.append(Effect(name, (), Polynomial(degree=(1, 2)), **common))
             count += 1
     if not effects:
         return
@@ -155,7 +158,7 @@ def _table(axis: Axis) -> Candidate:
 
 
 def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
-    """The load's weight turns the axis, once a turn and in proportion to the mass; less where the axis stands upright."""
+    """The load's weight turns the axis, once a turn, in proportion to the mass; not where it stands upright."""
     own = along(axis)
     if own is None or "load_kg" not in reach.columns:
         return
@@ -163,8 +166,8 @@ def _unbalanced(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     tilting = [other for other in reach.rotary if other is not axis]
     effects = zero(
         [
-            Effect(name, (), wave, **LOAD),  # type: ignore[arg-type]
-            *(Effect(name, (), wave, **reach.factor(other)) for other in tilting),  # type: ignore[arg-type]
+            Effect(name, (), wave, **LOAD),
+            *(Effect(name, (), wave, **reach.factor(other)) for other in tilting),
             Effect(name, (), wave),
         ]
     )
@@ -183,10 +186,10 @@ def _sag(reach: Reach, axis: Axis) -> Candidate:
     first, second = across(axis)
     own = along(axis) or 0
     wave = Fourier(order=(1,))
-    loaded = [{}, LOAD] if "load_kg" in reach.columns else [{}]
+    loaded: list[dict[str, Any]] = [{}, LOAD] if "load_kg" in reach.columns else [{}]
     forms = ((TURNS[own],), (LETTERS[first], LETTERS[second]), (TURNS[first], TURNS[second]), (LETTERS[own],))
     names = [f"E{letter}{axis.name}" for form in forms for letter in form]
-    effects = zero([Effect(name, (), wave, **state) for state in loaded for name in names])  # type: ignore[arg-type]
+    effects = zero([Effect(name, (), wave, **state) for state in loaded for name in names])
     loadings, at = [], 0
     for form in forms:
         size = np.zeros((len(loaded), len(names), 2))
@@ -212,7 +215,7 @@ def _twist(reach: Reach, axis: Axis) -> Iterator[Candidate]:
         return
     name = f"E{TURNS[own]}{axis.name}"
     loaded = "load_kg" in reach.columns
-    effects = zero([Effect(name, (), Fourier(order=(1,)), **reach.factor(other)) for other in others])  # type: ignore[arg-type]
+    effects = zero([Effect(name, (), Fourier(order=(1,)), **reach.factor(other)) for other in others])
     title = f"trunnion twist of {axis.name}: driven from one side, the angle lags along the axis"
     yield Candidate(
         f"trunnion twist {axis.name}", title, axis.name, f"{axis.name} weight", effects,
@@ -225,11 +228,11 @@ def _droop(reach: Reach) -> Iterator[Candidate]:
     heads = [axis for axis in reach.rotary if not axis.workpiece_side]
     if "tool_length" not in reach.columns or not heads:
         return
-    long = {"times": "tool_length", "times_center": 0.0, "times_scale": 100.0}
+    long: dict[str, Any] = {"times": "tool_length", "times_center": 0.0, "times_scale": 100.0}
     tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
     names = [f"E{TURNS[k]}{SPINDLE}" for k in range(3) if k != tool]
     wave = Fourier(order=(1,))
-    effects = zero([Effect(n, (), wave, input=head.name, **long) for head in heads for n in names])  # type: ignore[arg-type]
+    effects = zero([Effect(n, (), wave, input=head.name, **long) for head in heads for n in names])
     loading = weighed((1.0,) * 2 * len(effects))
     title = "tool droop: tool and holder hang by their weight as the head turns"
     yield Candidate("tool droop", title, "", "spindle", effects, (loading,), ("tool_length",), "a stiffer holder")

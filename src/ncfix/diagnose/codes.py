@@ -1,0 +1,52 @@
+"""What the message codes of diagnosis mean: NCF650 ... NCF659."""
+
+from __future__ import annotations
+
+from ncfix.diagnostics import Code
+
+CODES = {
+    "NCF650": Code(
+        "too few values for a diagnosis",
+        "The set-up and the constants of the machine file already take as many numbers as were measured, or nearly: "
+        "what is left cannot tell an effect from noise.",
+        "Measure more poses, or several balls in one set-up.",
+    ),
+    "NCF651": Code(
+        "all poses are alike",
+        "No axis was moved, or all rows are repeats of one pose: an error that depends on the pose cannot show.",
+        "`ncfix plan` proposes poses.",
+    ),
+    "NCF652": Code(
+        "the noise is not known",
+        "There are neither repeats nor a `# noise_um:` line, and too few poses for their neighbours to tell the noise. "
+        "Without it every wiggle could be an effect.",
+        "Repeat ten poses a few times, one after another, or state the noise of the instrument.",
+    ),
+    "NCF653": Code(
+        "every axis came from one side",
+        "All directions of approach that the file states are the same: backlash and play cannot show, and what they do "
+        "would be taken for something else.",
+        "Approach half of the poses from the other side.",
+    ),
+    "NCF654": Code(
+        "this does not look like that machine",
+        "What is left after the set-up was fitted is far larger than errors of machine tools are, and no mistake of "
+        "unit, sign or axis that ncfix knows explains it.",
+        "Is it the measurement of another machine, or are columns exchanged?",
+    ),
+    "NCF655": Code(
+        "the machine file is worse than none",
+        "Without any of its errors the machine file would agree better with the data, but not well enough to say that "
+        "a table is active or a sign is wrong.",
+        "Calibrate the machine anew before anything is added to its model.",
+    ),
+    "NCF656": Code(
+        "the files contradict each other",
+        "What one file says of a pose differs from what another says by far more than the noise.",
+        "Diagnose them one by one; something changed between them, or one belongs to another machine.",
+    ),
+    "NCF657": Code(
+        "a name that the catalogue does not have",
+        "`--without` names an effect that is not in the catalogue of this machine; nothing was left out for it.",
+    ),
+}
