@@ -260,3 +260,16 @@ def test_approach_and_departure() -> None:
 def test_skipped_blocks_are_executed_unless_asked() -> None:
     assert ends("/5 L X+1\nL Y+1") == [[1, 0, 0], [1, 1, 0]]
     assert ends("/5 L X+1\nL Y+1", block_skip=True) == [[0, 1, 0]]
+
+
+def test_the_height_of_a_called_position_shifts_the_depths() -> None:
+    body = (
+        "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL Z+50 FMAX\nCYCL CALL POS X+10 Y+20 Z+5 FMAX M3\nL X+1 FMAX"
+    )
+    assert ends(body)[1:] == [[10, 20, -9], [1, 20, 16]]
+
+
+def test_only_what_the_control_puts_in_is_known_at_run_time() -> None:
+    body = "Q1 = 3\nFN 18: SYSREAD Q2 = ID50 NR1 IDXQ1\nL X+Q1\nL Y+Q2"
+    assert len(reasons(body)) == 1
+    assert len(reasons("FN 23: Q20 = CDATA Q30\nL X+Q22 FMAX")) == 1

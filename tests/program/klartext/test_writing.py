@@ -7,6 +7,8 @@ import re
 import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.proof import SelfCheckError
+from ncfix.program.klartext.poles import pole_in_force
 from ncfix.program.reader import read
 from ncfix.program.writer import apply
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
@@ -58,6 +60,39 @@ def test_the_old_pole_comes_back_after_one_that_was_put_in() -> None:
     assert poles[0] == "CC X+100 Y+10"
     assert poles[-1] == "CC X+100.0000 Y+10.0000"
     assert len(poles) >= 3
+
+
+AFTER_CR = "L X+120 Y+0 Z+0 FMAX\nCC X+110,0 Y+10\nCR X+130 Y+10 R+10 DR+ F500\nLBL 1\nLP PR+30 IPA+10\nCALL LBL 1 REP 2"
+
+
+def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
+    text = fixed(AFTER_CR, allow_refused=True).text.decode("latin-1")
+    assert [line for line in text.splitlines() if line.startswith("CC")][-1] == "CC X+110,0 Y+10"
+
+
+def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ncfix.program.klartext.render.pole_in_force", lambda source, at: None)
+    with pytest.raises(SelfCheckError, match="would lead to"):
+        fixed(AFTER_CR, allow_refused=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("L X+1\n", ""),
+        ("5 CC X+1,5 Y-2 ; here\n6 L X+1\n", "X+1,5 Y-2"),
+        ("CC X+1 Y+2\nCC X+3 Y+4\n", "X+3 Y+4"),
+        ("CC X+1 Y+2\nCC\n", None),
+        ("CC X+1 Y+2\nCC X+3\n", None),
+        ("CC X+1 Y+2\nCC IX+3 Y+4\n", None),
+        ("CC X+1 Y+2\nCC X+Q1 Y+4\n", None),
+        ("CC X+1 Y+2\nLBL 3\n", None),
+        ("CC X+1 Y+2\n7 CALL PGM A.H\n", None),
+        ("CC X+1 Y+2\n7 FN 9: IF +Q1 EQU +0 GOTO LBL 5\n", "X+1 Y+2"),
+    ],
+)
+def test_the_pole_in_force_by_the_text(text: str, words: str | None) -> None:
+    assert pole_in_force(text.encode(), len(text)) == words
 
 
 def test_polar_lines_become_cartesian() -> None:

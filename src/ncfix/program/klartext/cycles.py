@@ -152,6 +152,8 @@ def call(control: Control, step: Step) -> None:
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
     height = where.inner[Z]
     bottom, clear, refusal = levels(control, height)
+    if step.name == "cycl call pos" and cycle.number in DRILLING:
+        bottom, clear = bottom + height, clear + height
     drill(control, step, where, axes, (bottom, clear, refusal))
 
 

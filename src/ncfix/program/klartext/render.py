@@ -13,6 +13,7 @@ from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, ar
 from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
 from ncfix.program.klartext.layout import Layout, poles_move
 from ncfix.program.klartext.number_text import value_of
+from ncfix.program.klartext.poles import pole_in_force
 from ncfix.program.klartext.words_text import WordWriter
 from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program
@@ -67,8 +68,9 @@ class Renderer(WordWriter):
                 position = self._further_line(position, target.ends[piece])
             self.out.ends.append(position)
         self._move_late_codes()
-        if self.own_pole:
-            self.out.lines.append(self._prefix() + self._old_pole())
+        old_pole = self._old_pole() if self.own_pole else ""
+        if old_pole:
+            self.out.lines.append(self._prefix() + old_pole)
 
     # -- what need not change -----------------------------------------------------------------------------------------
 
@@ -244,8 +246,12 @@ class Renderer(WordWriter):
         return "CC" + "".join(self.layout.blank + text for text in found.pole)
 
     def _old_pole(self) -> str:
-        """The pole that was in force, which later blocks may rely on."""
+        """The pole that was in force, which later blocks may rely on; empty if there was none."""
         target = self.target
+        if self.layout.name not in ("c", "cp"):
+            words = pole_in_force(self.program.source, int(self.program.blocks[self.block, 0]))
+            if words is not None:
+                return f"CC{self.layout.blank}{words}" if words else ""
         digits = max(POLE_DIGITS, int(target.decimals[target.spatial[target.plane[0]]]))
         pairs = sorted((index, float(target.original_centre[index])) for index in target.plane[:2])
         return "CC" + "".join(

@@ -16,7 +16,8 @@ ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control itself leave results."""
 
-TARGET = re.compile(r"Q[LRS]?\d+(?=\s*(?:=|,|\s|\Z))", re.IGNORECASE)
+TARGET = re.compile(r"(Q[LRS]?)(\d+)")
+CIRCLE = re.compile(r"FN\s*2[34]\b", re.IGNORECASE)
 READING = re.compile(r"FN\s*(18|2[0348])\b", re.IGNORECASE)
 PROGRAM_NAME = re.compile(r"CALL\s+PGM\s*(?P<name>.*)", re.IGNORECASE | re.DOTALL)
 FREE = re.compile(r"F(LT|L|CT|C|POL|SELECT)\b", re.IGNORECASE)
@@ -42,8 +43,16 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
         name = " ".join(text.split()[:2]).upper()
         control.refusal = control.refusal or f"{name} is not followed"
     elif READING.match(text):
-        for name in TARGET.findall(text):
-            control.scope.parameters.assign(name.upper(), 0.0, runtime=True)
+        read_values(control, text)
+
+
+def read_values(control: Control, text: str) -> None:
+    """FN 18, 28 and their like put what they read into a Q parameter; FN 23 and 24 into three in a row."""
+    for letters, number in TARGET.findall(text.partition("=")[0].upper()):
+        for offset in range(3):
+            control.scope.parameters.assign(f"{letters}{int(number) + offset}", 0.0, runtime=True)
+            if not CIRCLE.match(text):
+                break
 
 
 def tcpm(control: Control, found: re.Match[str]) -> None:
