@@ -111,6 +111,7 @@ class FanucPitch(Control):
         words = (settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes))
         files[SETTINGS] = (" ".join(words) + "\n").encode()
         notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
+        notes.append(f"{SETTINGS} is for ncfix emulate only; the control does not read it.")
         return Written(files, tuple(notes))
 
     def read(self, files: Files) -> Compensation:

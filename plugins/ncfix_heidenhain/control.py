@@ -261,6 +261,7 @@ def _notes(lines: tuple[Line, ...], most: int, both: bool) -> tuple[str, ...]:
         "A sum of tables over one axis each cannot follow angular errors, whose lever changes as another axis moves: "
         "that part of the error is left, unless the control has KinematicsComp (heidenhain-kinematics)."
     ]
+    notes.append("sign.txt is for ncfix emulate only; the control does not read it.")
     full = [line.input for line in lines if len(line.nodes) >= most > 2]
     if full:
         notes.append(f"With {most} rows the target is not reached along {', '.join(full)}.")

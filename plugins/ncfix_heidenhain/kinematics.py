@@ -197,6 +197,7 @@ def _read_units(files: Files, remarks: Remarks) -> tuple[float, float]:
 
 def _notes(components: list[Component], depends: list[bool], most: int) -> list[str]:
     notes = ["The direction of the tool is corrected only as far as rotary axes can turn themselves right."]
+    notes.append("units.txt is for ncfix emulate only; the control does not read it.")
     some = [each.axis for each, flag in zip(components, depends, strict=True) if flag]
     if some:
         notes.append(f"Errors of {', '.join(some)} depend on more than the position of the axis: the mean is written.")

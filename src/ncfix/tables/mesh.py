@@ -20,7 +20,7 @@ CLOSE = 48
 """Up to here every count is looked at, since nodes may come to lie on the kinks of a table; then some."""
 FAR = 130
 GROWTH = 1.15
-FINE = 1 / 16
+FINE = 1 / 8
 """Share of the target from which an axis alone is good enough."""
 LAST = 3
 """Of the largest grids, how many are tried."""
