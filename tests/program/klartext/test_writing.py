@@ -62,18 +62,20 @@ def test_the_old_pole_comes_back_after_one_that_was_put_in() -> None:
     assert len(poles) >= 3
 
 
-AFTER_CR = "L X+120 Y+0 Z+0 FMAX\nCC X+110,0 Y+10\nCR X+130 Y+10 R+10 DR+ F500\nLBL 1\nLP PR+30 IPA+10\nCALL LBL 1 REP 2"
+AFTER_CR = (
+    "L X+120 Y+0 Z+0 FMAX\nCC X+110,0 Y+10\nCR X+130 Y+10 R+10 DR+ F500\nLBL 1\nLP PR+30 IPA+10\nCALL LBL 1 REP 2"
+)
 
 
 def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
-    text = fixed(AFTER_CR, allow_refused=True).text.decode("latin-1")
+    text = fixed(AFTER_CR).text.decode("latin-1")
     assert [line for line in text.splitlines() if line.startswith("CC")][-1] == "CC X+110,0 Y+10"
 
 
 def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ncfix.program.klartext.render.pole_in_force", lambda source, at: None)
     with pytest.raises(SelfCheckError, match="would lead to"):
-        fixed(AFTER_CR, allow_refused=True)
+        fixed(AFTER_CR)
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ class Control(base.Control):
 
     def refuse_here(self, reason: str) -> None:
         """A motion that is not followed: none of the axes is known afterwards."""
-        unknown = dict.fromkeys(self.machine, reason)
+        unknown = dict.fromkeys(self.machine, f"where the axis {{}} stands is not known after this: {reason}")
         super().move(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason)
         self.path.tangent = None
 
