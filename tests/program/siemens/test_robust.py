@@ -1,0 +1,76 @@
+"""Random programs: each is followed or refused with a coded error, and what may be corrected is known."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import kinematics_of
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, load
+from ncfix.program.moves import Kind, Rule
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup, Tool
+from ncfix.program.trace import trace
+from program.siemens.following import SYSTEMS, ZERO
+
+SETUP = Setup(
+    work_offsets=dict.fromkeys(SYSTEMS, ZERO),
+    tools={number: Tool(100.0, 5.0) for number in range(3)},
+    initial={**ZERO, "Z": 200.0},
+)
+BLOCKS = """G0 X10 Y20 Z5|G1 X=IC(5) F100|G2 X20 Y3 CR=7.5|G3 I5 J0|X30 Y40|X1 Y1 Z1 A1 C1|G91|G90|G700|G710|G41|G40
+TRANS X10|AROT Z30|MIRROR X0|SCALE X2 Y2 Z2|ATRANS|G58 X1|G54|G500|G18|G17|DIAMON|DIAMOF|SUPA G0 Z0|G75 Z0
+TRAORI|TRAFOOF|A3=0.1 B3=0.2 C3=1|A3=0 B3=0 C3=1 X5|CYCLE800(0,"T",200000,57,15,0,0,0,30,0,0,0,0,-1)|CYCLE800()
+MCALL CYCLE81(50,0,2,-20)|MCALL|HOLES1(1,2)|AP=30 RP=10|G111 X1 Y1|CIP X10 I1=5 J1=5|C=DC(30)|A=IC(10)|T1 D1 M6
+R1=R1+1|IF R1>2 GOTOF DOWN|DOWN: X5|IF NOBODY==1 GOTOF DOWN|X=NOBODY|DEF REAL QQ=5|X=QQ|POS[X]=5|RND=2 X5|G4 F1|SUB1
+TURN=1 I5 J0|X10..5|=|MSG("x")|OTHER "x" 5|%|/X7|N10|;|BSPLINE X5|G64"""
+CHOICE = [block for line in BLOCKS.split("\n") for block in line.split("|")]
+SEEDS = 150
+
+
+def text_of(seed: int) -> str:
+    """Some blocks in a row."""
+    chance = random.Random(seed)
+    return "\n".join(chance.choice(CHOICE) for _ in range(chance.randint(3, 20))) + "\nM30\n"
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(str(root / "examples/machines/wCAYFXZSt.toml"))
+
+
+def test_what_may_be_corrected_is_known(machine: Machine) -> None:
+    followed = 0
+    for seed in range(SEEDS):
+        try:
+            program = read(text_of(seed).encode(), "part.mpf", "siemens")
+            kinematics = kinematics_of(machine)
+            moves = trace(program, SETUP, machine.axis_names, frozenset("AC"), None, 3000, kinematics).moves
+        except NcfixError:
+            continue
+        followed += 1
+        free = moves.rule == Rule.CORRECT
+        cut = free & (moves.kind != Kind.RAPID) & (moves.kind != Kind.DWELL)
+        assert not np.isnan(moves.end[free]).any(), seed
+        assert not np.isnan(moves.start[cut]).any(), seed
+        assert not np.isnan(moves.centre[free & (moves.kind == Kind.ARC)]).any(), seed
+    assert followed > SEEDS / 3
+
+
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
+def test_what_is_written_is_read_as_meant(machine: Machine, strategy: str) -> None:
+    """The product reads its own text again and would raise a fault of its own if it meant something else."""
+    fixed = 0
+    for seed in range(SEEDS, SEEDS + 40):
+        try:
+            program = read(text_of(seed).encode(), "part.mpf", "siemens")
+            fix_program(program, machine, SETUP, FixOptions(strategy=strategy, verify=False))
+        except NcfixError:
+            continue
+        fixed += 1
+    assert fixed > 10
