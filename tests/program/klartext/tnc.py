@@ -67,9 +67,6 @@ def ends(body: str, axes: str = "XYZ", **more: object) -> list[list[float]]:
     return [[round(float(value), 6) + 0.0 for value in row] for row in values]
 
 
-def fixed(
-    body: str, machine: Machine = THREE, setup: Setup = KNOWN, unit: str = "MM", *, allow_refused: bool = True
-) -> Fixed:
+def fixed(body: str, machine: Machine = THREE, setup: Setup = KNOWN, unit: str = "MM") -> Fixed:
     """The corrected program."""
-    options = FixOptions(allow_refused=allow_refused)
-    return fix_program(read(program(body, unit), "t.h", "heidenhain"), machine, setup, options)
+    return fix_program(read(program(body, unit), "t.h", "heidenhain"), machine, setup, FixOptions(allow_refused=True))
