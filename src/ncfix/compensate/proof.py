@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.arcs import across
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.settle import Settled
 from ncfix.diagnostics import NcfixError
 from ncfix.program.emit import Reading
@@ -18,6 +18,9 @@ from ncfix.program.tree import Program
 
 SAME = 1e-6
 """mm and rad; the emitter's book and a second reading differ by floating-point noise only."""
+STRAY = 1.0
+"""mm and rad; more than earlier corrections can shift a motion that is kept (or `STRAYS` times the largest of them)."""
+STRAYS = 10.0
 ATTEMPTS = 4
 """A second attempt knows the frames that moved with the first; the others are for frames that depend on frames."""
 
@@ -57,8 +60,10 @@ def proven(program: Program, attempt: Callable[[Reading | None], tuple[Settled, 
         reading = Reading.of(again, settled.plan.pieces)
     assert wrong is not None
     piece = int(np.argmax(wrong))
-    line = program.line(int(settled.moves.block[settled.plan.pieces.move[piece]]))
-    raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {settled.emission.end[piece]}")
+    move = int(settled.plan.pieces.move[piece])
+    line = program.line(int(settled.moves.block[move]))
+    meant = settled.moves.end[move] if settled.plan.pieces.kept[piece] else settled.emission.end[piece]
+    raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
 
 
 def _followed(program: Program, text: bytes, settled: Settled, follow: Follow) -> Moves:
@@ -81,13 +86,24 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
         return None
-    differs: Mask = _differs(again.end, emission.end[rows])
+    differs: Mask = _differs(again.end, emission.end[rows]) | _strayed(settled, again, rows)
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[_differs(off, np.zeros_like(off))]] = True
     return differs
+
+
+def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
+    """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
+    pieces, ends = settled.plan.pieces, settled.moves.end
+    kept = pieces.kept[rows]
+    last = pieces.fraction == 1
+    shifts = np.abs(pieces.end[last] - ends[pieces.move[last]])
+    most = max(STRAY, STRAYS * float(np.max(shifts[np.isfinite(shifts)], initial=0.0)))
+    strayed: Mask = (np.abs(again.end - ends[pieces.move[rows]]) > most).any(axis=1) & kept
+    return strayed
 
 
 def _differs(found: Array, meant: Array) -> Mask:
