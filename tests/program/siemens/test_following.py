@@ -243,6 +243,11 @@ def test_what_is_not_given_is_asked_for() -> None:
     assert texts == ["length of tool DRILL 8.5 is used and not given", "work offset G54 is used and not given"]
 
 
+def test_a_frame_over_a_transformation_is_said() -> None:
+    assert [message.code for message in follow("TRANS X1\nTRAORI\nG0 X1 Y1 Z1").messages] == ["NCF255"]
+    assert not follow("G54\nTRAORI\nTRANS X1\nG0 X1 Y1 Z1\nTRANS\nTRAFOOF").messages
+
+
 def test_an_axis_that_the_machine_lacks_is_named() -> None:
     with pytest.raises(UsageError, match="axis C1"):
         follow("G0 X1 C1=DC(5)")

@@ -10,6 +10,7 @@ from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.sinumerik import framing, motion
+from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import End, Words, set_pole
 from ncfix.program.sinumerik.orientation import OTHERS, VECTOR
@@ -34,6 +35,7 @@ Find = Callable[[str], Unit | None]
 
 CONFLICT = "NCF208"
 UNKNOWN_CYCLE = "NCF252"
+FRAME_STAYS = "NCF255"
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
 _PASSED = """
     G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
@@ -130,12 +132,22 @@ def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
+    warn_of_frame(control, step)
     control.modes.transformed = True
     control.switch_tcp()
 
 
+def warn_of_frame(control: Sinumerik, step: Calling) -> None:
+    """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
+    if control.frames.program != WORLD:
+        text = f"the programmed frame (TRANS, ROT, ...) is taken to stay in force over {step.name.upper()}"
+        control.warn(FRAME_STAYS, text, "program it anew after the transformation, or take it out before")
+
+
 def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAFOOF."""
+    if control.modes.transformed:
+        warn_of_frame(control, step)
     control.modes.transformed = False
     if control.suspended.pop("coordinates", None):
         control.lose_all(framing.AFTER_UNFOLLOWED)
