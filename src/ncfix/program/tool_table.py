@@ -1,4 +1,4 @@
-"""Tool tables: LinuxCNC's `.tbl`, and CSV with a header.
+"""Tool tables: LinuxCNC's `.tbl`, Heidenhain's TOOL.T (`tool_t`), and CSV with a header.
 
 LinuxCNC documentation, "Tool table format": one tool a line, `T1 P1 Z120.5 D10 ; comment`; Z is the length offset and D
 the diameter, in the machine's unit, which is mm here.
@@ -15,6 +15,7 @@ from pathlib import PurePath
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.program.setup import Tool
+from ncfix.program.tool_t import is_tool_t, tool_t_rows
 
 BAD_TABLE = "NCF385"
 ENTRY = re.compile(r"([A-Za-z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
@@ -23,12 +24,14 @@ COLUMNS = ("tool", "length", "radius", "diameter")
 
 
 def load_tool_table(path: str) -> dict[int, Tool]:
-    """The tools in a control's table, by number; the form follows from the suffix, `.csv` or else LinuxCNC's.
+    """The tools in a control's table, by number: Heidenhain's by its first line, CSV by its suffix, else LinuxCNC's.
 
     Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
     """
     text = read_bytes(path).decode("utf-8-sig", "replace")
     reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else linuxcnc_rows
+    if is_tool_t(text):
+        reader = tool_t_rows
     faults: list[Message] = []
     tools: dict[int, Tool] = {}
     for line, content in reader(text):

@@ -34,6 +34,8 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     if tool is None and "DL" not in words.values:
         return
     control.suspended.pop(TOOL, None)
+    if isinstance(tool, float) and not tool.is_integer():
+        tool = f"{tool:g}"
     axis = next((letter for letter in "xyuvw" if letter in flags), None)
     named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
     if isinstance(tool, str) and (named is None or named.length is None):

@@ -1,0 +1,53 @@
+"""Heidenhain's TOOL.T."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ncfix.diagnostics import ConfigError
+from ncfix.program.setup import Tool
+from ncfix.program.tool_table import load_tool_table
+
+TABLE = """\
+BEGIN TOOL .T {unit}
+T      NAME             L          R          R2         DL      DR      TL
+0      NULLWERKZEUG     +0         +0         +0         +0      +0
+5      BALL_D8          +120.5     +4         +4         +0.02   -0.01
+5.1    BALL_D8          +110       +4         +4
+6
+7      MILL D16         +90,25     +8
+[END]
+"""
+
+
+def read(tmp_path: Path, text: str) -> dict[int, Tool]:
+    path = tmp_path / "TOOL.T"
+    path.write_text(text)
+    return load_tool_table(str(path))
+
+
+def test_lengths_and_radii_with_their_oversizes(tmp_path: Path) -> None:
+    found = read(tmp_path, TABLE.format(unit="MM"))
+    assert found.keys() == {0, 5, 7}
+    assert found[5].length == pytest.approx(120.52)
+    assert found[5].radius == pytest.approx(3.99)
+    assert found[7] == Tool(90.25, 8.0)
+
+
+def test_inches(tmp_path: Path) -> None:
+    assert read(tmp_path, TABLE.format(unit="INCH"))[7].length == pytest.approx(90.25 * 25.4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what"),
+    [
+        ("+90,25", "+9O,25", "L: '\\+9O,25' is not a number"),
+        ("7      MILL", "X      MILL", "'X' is not a tool number"),
+        ("T      NAME", "N      NAME", "no columns T and L"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, what: str) -> None:
+    with pytest.raises(ConfigError, match=what):
+        read(tmp_path, TABLE.format(unit="MM").replace(old, new))
