@@ -118,6 +118,7 @@ class FanucRotary(Control):
     name = "fanuc-rotary"
     title = "Fanuc Series 30i three-dimensional compensation with angles"
     reaches = "L-VOL"
+    any_tool = True
     properties = Properties(
         value_sign="as --set sign says",
         input_signal="setpoint",

@@ -74,6 +74,7 @@ class Gcode(Control):
     title = "Rewritten programs, any control"
     reaches = "L-VOL+, R-VOL+"
     rewrites = True
+    any_tool = True
     properties = Properties(
         value_sign="correction",
         input_signal="setpoint",

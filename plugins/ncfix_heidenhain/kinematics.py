@@ -28,6 +28,7 @@ class KinematicsComp(Control):
     name = "heidenhain-kinematics"
     title = "Heidenhain KinematicsComp (iTNC 530)"
     reaches = "L-VOL, and the position part of R-VOL"
+    any_tool = True
     properties = Properties(
         value_sign="as --set sign says",
         input_signal="setpoint",

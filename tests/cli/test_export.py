@@ -171,3 +171,10 @@ def test_tables_on_top_of_a_corrected_program_are_refused(shop: Any, ncfix: Any,
     assert result.code == ExitCode.REFUSED
     assert "NCF493" in result.err
     assert "corrected twice" in result.err
+
+
+def test_a_machine_without_errors_leaves_programs_as_they_are(shop: Any, ncfix: Any) -> None:
+    arguments = ("-m", shop.perfect, "-o", shop.folder / "g", "--program", shop.program)
+    found = ncfix("export", "gcode", *arguments, "--json").json()["program"]
+    assert found["error_before_um"]["max"] == found["error_after_um"]["max"] == 0
+    assert (shop.folder / "g" / shop.program.name).read_bytes() == shop.program.read_bytes()

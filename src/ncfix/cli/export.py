@@ -150,5 +150,7 @@ def tell(made: Exported, as_json: bool, **more: object) -> None:
     if isinstance(program, dict):
         for when in ("before", "after"):
             console.put(f"{program['path']} {when}: {console.error_figures(program[f'error_{when}_um'])}\n")
+        if program["error_after_um"]["rms"] > program["error_before_um"]["rms"]:
+            console.say("This program is made worse: it runs where these tables do not fit the machine.")
     for note in made.notes:
         console.say(note)

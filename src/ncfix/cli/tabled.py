@@ -25,20 +25,24 @@ def along(
 ) -> dict[str, Any]:
     """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um}`.
 
+    Both are looked at where the tool cuts; rewritten programs have the figures of `fix` after, which looks at the ends
+    of rapids too.
+
     Raises `RefusedError` NCF493 for a program that carries a stamp of ncfix: it would be corrected twice.
     """
-    if control.rewrites:
-        entry = rewritten(following, settings, path).report.as_dict()
-        return {"path": shown(path), **{key: entry[key] for key in ("error_before_um", "error_after_um")}}
     from ncfix.compensate.simulation import tip_error
     from ncfix.compensate.tabled import tip_error_with
 
     program, followed = _followed(following, path)
     names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
     lines = lines_of(program, moves.block)
-    after = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
     before = figures(tip_error(machine, moves), lines)
-    return {"path": shown(path), "error_before_um": before, "error_after_um": figures(after, lines)}
+    if control.rewrites:
+        after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
+    else:
+        error = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
+        after = figures(error, lines)
+    return {"path": shown(path), "error_before_um": before, "error_after_um": after}
 
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
@@ -68,6 +72,6 @@ def _followed(following: Following, path: str) -> tuple[Program, Followed]:
     block = stamp.find(program)
     if block is not None:
         text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
-        place = program.place(block) or Place(shown(path))
+        place = program.place(block)
         raise RefusedError.of("NCF493", text, place, "give the original program, or run this one without tables")
     return program, follow(program, following.machine, following.setup, subprograms(path))

@@ -108,6 +108,7 @@ class Control(ABC):
     steps        what to do at the machine, in order
     switch_off   how to be rid of it
     rewrites     it has no tables, but programs that are rewritten
+    any_tool     what it does holds for tools of any length
     """
 
     name: ClassVar[str]
@@ -119,6 +120,7 @@ class Control(ABC):
     steps: ClassVar[tuple[str, ...]]
     switch_off: ClassVar[str]
     rewrites: ClassVar[bool] = False
+    any_tool: ClassVar[bool] = False
 
     @abstractmethod
     def write(self, request: Request) -> Written:
@@ -141,7 +143,7 @@ class Control(ABC):
         raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
 
     def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
-        """All options with those given; raises `UsageError` NCF485 for one that is unknown, or missing if `complete`."""
+        """All options with those given; raises `UsageError` NCF485 for one unknown or, if `complete`, missing."""
         for key in given:
             if key not in self.options:
                 known = ", ".join(self.options) or "none"

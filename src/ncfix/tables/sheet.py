@@ -24,7 +24,10 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     yield f"- Tip error: max {before['max']:.2f} um, rms {before['rms']:.2f} um without the tables;"
     yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {_pose(after['at'])}."
     yield f"- Class (ISO/TR 16907): {control.reaches}. Tables: {len(tables.grids)}, points: {tables.points}."
-    yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request)}."
+    if control.any_tool:
+        yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
+    else:
+        yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request)}."
     yield "- Not checked: collisions, and whether the control has the options that the tables need."
     yield from _list("Largest corrections", _corrections(left))
     yield from _list("Range covered; beyond it: " + control.properties.extrapolation, _ranges(request))
