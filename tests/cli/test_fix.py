@@ -144,6 +144,7 @@ def test_a_refusal_writes_nothing_unless_allowed(shop: Any, ncfix: Any) -> None:
     assert f"{shop.program}:3: NCF404" in result.err
     assert not (shop.folder / "out.ngc").exists()
     allowed = fixed(shop, ncfix, "--allow-refused")
+    assert len(re.findall(r"tip error \w+ .*; without what is refused\n", allowed.err)) == 2
     assert allowed.code == ExitCode.DONE
     assert b"\nG1 X500 F600\n" in (shop.folder / "out.ngc").read_bytes()
 

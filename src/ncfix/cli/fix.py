@@ -220,8 +220,9 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
         f"  largest correction  {entry['max_correction_um']:.1f} um",
     ]
     if entry["error_before_um"]:
-        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}")
-        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}")
+        without = "; without what is refused" if entry["refused"] else ""
+        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}{without}")
+        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
     if entry["leaves"]:
         lines.append(f"  {entry['strategy']}: {entry['leaves']}")
     return lines
