@@ -192,7 +192,9 @@ class _Emitter:
 
     def _keep(self, row: int) -> None:
         moves = self.moves
-        moved = self.moved[row]
+        moved, began, ended = self.moved[row], self.reading.start, self.reading.end
+        if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
+            moved = moved | (np.abs(ended[row] - began[row]) > 0)
         self.position = np.where(moved, self._kept_end(row), self.position)
         self.end[self.first_piece[row]] = self.position
         if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:

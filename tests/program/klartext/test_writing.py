@@ -78,6 +78,14 @@ def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytes
         fixed(AFTER_CR)
 
 
+def test_a_departure_goes_on_along_the_corrected_line() -> None:
+    body = "L X+120 Y+0 Z+0 FMAX\nL X+140 RL F500\nL X+300 Y+30\nDEP LT LEN20\nL Z+100 R0 FMAX"
+    ends = fixed(body).text.decode("latin-1").splitlines()
+    assert "DEP LT LEN20" in ends
+    straight = body.replace("X+300 Y+30", "X+300")
+    assert "DEP LT LEN20" in fixed(straight).text.decode("latin-1").splitlines()
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
