@@ -32,7 +32,7 @@ KNOWN = 200.0
 """The same where the header of a file states it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Background:
     """The coordinates and the likelihoods in them.
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from ncfix.diagnose.background import Background
 from ncfix.diagnose.misfit import misfit
 from ncfix.diagnose.view import View
 from ncfix.diagnostics import Message, UsageError
@@ -62,7 +61,7 @@ def enough(view: View) -> None:
         raise UsageError.of("NCF650", text, hint="measure more poses")
 
 
-def agreeing(view: View, ground: Background, residual: Array, sigma: float) -> None:
+def agreeing(view: View, residual: Array, sigma: float) -> None:
     """Refuse files that differ where they measured the same. Raises `UsageError` NCF656."""
     if len(view.measurements) < 2:
         return
@@ -70,8 +69,8 @@ def agreeing(view: View, ground: Background, residual: Array, sigma: float) -> N
     q = np.round(view.q, 6)
     places: dict[tuple[bytes, float, int], list[tuple[int, float]]] = {}
     length = view.column("tool_length")
-    for value, row, part, weight in zip(residual, view.row, view.component, ground.relative, strict=True):
-        if row >= 0 and weight < 10:
+    for value, row, part in zip(residual, view.row, view.component, strict=True):
+        if row >= 0:
             key = (q[row].tobytes(), float(length[row]), int(part))
             places.setdefault(key, []).append((int(view.file[row]), float(value)))
     for found in places.values():

@@ -35,7 +35,7 @@ EXCESS_UM = 2.0
 """And this much more than the noise, rms: machines have a little of everything."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Finding:
     """One named effect.
 
@@ -67,7 +67,7 @@ class Gap:
     holdout_after: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """What was found, and everything a report needs.
 
@@ -171,7 +171,7 @@ def _concluded(
     joint = addition.fitted(court, members, share)
     keep = ~outlying[np.maximum(seen.row, 0)] & (seen.row >= 0)
     sigma = _sigma(court, selected, share)
-    checks.agreeing(seen, ground, joint.before, sigma)
+    checks.agreeing(seen, joint.before, sigma)
     floor = noise.floor(seen, ground, sigma, keep)
     named = [(name, k) for k, name in enumerate(selected.members) if name not in UNNAMED]
     machine, added = addition.machine_with(court, [members[k] for _, k in named], joint.only([k for _, k in named]))
@@ -183,12 +183,12 @@ def _concluded(
         for (name, k), effects in zip(named, added, strict=True)
     )  # fmt: skip
     rest = [k for k, name in enumerate(selected.members) if name in UNNAMED]
-    unknown = sum((joint.shown[k] for k in rest), np.zeros(len(seen.y)))
-    unknown_um = seen.rms(unknown, keep) if rest else 0.0
-    held = holdout.held_out(court, members, share)
+    told = [members[k] for _, k in named]
+    after = addition.fitted(court, told, share).after if rest else joint.after
+    unknown_um = seen.rms(after - joint.after, keep) if rest else 0.0
+    held = holdout.held_out(court, told, share)
     known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
     parameters = float(np.linalg.matrix_rank(seen.base))
-    after = joint.after + unknown
     p_left = noise.lack_of_fit(floor, after[keep], parameters + sum(len(joint.numbers[k]) for _, k in named) / 2)
     excess = np.sqrt(max(seen.rms(after, keep) ** 2 - _length(seen, keep, floor.sigma_um) ** 2, 0.0))
     if p_left is not None and p_left < LACKING and excess > EXCESS_UM:
@@ -200,7 +200,7 @@ def _concluded(
         unknown_kind=_kind([court.groups[members[k].group].owner.title for k in rest], unknown_um),
         gap=Gap(
             seen.rms(joint.before, keep), seen.rms(after, keep), _length(seen, keep, floor.sigma_um),
-            seen.rms(held.without, known), seen.rms(_with_unknown_left(held, joint, unknown), known),
+            seen.rms(held.without, known), seen.rms(held.with_all, known),
         ),
         floor=floor,
         machine=machine if any(added) else None,
@@ -239,11 +239,6 @@ def _proposal(
 
 def _kind(titles: Sequence[str], unknown_um: float) -> str:
     return " and ".join(titles) or ("something that follows no pattern that was looked for" if unknown_um else "")
-
-
-def _with_unknown_left(held: holdout.HeldOut, joint: addition.Joint, unknown: Array) -> Array:
-    """Errors on held-out poses; what has no name is not predicted by the machine file."""
-    return held.with_all + unknown
 
 
 def _sigma(court: Court, selected: Selected, share: float) -> float:

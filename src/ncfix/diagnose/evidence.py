@@ -60,7 +60,7 @@ class Evidence:
         return Member(groups[int(form)], SIZES[int(size)])
 
 
-@dataclass
+@dataclass(repr=False)
 class Court:
     """All groups in the coordinates of the background, and the names that own them."""
 

@@ -25,7 +25,7 @@ LED = 0.5
 """Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Group:
     """One form of a candidate.
 
@@ -39,7 +39,7 @@ class Group:
     columns: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Gathered:
     """The groups that the data show, and the candidates that they cannot show, with the share that is left."""
 

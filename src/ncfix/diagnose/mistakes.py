@@ -40,7 +40,7 @@ OFF_MM = 0.3
 INCH = 25.4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mistake:
     """A mistake, and machine and measurements as they are without it.
 

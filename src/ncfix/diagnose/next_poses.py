@@ -34,7 +34,7 @@ WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Proposal:
     """Poses to be measured.
 
@@ -51,7 +51,7 @@ class Proposal:
     rivals: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Contest:
     """One rival against the effect: information of the old rows, and the blocks of every pose on offer.
 

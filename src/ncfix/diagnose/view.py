@@ -28,7 +28,7 @@ HARDLY = 1e-5
 """Singular values below this, of the largest, are taken for what cannot be told."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class View:
     """One entry per value.
 

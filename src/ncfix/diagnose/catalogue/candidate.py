@@ -23,7 +23,7 @@ UNTOUCHED_MM, UNTOUCHED_DEG = 1.0, 5.0
 """An axis that moves less than this was not measured."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Candidate:
     """A physical effect that may be missing.
 

@@ -1,0 +1,149 @@
+"""Effects that were put in are named, nothing is named where nothing is, and poor data are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.poses import machine, perfect, plan
+from ncfix.diagnose import page, result, words
+from ncfix.diagnose.catalogue import catalogue, without
+from ncfix.diagnose.checks import remarks
+from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
+from ncfix.diagnose.view import view
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Effect, Machine
+from ncfix.machine.smooth import Backlash
+from ncfix.measure.measurement import Measurement
+from ncfix.measure.synthetic import Faults, simulate
+
+NOISE_UM = 2.0
+
+
+def measured(known: Machine, count: int = 150, seed: int = 1, noise_um: float = NOISE_UM) -> Measurement:
+    return simulate(plan(known, "tcp", count, seed), known, Faults(noise_um), seed)
+
+
+def lines(known: Machine) -> Machine:
+    """The machine with its location errors only."""
+    return known.replace(effects=tuple(effect for effect in known.effects if effect.location))
+
+
+@pytest.fixture(scope="module")
+def known() -> Machine:
+    return lines(machine("wCBXFZYSt"))
+
+
+@pytest.fixture(scope="module")
+def backlash(known: Machine) -> Diagnosis:
+    worn = known.replace(effects=(*known.effects, Effect("EXX", (0.016,), Backlash())))
+    return diagnose([measured(worn)], known)
+
+
+def test_a_backlash_is_named_and_added(backlash: Diagnosis) -> None:
+    first = backlash.findings[0]
+    assert (first.candidate.name, backlash.verdict) == ("backlash X", FOUND)
+    assert backlash.machine is not None
+    added = [effect for effect in backlash.machine.effects if isinstance(effect.basis, Backlash)]
+    constant, _, bowed = added[0].coefficients
+    assert abs(constant + bowed / 3 - 0.016) < 0.001  # mean over the travel; 2 um over 150 poses: 0.33 um, three sigma
+    assert backlash.gap.holdout_after < 0.6 * backlash.gap.holdout_before
+    assert backlash.gap.after < 1.15 * backlash.gap.floor
+
+
+def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
+    found = result.as_dict(backlash)
+    assert {"verdict", "effects", "unknown", "gap_um", "where", "next_measurements", "machine"} <= set(found)
+    assert set(found["gap_um"]) == {"before", "after", "floor", "holdout_before", "holdout_after"}
+    wanted = {"name", "title", "axis", "why", "coefficients", "sigma", "p_value", "aliases"}
+    assert wanted <= set(found["effects"][0])
+    assert result.with_provenance(backlash).provenance["added"] == "backlash X"
+
+
+def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
+    assert "backlash X" in words.text(backlash)
+    html = page.page(backlash)
+    assert "backlash X" in html
+    assert html.count("<svg") >= 5
+
+
+def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:
+    worn = known.replace(effects=(*known.effects, Effect("EXX", (0.016,), Backlash())))
+    found = diagnose([measured(worn, 80)], known, ("backlash-x", "no such name"))
+    assert all(each.candidate.name != "backlash X" for each in found.findings)
+    assert found.unheard_of == ("no such name",)
+    assert any(message.code == "NCF657" for message in remarks(found.view, found.unheard_of))
+
+
+def test_nothing_is_named_where_nothing_is(known: Machine) -> None:
+    found = diagnose([measured(known, 100)], known)
+    assert (found.verdict, found.findings, found.machine) == (NOTHING, (), None)
+
+
+def test_the_catalogue_has_fifty_names_each_once(known: Machine) -> None:
+    names = [each.name for each in catalogue(view([measured(known, 40)], known).reach)]
+    assert len(names) == len(set(names)) >= 50
+    assert without(catalogue(view([measured(known, 40)], known).reach), ["exx"])[0][0].name != "EXX"
+
+
+def test_errors_with_the_sign_of_corrections_are_a_mistake(known: Machine) -> None:
+    large = known.replace(effects=tuple(scaled(effect, 8.0) for effect in known.effects))
+    turned = known.replace(effects=tuple(scaled(effect, -8.0) for effect in known.effects))
+    found = diagnose([measured(large, 80)], turned)
+    assert found.findings[0].candidate.name == "wrong sign"
+    assert found.verdict in (FOUND, AMBIGUOUS)
+
+
+def scaled(effect: Effect, factor: float) -> Effect:
+    return replace(effect, coefficients=tuple(factor * c for c in effect.coefficients))
+
+
+def refused(code: str, data: list[Measurement], known: Machine) -> None:
+    with pytest.raises(NcfixError) as caught:
+        diagnose(data, known)
+    assert caught.value.messages[0].code == code
+
+
+def test_one_pose_is_refused(known: Machine) -> None:
+    refused("NCF651", [measured(known, 40).rows([0] * 40)], known)
+
+
+def test_no_repeats_and_no_noise_are_refused(known: Machine) -> None:
+    data = measured(known, 40)
+    silent = replace(data, headers=tuple(pair for pair in data.headers if pair[0] != "noise_um"))
+    refused("NCF652", [silent], known)
+
+
+def test_too_few_values_are_refused(known: Machine) -> None:
+    refused("NCF650", [measured(known, 7)], known)
+
+
+def test_another_machine_is_refused(known: Machine) -> None:
+    data = measured(known, 80)
+    noise = np.random.default_rng(0).normal(scale=2.0, size=80)
+    refused("NCF654", [data.with_columns({"dx": data.columns["dx"] + noise})], known)
+
+
+def test_files_that_contradict_each_other_are_refused(known: Machine) -> None:
+    first = measured(known, 80)
+    worse = np.where(np.arange(80) % 2, 0.03, -0.03)
+    second = replace(first.with_columns({"dy": first.columns["dy"] + worse}), path="second.csv")
+    refused("NCF656", [first, second], known)
+
+
+def test_one_side_only_is_said(known: Machine) -> None:
+    poses = plan(known, "tcp", 60)
+    one = poses.with_columns({name: np.ones(60) for name in poses.columns if name.startswith("dir_")})
+    seen = view([simulate(one, known, Faults(NOISE_UM), 1)], known)
+    assert [message.code for message in remarks(seen, ())] == ["NCF653"]
+    assert not any("backlash" in each.name for each in catalogue(seen.reach))
+
+
+def test_a_file_worse_than_none_is_refused(known: Machine) -> None:
+    random = np.random.default_rng(5)
+    wild = [replace(e, coefficients=(random.uniform(-5e-4, 5e-4),)) for e in known.effects if e.rotational]
+    bad = known.replace(effects=tuple(wild))
+    bent = perfect(known).replace(effects=(Effect("EXX", (0.06,), Backlash()),))
+    refused("NCF655", [measured(bent, 80)], bad)
