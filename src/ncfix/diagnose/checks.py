@@ -22,6 +22,8 @@ NEIGHBOURS = 60
 STRANGE_UM = 300.0
 """Residuals, rms, that no machine tool has."""
 WORSE = 1.3
+AS_IT_STANDS_UM = 0.01
+"""Constants are not refitted where the file itself is judged."""
 CONTRADICTION = 1e-6
 
 
@@ -43,7 +45,7 @@ def _nothing(machine: Machine) -> Selection:
 
 def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
     """Refuse what no mistake explains. Raises `UsageError` NCF654, NCF655."""
-    now = misfit(measurements, machine)
+    now = misfit(measurements, machine, tight_um=AS_IT_STANDS_UM)
     if now.free > STRANGE_UM:
         text = f"{now.free:.0f} um rms are left after the set-up was fitted"
         raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")

@@ -35,7 +35,9 @@ class Misfit:
     loose: Array
 
 
-def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:
+def misfit(
+    measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = (), tight_um: float = TIGHT_UM
+) -> Misfit:
     """Fit and look."""
     selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
     problem = Problem.of(measurements, machine, selection)
@@ -43,7 +45,7 @@ def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequenc
     known = [each.sigma for each in problem.observations if each.noise_known]
     sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
     relative = relative_noise(problem)
-    tight, coefficients = _fitted(problem, relative, sigma, TIGHT_UM, free)
+    tight, coefficients = _fitted(problem, relative, sigma, tight_um, free)
     wide, _ = _fitted(problem, relative, sigma, WIDE_UM, free)
     return Misfit(tight, wide, sigma, coefficients[len(coefficients) - free :] if free else np.zeros(0))
 

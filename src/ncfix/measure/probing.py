@@ -96,7 +96,7 @@ class Probing(Observation):
         """See `Observation`."""
         tip = self.machine.design(self.meant, self.state, effects)[:, :3]
         rows = -np.einsum("nij,njk->nik", self.axes_by_tip, tip)
-        rows = rows.reshape(-1, rows.shape[-1])
+        rows = rows.reshape(3 * len(self.measurement), rows.shape[-1])
         return np.concatenate([rows, np.zeros((len(self.distances), rows.shape[1]))])
 
     def unknown_design(self, unknowns: Array) -> Array:
