@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from classes.judging import SETUP, machine
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.machine import load
 from ncfix.program.reader import read
+from ncfix.program.setup import Setup
 
 
 def written(body: str) -> str:
@@ -50,3 +55,18 @@ def written(body: str) -> str:
 )
 def test_a_corrected_block_keeps_its_manner(body: str, expected: str) -> None:
     assert written(body) == expected
+
+
+CRADLE = Path(__file__).parents[3] / "examples" / "machines" / "wCAYFXZSt.toml"
+
+
+@pytest.mark.parametrize("turn", ["ACN(20)", "ACP(5)", "DC(350)"])
+def test_a_turn_past_zero_is_not_split(turn: str) -> None:
+    """The control counts from 0 to 360 degrees again after it: pieces in plain degrees would turn once more."""
+    source = f"G54 G0 X10 Y0 Z100 A0 C10\nG1 F2000 X12 C={turn}\nX20 C=IC(90)\nM30\n".encode()
+    program = read(source, "part.mpf", "siemens")
+    text = fix_program(program, load(CRADLE), Setup(assume_zero=True), FixOptions(verify=False)).text.decode()
+    after = text.split(f"C={turn}")[1].splitlines()
+    assert "C=IC(" in after[1]
+    (step,) = re.findall(r"C=IC\(([\d.]+)\)", text)
+    assert 0 < float(step) <= 90

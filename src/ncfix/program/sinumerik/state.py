@@ -279,7 +279,7 @@ class Sinumerik(Control):
         if words.values.keys() & {"AP", "RP"}:
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
         self.lost = end.lost
-        refusal, self.whole = refusal or words.refusal, words.whole
+        refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(end.target)
         if not passing and not refusal:
             self.ask_for_length()
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
@@ -310,6 +310,11 @@ class Sinumerik(Control):
             return np.array([(tips[1][place] - tips[0][place]) / PROBE for place in places])
 
         return Pointing.of((turning[0], turning[1]), ask)
+
+    def _passes_zero(self, target: Vector) -> bool:
+        """Whether DC, ACP or ACN leads an axis past a full turn: then pieces of the way would count otherwise."""
+        turn = 2 * math.pi
+        return any(not 0 <= place < turn for index in self.over for place in (self.position[index], target[index]))
 
     def wrap(self) -> None:
         """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""
