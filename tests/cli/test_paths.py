@@ -155,6 +155,14 @@ def test_verify_on_the_shipped_example_against_itself(examples: Path, ncfix: Any
     assert said["error_after_um"]["max"] == pytest.approx(said["error_before_um"]["max"], rel=0.2)
 
 
+def test_verify_passes_what_fix_wrote_on_a_machine_with_play(examples: Path, ncfix: Any, tmp_path: Path) -> None:
+    program, setup = examples / "programs/blade.nc", examples / "programs/blade.setup.toml"
+    common = ["-m", examples / "machines/wCBXFZYSt.toml", "--setup", setup]
+    assert ncfix("fix", program, "-o", tmp_path, *common).code == ExitCode.DONE
+    result = ncfix("verify", program, tmp_path / "blade.nc", *common)
+    assert result.code == ExitCode.DONE, result.out
+
+
 def test_two_ways_to_look_at_a_corrected_program_agree(examples: Path, ncfix: Any, tmp_path: Path) -> None:
     """`fix` compares at the same instant of the planned motions, `verify` curves that it reads from the two files.
 

@@ -9,11 +9,12 @@ breadth beside it, is not taken for the one that is meant.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.flanks import other_side, uncertain
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import TipError, actual_tip, batches, samples
 from ncfix.diagnostics import UsageError
@@ -82,7 +83,35 @@ def compare(machine: Machine, original: Moves, other: Moves, state: State = Stat
     _check_alike(intended, actual)
     there = TipError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
     back = TipError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
+    turning = uncertain(done, actual.rows, actual.fraction)
+    if turning.any():
+        there, back = _on_either_side(done, turning, intended, actual, there, back)
     return there, back
+
+
+def _on_either_side(
+    done: Intent, turning: Mask, intended: Curve, actual: Curve, there: TipError, back: TipError
+) -> tuple[TipError, TipError]:
+    """The same where axes that turn round may be on either side of their play: of both sides the nearer one."""
+    motions = np.zeros((len(done.moves), turning.shape[1]), dtype=bool)
+    np.logical_or.at(motions, actual.rows, turning)
+
+    def tip(rows: Index, fraction: Array) -> Array:
+        return other_side(done, rows, fraction, motions[rows])
+
+    parts = batches(len(actual.rows))
+    sides = [other_side(done, actual.rows[part], actual.fraction[part], turning[part]) for part in parts]
+    points = np.concatenate(sides)
+    other = replace(actual, points=points, tip=tip)
+    on_curve = TipError(actual.rows, actual.fraction, nearest(intended, other), points)
+    return _nearer(there, on_curve), _nearer(back, replace(back, actual=nearest(other, intended)))
+
+
+def _nearer(one: TipError, other: TipError) -> TipError:
+    """Of two errors along the same samples, the smaller one at each."""
+    better = (other.size < one.size)[:, None]
+    intended, actual = np.where(better, other.intended, one.intended), np.where(better, other.actual, one.actual)
+    return TipError(one.rows, one.fraction, intended, actual)
 
 
 def _check_alike(intended: Curve, actual: Curve) -> None:

@@ -25,9 +25,10 @@ class Finding:
     code    stable code, explained in `codes.py`
     moves   (k,) indices of the motions, ascending
     values  (k,) one figure per motion, in the unit that `text` names
-    text    sentence with the fields `{value}` and `{axis}`
+    text    sentence with the fields `{value}`, `{axis}` and `{unit}`
     axes    (k,) axis letter per motion, or empty
     hint    what to do about it
+    turns   (k,) whether that axis is rotary, and the value in degrees; or empty
     """
 
     code: str
@@ -36,6 +37,7 @@ class Finding:
     text: str
     axes: tuple[str, ...] = ()
     hint: str = ""
+    turns: tuple[bool, ...] = ()
 
     def __len__(self) -> int:
         return len(self.moves)
@@ -43,7 +45,8 @@ class Finding:
     def sentence(self, k: int) -> str:
         """What is the matter with the k-th motion."""
         axis = self.axes[k] if self.axes else ""
-        return self.text.format(value=float(self.values[k]), axis=axis)
+        unit = "degrees" if self.turns and self.turns[k] else "mm"
+        return self.text.format(value=float(self.values[k]), axis=axis, unit=unit)
 
     def messages(self, place_of: Callable[[int], Place | None], most: int = MOST) -> tuple[Message, ...]:
         """One message per motion, at most `most`; the last one says how many more there are."""

@@ -17,7 +17,7 @@ from ncfix.compensate.account import Account, FixReport, Refusal
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.proof import proven
+from ncfix.compensate.proof import SelfCheckError, proven
 from ncfix.compensate.settle import Settled, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
@@ -30,6 +30,9 @@ from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
+
+ASTRAY = 1.0
+"""mm; no correction and no remainder of one is so large."""
 
 __all__ = ["FixOptions", "Fixed", "fix_program"]
 
@@ -76,6 +79,8 @@ def fix_program(
 
     proof = proven(program, attempt, follow)
     errors = _errors(on_machine, proof.settled) if options.verify else None
+    if errors is not None:
+        _check_sane(program, proof.settled, errors)
     report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
@@ -117,6 +122,13 @@ def _errors(machine: Machine, settled: Settled) -> PathError:
     emission = settled.emission
     pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
     return path_error(machine, settled.moves, pieces, emission.start, tilts=False)
+
+
+def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:
+    """Raise `SelfCheckError` where the corrected path is no longer that of the program at all."""
+    if errors.after.max > max(ASTRAY, 10 * errors.before.max):
+        line = _line_of(program, settled.moves, errors.after)
+        raise SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
 
 
 def _figures(figures: Figures) -> dict[str, float | int | None]:

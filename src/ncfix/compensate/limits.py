@@ -59,7 +59,7 @@ def not_a_number(written: Written) -> Finding:
 
 def outside_calibrated(written: Written) -> Finding:
     """NCF405: motions that leave the range of an axis as they are programmed."""
-    text = "axis {axis} goes {value:.4g} (mm or degree) beyond the range over which its errors are known"
+    text = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
     return _of_axes(written, "NCF405", text, _programmed_excess(written))
 
 
@@ -74,9 +74,7 @@ def over_travel(written: Written) -> Finding:
     curved = written.segments.arc | written.intent.moves.tcp[pieces.move]
     np.maximum.at(corrected, pieces.move, excess(written.intent.machine, written.joints, each, curved))
     beyond = np.where(_programmed_excess(written) > FUZZ, -np.inf, corrected)
-    return _of_axes(
-        written, "NCF404", "the correction takes axis {axis} {value:.4g} (mm or degree) beyond its range", beyond
-    )
+    return _of_axes(written, "NCF404", "the correction takes axis {axis} {value:.4g} {unit} beyond its range", beyond)
 
 
 def too_large(written: Written) -> Finding:
@@ -162,7 +160,8 @@ def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
     most = beyond[np.arange(len(beyond)), axis]
     rows = np.flatnonzero((most > FUZZ) & ~kept)
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
-    return Finding(code, rows, most[rows] * units, text, tuple(machine.axis_names[j] for j in axis[rows]))
+    names = tuple(machine.axis_names[j] for j in axis[rows])
+    return Finding(code, rows, most[rows] * units, text, names, turns=tuple(machine.rotary[axis[rows]].tolist()))
 
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:
