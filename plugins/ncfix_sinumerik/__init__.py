@@ -15,7 +15,10 @@ SIEMENS = Dialect(
         rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(?:(?:TRAORI|TRAFOOF|SUPA|STOPRE|MCALL|FFWON|ORI[WM]KS)\b|GOTO[FB][ \t]+[A-Z_])",
         rb"(?im)^[^(;\n]*(?:\b[XYZABC]=(?:AC|IC|DC|ACP|ACN)[ \t]*\(|\b(?:CR|AR|[ABC]3)=[-+.\d])",
     ),
-    foreign=tuple((family, pattern) for family, pattern in FOREIGN if not family.startswith("Siemens")),
+    foreign=(
+        *((family, pattern) for family, pattern in FOREIGN if not family.startswith("Siemens")),
+        ("Fanuc-like code (--dialect fanuc)", rb"\A\s*%[ \t]*\r?\n\s*O\d+"),
+    ),
     comment="; {}",
     closure_mm=0.01,
     closure_relative=0.0,
