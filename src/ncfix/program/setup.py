@@ -48,8 +48,8 @@ class Setup:
     workpiece_offset  origin of the workpiece frame in the base frame with all axes at zero, mm
     tcp               X Y Z are tool-tip coordinates from the start of the program
     assume_zero       what is not given is zero (named in warnings and in the stamp), else it is an error
-    no_point          what numbers without a decimal point mean to controls that tell: "calculator" (X50 is 50 mm), or an
-                      increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
+    no_point          what numbers without a decimal point mean to controls that tell: "calculator" (X50 is 50 mm), or
+                      an increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 

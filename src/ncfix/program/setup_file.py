@@ -25,8 +25,8 @@ UNKNOWN_KEY = "NCF382"
 WRONG_VALUE = "NCF383"
 
 SYSTEM = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P\d+|G500|G5(?:0[5-9]|[1-9]\d)|PRESET\d*")
-"""Names of work offsets: G54 to G59.3, G54.1 P1 and so on; those of SINUMERIK, G500, G505 to G599; and of the TNC: PRESET,
-the one that is active when the program starts, PRESET1 and so on."""
+"""Names of work offsets: G54 to G59.3, G54.1 P1 and so on; those of SINUMERIK, G500, G505 to G599; and of the TNC:
+PRESET, the one that is active when the program starts, PRESET1 and so on."""
 
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
 """Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""

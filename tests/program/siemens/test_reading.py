@@ -123,5 +123,5 @@ def test_the_lanes_agree_over_the_corpus(shared: Callable[[str], Path]) -> None:
 
 def test_a_tape_with_a_program_number_is_not_taken_for_sinumerik_code() -> None:
     """A machine with a Siemens control reads what does not show its language as Siemens code; this shows it."""
-    with pytest.raises(SourceError, match="NCF103.*Fanuc"):
+    with pytest.raises(SourceError, match=r"NCF103.*Fanuc"):
         read(b"%\nO0001\nN10 G21 G90\nN20 G0 X10.\nM30\n%\n", "part.nc", "siemens")
