@@ -66,7 +66,7 @@ CODES: dict[str, Code] = (
         ),
         "NCF116": Code(
             "Number with an exponent",
-            "A number looks like `1e-05`, which some programs write for small values; a control reads E as another word.",
+            "A number looks like `1e-05`, as some programs write small values; a control reads E as another word.",
             "Write the number out, as 0.00001; put a blank before E if a word is meant.",
         ),
         "NCF117": Code(
