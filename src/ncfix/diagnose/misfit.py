@@ -15,7 +15,9 @@ from ncfix.measure.selection import Selection
 
 TIGHT_UM = 4.0
 """How far each constant of a machine file may have moved since, at the tool tip."""
-WIDE_UM = 1e6
+FREE_UM = 500.0
+"""The same where they are free: no more, or what cannot be told runs away."""
+WIDE_UM = 1e5
 TRIM = 0.97
 """Share of the values that count: the rest may be outliers."""
 STEPS = 4
@@ -46,7 +48,7 @@ def misfit(
     sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
     relative = relative_noise(problem)
     tight, coefficients = _fitted(problem, relative, sigma, tight_um, free)
-    wide, _ = _fitted(problem, relative, sigma, WIDE_UM, free)
+    wide, _ = _fitted(problem, relative, sigma, FREE_UM, free)
     return Misfit(tight, wide, sigma, coefficients[len(coefficients) - free :] if free else np.zeros(0))
 
 
