@@ -129,7 +129,7 @@ CODES = {
         "`--tool 12=120.0` gives it.",
     ),
     "NCF445": Code(
-        "Program written out flat",
+        "program written out flat",
         "With --flatten every block is written as often as it is executed, for some need another correction each time. "
         "Loops, subprogram calls and expressions are gone from the program that is written.",
         "Keep the original: changes are better made there.",
