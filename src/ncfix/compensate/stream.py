@@ -34,11 +34,10 @@ from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
 from ncfix.program import stamp
 from ncfix.program.dialect import Dialect
-from ncfix.program.language import language_of
+from ncfix.program.language import Run, language_of
 from ncfix.program.moves import Kind, Moves, Rule, Trace
 from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, rows_of, stretch
 from ncfix.program.setup import Setup
-from ncfix.program.trace import MAX_BLOCKS
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
 
@@ -160,7 +159,7 @@ class Stream:
         assert make is not None
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)
         kinematics = kinematics_of(self.machine)
-        found: Follower = make(self.dialect, self.setup, axes, rotary, self.resolve, MAX_BLOCKS, kinematics)
+        found: Follower = make(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
         return found
 
     def _parts(self, follower: Follower) -> Iterator[Part]:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from ncfix.diagnostics import RefusedError, SourceError
-from ncfix.program.language import Resolve, language_of
+from ncfix.program.language import Resolve, Run, language_of
 from ncfix.program.moves import Kind, Kinematics, Moves
 from ncfix.program.reader import read
-from ncfix.program.trace import MAX_BLOCKS, trace
+from ncfix.program.trace import trace
 from ncfix.program.tree import Program
 
 if TYPE_CHECKING:
@@ -50,12 +50,7 @@ class Unroll(Protocol):
     def __call__(
         self,
         program: Program,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        resolve: Resolve | None,
-        max_blocks: int,
-        kinematics: Kinematics | None,
+        run: Run,
         steps: Mapping[str, float],
         limit: int,
     ) -> Sequence[FlatLine]:
@@ -93,7 +88,7 @@ def flatten(
     if unroll is None:
         raise RefusedError.of(NOT_FLAT, f"programs in {program.dialect.title} cannot be written out flat")
     try:
-        found = unroll(program, setup, axes, rotary, resolve, MAX_BLOCKS, kinematics, steps, limit)
+        found = unroll(program, Run(setup, axes, rotary, resolve, kinematics=kinematics), steps, limit)
     except SourceError as error:
         if error.messages[0].code in (RUNTIME, TOO_LONG):
             raise RefusedError.collected(error.messages) from None

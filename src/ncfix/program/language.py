@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
 
+MAX_BLOCKS = 10_000_000
+"""Blocks that are executed before a program counts as endless."""
+
 
 class BlockLayout(Protocol):
     """Where things stand in a motion block; what else there is, only the family's own renderer knows."""
@@ -54,20 +57,16 @@ class BulkLayout:
     lower: bool
 
 
-class Follow(Protocol):
-    """Follows a program as the control would; see `trace`, which has the same arguments."""
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a program is followed with; see `trace`, which has the same arguments."""
 
-    def __call__(
-        self,
-        program: Program,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        resolve: Resolve | None,
-        max_blocks: int,
-        kinematics: Kinematics | None,
-    ) -> Trace:
-        """The motions of the program."""
+    setup: Setup
+    axes: tuple[str, ...]
+    rotary: frozenset[str]
+    resolve: Resolve | None = None
+    max_blocks: int = MAX_BLOCKS
+    kinematics: Kinematics | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +79,7 @@ class Language:
     scan      (source, blocks) -> shapes and numbers of the blocks, without understanding them
     parse     (dialect, text) -> one block by its grammar; raises `BlockError`
     lenient   a block that cannot be read, and that the control may never get to, is no error until it does
-    follow    the program's motions
+    follow    the program's motions; raises what `trace` does
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
     render    (program, block, layout, target) -> its edits, and the lines that come after it
     arc_pieces  `render` can write an arc as several (`Target.arcs`)
@@ -88,14 +87,14 @@ class Language:
               for blocks that it has to write one by one
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
-    follower  as `follow`, but for a program that comes in parts; takes a dialect and then the arguments of `trace`
+    follower  as `follow`, but for a program that comes in parts, of a dialect
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
     end: Callable[[bytes, NDArray[np.int64]], int]
     scan: Callable[[bytes, NDArray[np.int64]], Scan]
     parse: Callable[[Dialect, str], Parsed]
-    follow: Follow
+    follow: Callable[[Program, Run], Trace]
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]
     lenient: bool = False
@@ -103,7 +102,7 @@ class Language:
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
     renumber: Callable[[bytes], bytes] | None = None
     unroll: Unroll | None = None
-    follower: Callable[..., Follower] | None = None
+    follower: Callable[[Dialect, Run], Follower] | None = None
 
 
 @lru_cache(maxsize=32)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ncfix.program.language import BulkLayout
 from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
 
 #: In the order in which programs write them.
@@ -97,3 +98,12 @@ def _separator(program: Program, block: int, word: Word) -> str:
 def has_free_text(program: Program, block: int) -> bool:
     """Whether the block holds anything but words, comments and block skip (flow, tape marks, opaque text)."""
     return any(isinstance(item, (Flow, Opaque, Tape)) for item in program.items_of(block))
+
+
+def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | None:
+    """The part of a layout that holds for all blocks of the shape; None if an axis word is no plain number."""
+    slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
+    if len(slots) < len(layout.axes):
+        return None
+    at = program.position(block, layout.code_at)
+    return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())

@@ -43,6 +43,11 @@ def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
     return len(blocks)
 
 
+def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
+    """As `tape_end` for languages without a mark that ends the text: what stands behind the program's end is read."""
+    return len(blocks)
+
+
 @dataclass(slots=True)
 class Reach:
     """Follows the blocks of a program in the order written.

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ncfix.diagnostics import UsageError
-from ncfix.program.language import language_of
+from ncfix.program.language import MAX_BLOCKS, Run, language_of
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 
 NO_LETTER = "NCF207"
-MAX_BLOCKS = 10_000_000
-"""Blocks that are executed before a program counts as endless."""
 
 
 def trace(
@@ -38,4 +36,4 @@ def trace(
     strangers = [axis for axis in axes if axis not in AXIS_LETTERS]
     if strangers:
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
-    return language_of(program.dialect).follow(program, setup, axes, rotary, resolve, max_blocks, kinematics)
+    return language_of(program.dialect).follow(program, Run(setup, axes, rotary, resolve, max_blocks, kinematics))

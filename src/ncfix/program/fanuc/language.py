@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ncfix.program.fanuc.blocks import parse_block
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.interpreter import MacroInterpreter
+from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
-from ncfix.program.language import BulkLayout, Resolve
-from ncfix.program.moves import Kinematics, Trace
-from ncfix.program.rs274.language import RS274, finished
+from ncfix.program.language import BulkLayout, Run
+from ncfix.program.moves import Trace
+from ncfix.program.rs274.language import RS274
 from ncfix.program.rs274.unroll import unrolled
-from ncfix.program.setup import Setup
 from ncfix.program.shapes import Scan, scan
 from ncfix.program.tree import Literal, Program
 
@@ -30,35 +30,22 @@ def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     return scan(source, blocks, pointless=True)
 
 
-def follow(
-    program: Program,
-    setup: Setup,
-    axes: tuple[str, ...],
-    rotary: frozenset[str],
-    resolve: Resolve | None,
-    max_blocks: int,
-    kinematics: Kinematics | None,
-) -> Trace:
+def following(program: Program, run: Run) -> MacroInterpreter:
+    """The control's walk through a program, before its first step."""
+    control = MacroControl(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    return MacroInterpreter(control, program, run.resolve, run.max_blocks)
+
+
+def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
-    control = MacroControl(setup, axes, rotary, program.dialect, kinematics)
-    MacroInterpreter(control, program, resolve, max_blocks).run()
-    return finished(control, program)
+    walk = following(program, run)
+    walk.run()
+    return finished(walk.control, program, walk.control.builder.moves())
 
 
-def unroll(
-    program: Program,
-    setup: Setup,
-    axes: tuple[str, ...],
-    rotary: frozenset[str],
-    resolve: Resolve | None,
-    max_blocks: int,
-    kinematics: Kinematics | None,
-    steps: Mapping[str, float],
-    limit: int,
-) -> Sequence[FlatLine]:
+def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    control = MacroControl(setup, axes, rotary, program.dialect, kinematics)
-    return unrolled(MacroInterpreter(control, program, resolve, max_blocks), steps, limit)
+    return unrolled(following(program, run), steps, limit)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:

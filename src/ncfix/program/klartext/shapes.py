@@ -34,11 +34,6 @@ def split(source: bytes) -> NDArray[np.int64]:
     return np.stack((lines[starts, 0], lines[~continued, 1]), axis=1)
 
 
-def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
-    """No block ends the text for the reader: labels may stand behind the program's end."""
-    return len(blocks)
-
-
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
-from ncfix.program.language import Resolve
-from ncfix.program.moves import Kinematics, Moves
+from ncfix.program.language import Run
+from ncfix.program.moves import Moves
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.interpreter import Interpreter
-from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 
 
@@ -56,19 +55,10 @@ class PartInterpreter(Interpreter):
 class RS274Follower:
     """See `parts.Follower`."""
 
-    def __init__(
-        self,
-        dialect: Dialect,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        resolve: Resolve | None,
-        max_blocks: int,
-        kinematics: Kinematics | None,
-    ) -> None:
-        self.control = Control(setup, axes, rotary, dialect, kinematics)
-        self.resolve = resolve
-        self.max_blocks = max_blocks
+    def __init__(self, dialect: Dialect, run: Run) -> None:
+        self.control = Control(run.setup, run.axes, run.rotary, dialect, run.kinematics)
+        self.resolve = run.resolve
+        self.max_blocks = run.max_blocks
         self.interpreter: PartInterpreter | None = None
 
     @property

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ncfix.diagnostics import UsageError
-from ncfix.program import stamp
+from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
-from ncfix.program.language import BulkLayout, Language, Resolve
-from ncfix.program.moves import Kinematics, Trace
-from ncfix.program.setup import Setup
+from ncfix.program.language import BulkLayout, Language, Run
+from ncfix.program.layout import bulk_layout
+from ncfix.program.moves import Trace
+from ncfix.program.reach import whole_text
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.interpreter import Interpreter
@@ -22,52 +19,25 @@ from ncfix.program.sinumerik.render import render
 from ncfix.program.sinumerik.scanning import scan
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unroll import Recorder
-from ncfix.program.tree import Literal, Program
+from ncfix.program.tree import Program
 
 
-def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
-    """There is no mark that ends the text: subprograms may follow the program."""
-    return len(blocks)
+def following(program: Program, run: Run) -> Interpreter:
+    """The control's walk through a program, before its first step."""
+    control = Sinumerik(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    return Interpreter(control, program, run.resolve, run.max_blocks)
 
 
-def follow(
-    program: Program,
-    setup: Setup,
-    axes: tuple[str, ...],
-    rotary: frozenset[str],
-    resolve: Resolve | None,
-    max_blocks: int,
-    kinematics: Kinematics | None,
-) -> Trace:
+def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
-    control = Sinumerik(setup, axes, rotary, program.dialect, kinematics)
-    moves = Interpreter(control, program, resolve, max_blocks).run()
-    lacking = (*control.foreign.values(), *control.knowledge.missing.values())
-    if lacking:
-        raise UsageError.collected(lacking)
-    marked = stamp.find(program)
-    return Trace(
-        moves=replace(moves, pointing=control.pointing) if control.points else moves,
-        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
-        assumed=tuple(control.knowledge.assumed),
-        stamp="" if marked is None else program.text_of(marked),
-    )
+    walk = following(program, run)
+    moves, control = walk.run(), walk.control
+    return finished(control, program, replace(moves, pointing=control.pointing) if control.points else moves)
 
 
-def unroll(
-    program: Program,
-    setup: Setup,
-    axes: tuple[str, ...],
-    rotary: frozenset[str],
-    resolve: Resolve | None,
-    max_blocks: int,
-    kinematics: Kinematics | None,
-    steps: Mapping[str, float],
-    limit: int,
-) -> Sequence[FlatLine]:
+def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    control = Sinumerik(setup, axes, rotary, program.dialect, kinematics)
-    return Interpreter(control, program, resolve, max_blocks).unrolled(Recorder(steps, limit))
+    return following(program, run).unrolled(Recorder(steps, limit))
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
@@ -75,11 +45,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     layout = layout_of(program, block)
     if layout is None or not layout.axes or layout.polar or layout.vector:
         return None
-    slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
-    if len(slots) < len(layout.axes):
-        return None
-    at = program.position(block, layout.code_at)
-    return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())
+    return bulk_layout(program, block, layout)
 
 
 SINUMERIK = Language(
