@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, perfect, plan
-from ncfix.diagnose import page, result, words
+from ncfix.diagnose import result, words
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.checks import remarks
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
@@ -18,6 +18,7 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Backlash
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.synthetic import Faults, simulate
+from ncfix.report.diagnosis import page
 
 NOISE_UM = 2.0
 
@@ -64,7 +65,7 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
 
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
     assert "backlash X" in words.text(backlash)
-    html = page.page(backlash)
+    html = page(backlash)
     assert "backlash X" in html
     assert html.count("<svg") >= 5
 

@@ -79,7 +79,7 @@ def _extras(
     if next_path is not None:
         _write_next(found, targets([measured[0]], next_path, False, force, inputs)[0])
     if report is not None:
-        from ncfix.diagnose.page import page
+        from ncfix.report.diagnosis import page
 
         targets([measured[0]], report, False, force, inputs)[0].write(page(found).encode())
 
