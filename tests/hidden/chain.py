@@ -68,7 +68,10 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """A chain from the workpiece to the tool; `joints` in the order of the topology string, without F and S."""
+    """A chain from the workpiece to the tool; `joints` in the order of the topology string, without F and S.
+
+    `size` is how large it is beside the plain machine of its kind, `lengths` are the tools that belong to it, mm.
+    """
 
     name: str
     joints: tuple[Joint, ...]
@@ -76,6 +79,8 @@ class Machine:
     gravity: Vec
     ram: str
     tool_direction: Vec = (0.0, 0.0, 1.0)
+    size: float = 1.0
+    lengths: tuple[float, float] = (110.0, 300.0)
 
     @property
     def axes(self) -> tuple[str, ...]:

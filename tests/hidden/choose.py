@@ -58,9 +58,9 @@ def _layout(rng: Generator, spec: Family, topology: str, kind: str) -> Design:
 def _measured(rng: Generator, spec: Family, topology: str, machine: Machine, model: Model, kind: str) -> Draft:
     """The draft without anything hidden, with its clutter."""
     design = _layout(rng, spec, topology, kind)
-    lengths = workshop.LENGTHS[topology][:: 1 if rng.random() < 0.5 else -1]
-    s = designs.lay_out(rng, machine, topology, climate.draw_climate(rng), lengths, design)
-    given = ~designs.held_out(rng, s)
+    lengths = machine.lengths[:: 1 if rng.random() < 0.5 else -1]
+    s = designs.lay_out(rng, machine, topology, climate.draw_climate(rng), lengths, designs.varied(rng, design))
+    given = ~designs.held_out(rng, s, rng.uniform(0.2, 0.3))
     sight = view(s, model, given, kind)
     return Draft(topology, design, kind, s, given, sight, World(machine, model), model, machine, model)
 

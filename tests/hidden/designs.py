@@ -17,12 +17,15 @@ from .motion import Array, Ints, Mask
 from .situation import Situation
 
 LEVELS = 7
-SESSION = 6.0 * 3600
+LOOSE = ("balls", "bars", "free")
 
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """How a measurement is laid out. `layout`: "balls" on the table, "bars" about them, "free" in the travels."""
+    """How a measurement is laid out. `layout`: "balls" on the table, "bars" about them, "free" in the travels.
+
+    `levels`: into how many cells the travel of a rotary axis is divided.
+    """
 
     name: str
     layout: str = "balls"
@@ -31,6 +34,7 @@ class Design:
     tools: int = 2
     repeated: int = 12
     times: int = 4
+    levels: int = LEVELS
     ordered: bool = False
     one_sided: bool = False
     on_pitch: bool = False
@@ -71,7 +75,16 @@ def lay_out(
     order = np.lexsort(picked.q.T) if design.ordered else rng.permutation(len(picked))
     rows = _repeats(rng, len(picked), design)
     timed = picked.rows(order).rows(rows)
-    return replace(timed, repeat=_count_repeats(rows), time=_times(rng, rows), climate=climate)
+    return replace(timed, repeat=_count_repeats(rows), time=_times(rng, rows, climate.session), climate=climate)
+
+
+def varied(rng: Generator, design: Design) -> Design:
+    """A good design as somebody else would have laid it out; the poor ones are what they are."""
+    if design.name not in LOOSE:
+        return design
+    often = {"repeated": int(rng.integers(10, 16)), "times": int(rng.integers(3, 6))}
+    count = round(design.count * rng.uniform(0.95, 1.15))
+    return replace(design, count=count, balls=int(rng.integers(4, 6)), levels=int(rng.integers(6, 10)), **often)
 
 
 def span(machine: Machine, name: str) -> tuple[float, float]:
@@ -89,7 +102,7 @@ def _poses(rng: Generator, machine: Machine, topology: str, lengths: tuple[float
     tool = rng.integers(min(design.tools, len(lengths)), size=n)
     ball = rng.integers(design.balls if design.layout != "free" else 2, size=n)
     s = _empty(machine, np.asarray(lengths)[tool], 2 * ball + tool)
-    q, cells = _angles(rng, machine, n)
+    q, cells = _angles(rng, machine, n, design.levels)
     s = replace(s, q=q, block=cells)
     if design.layout == "free":
         return _free(rng, s, design)
@@ -98,37 +111,37 @@ def _poses(rng: Generator, machine: Machine, topology: str, lengths: tuple[float
 
 def _at_balls(rng: Generator, s: Situation, table: Table, ball: Ints, design: Design) -> Situation:
     """The linear axes follow so that the nominal tip is in a ball, or on the sphere of a bar about it."""
-    place = _ring(rng, table, design.balls)[ball]
+    place = np.round(s.machine.size * _ring(rng, table, design.balls), 4)[ball]
     if design.layout == "balls":
         return replace(s, q=_written(s.machine, s.machine.linear_solve(s.q, s.length, place)))
     way = rng.normal(size=place.shape)
     way[:, 2] = np.abs(way[:, 2])
     way /= np.linalg.norm(way, axis=1, keepdims=True)
-    bar = np.asarray(table.bars)[ball % 2]
+    bar = np.round(s.machine.size * np.asarray(table.bars))[ball % 2]
     q = _written(s.machine, s.machine.linear_solve(s.q, s.length, place + bar[:, None] * way))
     block = s.block if s.block.any() else 4 * (way[:, 0] > 0) + 2 * (way[:, 1] > 0) + (way[:, 2] > 0.5)
     return replace(s, q=q, centre=place, radius=bar, block=block)
 
 
 def _ring(rng: Generator, table: Table, count: int) -> Array:
-    """Ball centres, workpiece frame (count, 3), to four decimals."""
-    turn = 2 * np.pi * (np.arange(count) + rng.uniform(-0.2, 0.2, count)) / count
-    radius = np.linspace(*table.radius, count) * rng.uniform(0.9, 1.1, count)
+    """Ball centres on a machine of the plain size, workpiece frame (count, 3)."""
+    turn = 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
+    radius = np.linspace(*table.radius, count) * rng.uniform(0.8, 1.15, count)
     height = rng.permutation(np.linspace(*table.height, count))
     ring = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
-    result: Array = np.round(np.asarray(table.middle) + ring, 4)
+    result: Array = np.asarray(table.middle) + ring
     return result
 
 
-def _angles(rng: Generator, machine: Machine, n: int) -> tuple[Array, Ints]:
+def _angles(rng: Generator, machine: Machine, n: int, levels: int) -> tuple[Array, Ints]:
     """Rotary positions spread over the cells of their travels, never twice the same, and the number of the cell."""
     q, cells = np.zeros((n, len(machine.joints))), np.zeros(n, dtype=int)
     for i, joint in enumerate(machine.joints):
         if joint.rotary:
             low, high = span(machine, joint.name)
-            level = rng.integers(LEVELS, size=n)
-            q[:, i] = np.round(low + (high - low) * (level + rng.uniform(0.1, 0.9, n)) / LEVELS, 3) * joint.unit
-            cells = cells * LEVELS + level
+            level = rng.integers(levels, size=n)
+            q[:, i] = np.round(low + (high - low) * (level + rng.uniform(0.1, 0.9, n)) / levels, 3) * joint.unit
+            cells = cells * levels + level
     return q, cells
 
 
@@ -159,7 +172,7 @@ def _dressed(rng: Generator, s: Situation, design: Design) -> Situation:
     """Approach directions, and the workpiece that lies on the table: every other set-up carries a heavy one."""
     direction = np.ones_like(s.q) if design.one_sided else rng.choice((-1.0, 1.0), s.q.shape)
     heavy = (s.set_id // 2 + s.set_id) % 2 if design.tools > 1 else np.zeros(len(s), dtype=int)
-    loads = np.round(rng.uniform((20, 180), (60, 260)))
+    loads = np.round(rng.uniform((10, 150), (70, 320)))
     return replace(s, direction=direction, load=loads[heavy])
 
 
@@ -188,11 +201,11 @@ def _count_repeats(rows: Ints) -> Ints:
     return np.arange(len(rows)) - start
 
 
-def _times(rng: Generator, rows: Ints) -> Array:
-    """Some six hours for the whole; a repeat takes 15 s, a new pose more."""
+def _times(rng: Generator, rows: Ints, session: float) -> Array:
+    """Some hours for the whole; a repeat takes 15 s, a new pose more."""
     fresh = np.diff(rows, prepend=-1) != 0
     steps = np.where(fresh, rng.uniform(0.5, 1.5, len(rows)), 0.0)
-    pace = SESSION / steps.sum()
+    pace = session / steps.sum()
     return np.round(np.cumsum(np.where(fresh, steps * pace, 15.0)), 1)
 
 

@@ -13,7 +13,7 @@ from . import designs
 from .designs import Design
 
 FINAL_RANGE = 2**40
-_SALT = "hidden effects, final run, 1"
+_SALT = "hidden effects, final run, 2"
 
 
 @dataclass(frozen=True, slots=True)

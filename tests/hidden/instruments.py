@@ -16,19 +16,32 @@ Tips = Callable[[Situation], tuple[Array, Array]]
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Of one coordinate, micrometre: standard deviation, degrees of freedom of its tails (inf: normal), the share of
-    rows that are wrong by 5 to 15 times that, and the part that wanders with time (first order, 15 minutes).
+    """Of one coordinate, micrometre: standard deviation of all of it, degrees of freedom of its tails (inf: normal), the
+    share of rows that are wrong by 5 to 15 times that, the part that wanders with time (first order) and how long it
+    remembers, s; and the share of outliers that are wrong in one coordinate only.
     """
 
     sigma_um: float = 3.0
     tails: float = 5.0
     outliers: float = 0.01
     wander_um: float = 0.3
+    memory: float = 900.0
+    lonely: float = 0.0
 
 
 CUT = 6.0
-CLEAN = Noise(outliers=0.0, wander_um=0.0)
 SILENT = Noise(sigma_um=0.0, outliers=0.0, wander_um=0.0)
+
+
+def draw_instrument(rng: Generator, clean: bool) -> Noise:
+    """Three micrometres in every case; tails, outliers and wandering are the instrument's own. A clean one has tails
+    only.
+    """
+    tails = float(np.exp(rng.uniform(np.log(4.5), np.log(30.0))))
+    if clean:
+        return Noise(tails=tails, outliers=0.0, wander_um=0.0)
+    memory = float(np.exp(rng.uniform(np.log(240), np.log(5400))))
+    return Noise(3.0, tails, rng.uniform(0.004, 0.016), rng.uniform(0.1, 0.6), memory, rng.uniform(0.0, 0.6))
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +59,12 @@ class Setup:
 
 
 def draw_setup(rng: Generator, s: Situation, kind: str) -> Setup:
-    """Offsets of some hundredths for an R-test, of half a millimetre for probed balls.
+    """Offsets of some hundredths for an R-test, of up to a millimetre for probed balls.
 
     A stylus belongs to its tool (number % 2) whatever the set; a bar's cup has none. Probed balls (number // 2) keep
     their place for both tools; else every set is set up anew.
     """
-    size = 0.5 if kind == "probe" else 0.03
+    size = rng.uniform(0.2, 1.0) if kind == "probe" else rng.uniform(0.01, 0.05)
     sets = [int(k) for k in np.unique(s.set_id)]
     tools = {k: np.zeros(3) if kind == "length" else rng.uniform(-size, size, 3) for k in range(2)}
     places = {k: rng.uniform(-size, size, 3) for k in sets}
@@ -63,18 +76,20 @@ def draw_noise(rng: Generator, noise: Noise, time: Array, width: int) -> tuple[A
     """(n, width) in mm, tails cut at six sigma, and the rows that are outliers beyond that."""
     n = len(time)
     drawn = np.clip(rng.standard_t(noise.tails, (n, width)) / np.sqrt(noise.tails / (noise.tails - 2)), -CUT, CUT)
-    drawn *= noise.sigma_um
-    drawn += noise.wander_um * _wander(rng, time, width)
+    drawn *= np.sqrt(max(noise.sigma_um**2 - noise.wander_um**2, 0.0))
+    drawn += noise.wander_um * _wander(rng, time, width, noise.memory)
     bad = np.flatnonzero(rng.random(n) < noise.outliers)
     away = rng.normal(size=(len(bad), width))
+    alone = rng.random(len(bad)) < noise.lonely
+    away[alone] *= np.arange(width) == rng.integers(width, size=(int(alone.sum()), 1))
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     drawn[bad] += away * noise.sigma_um * rng.uniform(5, 15, (len(bad), 1))
     return drawn * 1e-3, bad
 
 
-def _wander(rng: Generator, time: Array, width: int) -> Array:
+def _wander(rng: Generator, time: Array, width: int, memory: float) -> Array:
     """A first-order wandering with variance 1."""
-    keep = np.exp(-np.diff(time, prepend=time[0]) / 900.0)
+    keep = np.exp(-np.diff(time, prepend=time[0]) / memory)
     state, result = rng.normal(size=width), np.empty((len(time), width))
     for i, k in enumerate(keep):
         state = k * state + np.sqrt(1 - k * k) * rng.normal(size=width)

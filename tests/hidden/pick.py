@@ -109,7 +109,7 @@ def _told_by_more(rng: Generator, draft: Draft, specimen: Specimen, rival: Entry
     """Whether 54 more poses with the second tool, anywhere, tell a specimen from its closest relative."""
     s = draft.situation
     design = replace(designs.FREE, count=54, repeated=0, tools=1)
-    other = tuple(x for x in workshop.LENGTHS[draft.topology] if x != s.length[0])
+    other = tuple(x for x in s.machine.lengths if x != s.length[0])
     more = designs.lay_out(rng, s.machine, draft.topology, s.climate, other, design)
     both = joined([s, replace(more, set_id=more.set_id + 51)])
     sight = view(both, draft.handed_model, np.ones(len(both), dtype=bool), draft.kind)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from . import designs, files, instruments, workshop
-from .instruments import Noise
 from .motion import Array
 from .scenario import Scenario
 from .situation import Situation
@@ -32,7 +31,7 @@ def at_random(scene: Scenario, count: int, seed: int) -> str:
     """The same at `count` random poses within the travels, with all tools."""
     rng, draft = np.random.default_rng([seed, 1]), scene.draft
     design = replace(designs.FREE, count=count, repeated=0)
-    lengths = workshop.LENGTHS[draft.topology]
+    lengths = draft.world.machine.lengths
     s = designs.lay_out(rng, draft.world.machine, draft.topology, draft.situation.climate, lengths, design)
     times = _later(scene, count)
     sets = NEW_SETS + np.searchsorted(np.unique(s.length), s.length)
@@ -71,5 +70,5 @@ def _measured(scene: Scenario, s: Situation, seed: int) -> str:
     lengths = {int(k): float(x) for k, x in zip(s.set_id, s.length, strict=True)}
     stylus = {k: had[x] if x in had else rng.uniform(-0.03, 0.03, 3) for k, x in lengths.items()}
     values = instruments.tcp(s, scene.draft.world.tips, replace(setup, stylus=stylus))
-    drawn, _ = instruments.draw_noise(rng, Noise(outliers=0.0), s.time, 3)
+    drawn, _ = instruments.draw_noise(rng, replace(scene.noise, outliers=0.0), s.time, 3)
     return files.measurement(s, "tcp", values + drawn)

@@ -17,7 +17,7 @@ from . import files, instruments
 from .choose import choose
 from .draft import Draft
 from .families import FAMILIES, Family
-from .instruments import CLEAN, SILENT, Noise, Setup
+from .instruments import SILENT, Noise, Setup, draw_instrument
 from .model import machine_toml
 from .motion import Array, Mask
 from .names import Named
@@ -64,6 +64,7 @@ class Scenario:
     given: Mask
     draft: Draft
     setup: Setup
+    noise: Noise
 
     def write(self, handed: Path, truth: Path) -> None:
         """Both parts, into folders that must not be one."""
@@ -99,12 +100,12 @@ def scenario(
     spec = FAMILIES[family]
     rng = np.random.default_rng([seed, list(FAMILIES).index(family)])
     draft = choose(rng, spec, Wish(index, effect, amplitude_um, topology, kind))
-    noise = SILENT if silent else CLEAN if spec.clean else Noise()
+    noise = SILENT if silent else draw_instrument(rng, spec.clean)
     setup = instruments.draw_setup(rng, draft.situation, draft.kind)
     handed, outliers = _handed(rng, draft, setup, noise)
     tips = draft.world.displacement(draft.situation)
     truth = _truth(seed, spec, draft, tips, outliers, noise)
-    return Scenario(handed, truth, files.plan(draft.situation), tips, draft.given, draft, setup)
+    return Scenario(handed, truth, files.plan(draft.situation), tips, draft.given, draft, setup, noise)
 
 
 def observe(world: World, s: Situation, kind: str, setup: Setup) -> Array:

@@ -33,7 +33,7 @@ def situation(topology: str, seed: int = 3) -> Situation:
     rng = np.random.default_rng(seed)
     machine = workshop.draw_machine(rng, topology)
     design = FREE if topology == "wXFYZSt" else BALLS
-    return lay_out(rng, machine, topology, draw_climate(rng), workshop.LENGTHS[topology], design)
+    return lay_out(rng, machine, topology, draw_climate(rng), machine.lengths, design)
 
 
 def turned_about(point: Array, vector: Array) -> Array:

@@ -69,6 +69,7 @@ THREE_AXES = Machine(
     ram="Y",
 )
 _MACHINES = dict(zip(TOPOLOGIES, (HORIZONTAL, TRUNNION, HEAD, THREE_AXES), strict=True))
+PITCHES = (5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0)
 LENGTHS = {
     "wCBXFZYSt": (110.0, 300.0),
     "wCAYFXZSt": (90.0, 260.0),
@@ -87,28 +88,49 @@ _MOTIONS = ("EXX", "EYY", "EZZ", "EYX", "EZX", "EXY", "EZY", "EXZ", "EYZ")
 
 
 def draw_machine(rng: Generator, topology: str) -> Machine:
-    """The machine of that kind with axis points and spindle nose moved by some mm: no two seeds share levers."""
-    plain = _MACHINES[topology]
-    joints = tuple(
-        replace(j, point=_shifted(rng, j.point, np.asarray(j.direction))) if j.rotary else j for j in plain.joints
-    )
-    return replace(plain, joints=joints)
+    """A machine of that kind: larger or smaller, other screws, other tools, its swivel tilted a little otherwise.
+
+    No two seeds share travels, levers or pitches.
+    """
+    plain, size = _MACHINES[topology], float(np.round(rng.uniform(0.85, 1.2), 3))
+    tilt = _tilt(rng) if topology == "wCAYFXZSt" else None
+    joints = tuple(_rotary(rng, j, size, tilt) if j.rotary else _linear(rng, j, size) for j in plain.joints)
+    x, y, z = (round(size * v, 2) for v in plain.tool_point)
+    short, long = LENGTHS[topology]
+    tools = float(np.round(short * rng.uniform(0.8, 1.3))), float(np.round(long * rng.uniform(0.85, 1.15)))
+    return replace(plain, joints=joints, tool_point=(x, y, z), size=size, lengths=tools)
 
 
-def _shifted(rng: Generator, point: Vec, direction: np.ndarray) -> Vec:
-    """A point within +-15 mm, on the axis' normal plane, in hundredths of a millimetre."""
-    shift = rng.uniform(-15, 15, 3)
-    x, y, z = np.round(np.asarray(point) + shift - direction * (direction @ shift), 2)
-    return float(x), float(y), float(z)
+def _tilt(rng: Generator) -> tuple[Vec, Vec, Vec]:
+    """The triad of a swivel that is tilted by 35 to 55 degrees."""
+    angle = np.deg2rad(np.round(rng.uniform(35, 55), 1))
+    c, s = float(np.cos(angle)), float(np.sin(angle))
+    return (c, 0.0, s), (0.0, 1.0, 0.0), (-s, 0.0, c)
+
+
+def _linear(rng: Generator, joint: Joint, size: float) -> Joint:
+    """Travel to whole millimetres."""
+    low, high = (float(np.round(size * rng.uniform(0.95, 1.08) * end)) for end in (joint.low, joint.high))
+    return replace(joint, low=low, high=high, pitch=float(rng.choice(PITCHES)))
+
+
+def _rotary(rng: Generator, joint: Joint, size: float, tilt: tuple[Vec, Vec, Vec] | None) -> Joint:
+    """Its point within some centimetres, on the axis' normal plane, in hundredths of a millimetre."""
+    if tilt is not None and joint.name == "A":
+        joint = replace(joint, direction=tilt[0], triad=tilt)
+    direction, shift = np.asarray(joint.direction), rng.uniform(-30, 30, 3)
+    x, y, z = np.round(size * np.asarray(joint.point) + shift - direction * (direction @ shift), 2)
+    return replace(joint, point=(float(x), float(y), float(z)))
 
 
 def draw_model(rng: Generator, machine: Machine, topology: str, rich: bool = False) -> Model:
     """Known errors: gains, squareness, all lines of the rotary axes; with `rich` a table for each linear error
     motion.
     """
+    angle, shift = rng.uniform(20e-6, 60e-6), rng.uniform(0.03, 0.08)
     terms = [_gain(rng, machine, name) for name in _GAINS]
-    terms += [Term(name, (_angle(rng, 40e-6),)) for name in _SQUARENESS]
-    terms += [Term(name, (_angle(rng, 40e-6) if name[1] in "ABC" else _mm(rng, 0.05),)) for name in _LINES[topology]]
+    terms += [Term(name, (_angle(rng, angle),)) for name in _SQUARENESS]
+    terms += [Term(name, (_angle(rng, angle) if name[1] in "ABC" else _mm(rng, shift),)) for name in _LINES[topology]]
     if rich:
         terms += [_table(rng, machine, name) for name in _MOTIONS]
     return Model(tuple(terms))

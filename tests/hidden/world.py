@@ -90,7 +90,7 @@ def draw_clutter(
     magnitude.
     """
     fields = [entry.draw(rng) for entry in entries]
-    weight = np.exp(rng.normal(scale=0.5, size=len(fields)))
+    weight = np.exp(rng.normal(scale=rng.uniform(0.3, 0.9), size=len(fields)))
     unit = [w / rms(first_order(sensitivity, f(s))) for w, f in zip(weight, fields, strict=True)]
     shifts = sum(first_order(sensitivity, u * f(s)) for u, f in zip(unit, fields, strict=True))
     off = rng.normal(size=sight.base.shape[2]) / np.array([rms(c) + 1e-30 for c in np.moveaxis(sight.base, 2, 0)])

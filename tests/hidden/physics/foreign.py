@@ -39,15 +39,15 @@ def _pose_field() -> Entry:
     """Nothing rigid: every pose has its own smooth error vector."""
 
     def draw(rng: Generator) -> Field:
-        reach = rng.uniform(0.7, 1.2)
+        reach, count = rng.uniform(0.5, 1.2), int(rng.integers(30, 120))
         seed = int(rng.integers(2**32))
 
         def twists(s: Situation) -> Array:
             own = np.random.default_rng(seed)
             x = _features(s)
-            waves = own.normal(scale=1 / reach, size=(x.shape[1], 80))
-            parts = np.sin(x @ waves * 1.6 + own.uniform(0, 2 * np.pi, 80))
-            return _of_workpiece(parts @ own.normal(size=(80, 3)), s)
+            waves = own.normal(scale=1 / reach, size=(x.shape[1], count))
+            parts = np.sin(x @ waves * 1.6 + own.uniform(0, 2 * np.pi, count))
+            return _of_workpiece(parts @ own.normal(size=(count, 3)), s)
 
         return twists
 
@@ -58,7 +58,7 @@ def _creep() -> Entry:
     """The structure settles after every move: the error follows where the axes were in the last half hour."""
 
     def draw(rng: Generator) -> Field:
-        pull, slow = rng.normal(size=(8, 3)), rng.uniform(900, 2400)
+        pull, slow = rng.normal(size=(8, 3)), np.exp(rng.uniform(np.log(600), np.log(3600)))
 
         def twists(s: Situation) -> Array:
             x = _features(s)
@@ -75,15 +75,15 @@ def _creep() -> Entry:
 
 
 def _pulse() -> Entry:
-    """Coolant comes and goes: a swing of some ten minutes with uneven strokes, tied to no sensor and no position."""
+    """Coolant comes and goes: a swing of ten minutes to an hour with uneven strokes, tied to no sensor and no position."""
 
     def draw(rng: Generator) -> Field:
-        period, phase = rng.uniform(600, 2400), rng.uniform(0, 2 * np.pi)
-        way, skew = rng.normal(size=3), rng.uniform(0.3, 0.8)
+        period, phase = rng.uniform(500, 3000), rng.uniform(0, 2 * np.pi)
+        way, skew, swell = rng.normal(size=3), rng.uniform(0.0, 0.9), rng.uniform(0.1, 0.6)
 
         def twists(s: Situation) -> Array:
             turn = 2 * np.pi * s.time / period + phase
-            stroke = np.sin(turn + skew * np.sin(turn)) * (1 + 0.4 * np.sin(turn / 5.3))
+            stroke = np.sin(turn + skew * np.sin(turn)) * (1 + swell * np.sin(turn / 5.3))
             return _of_workpiece(np.outer(stroke, way), s)
 
         return twists
@@ -96,13 +96,13 @@ def _shove(machine: Machine) -> Entry:
     count = len(machine.axes)
 
     def draw(rng: Generator) -> Field:
-        centre, size = rng.uniform(-0.35, 0.35, count), rng.uniform(0.35, 0.55)
-        way = rng.normal(size=(1 + count, 3))
+        centre, size = rng.uniform(-0.45, 0.45, count), rng.uniform(0.35, 0.65)
+        way, edge, power = rng.normal(size=(1 + count, 3)), rng.uniform(0.1, 0.35), rng.uniform(0.5, 1.5)
 
         def twists(s: Situation) -> Array:
             off = (_features(s) - centre) / size
             region = np.exp(-np.mean(off**2, axis=1))
-            strength = np.clip(region - 0.3, 0, None) ** 0.7
+            strength = np.clip(region - edge, 0, None) ** power
             return _of_workpiece(strength[:, None] * (way[0] + 0.6 * np.tanh(off) @ way[1:]), s)
 
         return twists
@@ -115,9 +115,9 @@ def _wander() -> Entry:
 
     def draw(rng: Generator) -> Field:
         steps = np.cumsum(rng.normal(size=(2000, 3)), axis=0)
-        kernel = np.hanning(41) / 20
+        kernel = np.hanning(2 * int(rng.integers(8, 40)) + 1)
         walk = np.stack([np.convolve(steps[:, k], kernel, "same") for k in range(3)], axis=1)
-        rate = rng.uniform(25, 45)
+        rate = rng.uniform(25, 60)
 
         def twists(s: Situation) -> Array:
             index = np.minimum(s.time / rate, len(walk) - 1)
@@ -133,10 +133,10 @@ def _slip() -> Entry:
     """Something slips once: before and after differ by a vector (catalogue row 49)."""
 
     def draw(rng: Generator) -> Field:
-        at, way = rng.uniform(0.3, 0.7), rng.normal(size=3)
+        at, way = rng.uniform(0.2, 0.8), rng.normal(size=3)
 
         def twists(s: Situation) -> Array:
-            return _of_workpiece(np.outer(s.time > at * 6.0 * 3600, way), s)
+            return _of_workpiece(np.outer(s.time > at * s.climate.session, way), s)
 
         return twists
 
@@ -148,11 +148,11 @@ def _cable(machine: Machine) -> Entry:
     first, second = (joint.name for joint in machine.joints if joint.rotary)
 
     def draw(rng: Generator) -> Field:
-        phase, lean = rng.uniform(0, 2 * np.pi, 2), spread(rng, 0.2, 0.5)
-        way = rng.normal(size=3)
+        phase, lean = rng.uniform(0, 2 * np.pi, 2), spread(rng, 0.0, 0.6)
+        way, rate = rng.normal(size=3), rng.uniform(0.7, 1.6)
 
         def twists(s: Situation) -> Array:
-            pull = np.sin(s.column(first) + phase[0]) * np.sin(1.3 * s.column(second) + phase[1])
+            pull = np.sin(s.column(first) + phase[0]) * np.sin(rate * s.column(second) + phase[1])
             return _of_workpiece(np.outer(pull + lean * pull * s.moving(first), way), s)
 
         return twists

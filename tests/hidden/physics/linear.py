@@ -11,7 +11,8 @@ from ..motion import Array, inverse, moved
 from ..situation import Situation
 from .entry import Entry, Field, Signal, field, symbol
 
-PIVOT = 15.0
+PIVOTS = (3.0, 40.0)
+LEVER = 60.0
 _TURNS = {"A": ("Y", "Z"), "B": ("Z", "X"), "C": ("X", "Y")}
 
 
@@ -36,7 +37,7 @@ def _has_lever(machine: Machine, joint: Joint, component: str) -> bool:
     tip = moved(carriers["S"][0], np.asarray(machine.tool_point) - 200.0 * np.asarray(machine.tool_direction))
     pose, reference = carriers[joint.name]
     lever = np.cross(np.eye(3)["ABC".index(component)], moved(inverse(pose), tip) - reference)
-    return bool(np.max(np.linalg.norm(lever, axis=1)) > 2 * PIVOT)
+    return bool(np.max(np.linalg.norm(lever, axis=1)) > LEVER)
 
 
 def _motion(joint: Joint, component: str) -> Entry:
@@ -53,11 +54,11 @@ def _motion(joint: Joint, component: str) -> Entry:
 
 
 def _pivoted(rng: Generator, frame: str, component: str, signal: Signal) -> dict[tuple[str, str], Signal]:
-    """The motion, and for a rotation the shifts that come with a pivot up to PIVOT mm beside the stated reference."""
+    """The motion, and for a rotation the shifts that come with a pivot some millimetres beside the stated reference."""
     parts = {(frame, component): signal}
     if component in "ABC":
         first, second = _TURNS[component]
-        a, b = rng.uniform(-PIVOT, PIVOT, 2)
+        a, b = np.exp(rng.uniform(*np.log(PIVOTS))) * rng.uniform(-1, 1, 2)
         parts[frame, first] = lambda s: a * signal(s)
         parts[frame, second] = lambda s: b * signal(s)
     return parts

@@ -45,7 +45,7 @@ def _of_angle(joint: Joint, curve: curves.Curve, size: float = 1.0) -> Signal:
 def _pair(rng: Generator, joint: Joint, names: tuple[str, str], first: int) -> Field:
     """Two components across the axis, of unlike size and shape: an oval whirl, not a circle."""
     a, b = curves.turning(rng, first), curves.turning(rng, first)
-    size = rng.uniform(0.6, 1.4)
+    size = rng.uniform(0.4, 1.6)
     return field(
         {(joint.name, names[0]): _of_angle(joint, a), (joint.name, names[1]): _of_angle(joint, b, size)},
     )
@@ -68,7 +68,7 @@ def _axial(joint: Joint) -> Entry:
     along = letters(joint)[0]
 
     def draw(rng: Generator) -> Field:
-        return field({(joint.name, along): _of_angle(joint, curves.turning(rng, 1, share=0.35))})
+        return field({(joint.name, along): _of_angle(joint, curves.turning(rng, 1, share=0.3))})
 
     return _entry(joint, 22, "axial", (along,), draw)
 
@@ -95,11 +95,12 @@ def _worm(joint: Joint) -> Entry:
     about = letters(joint)[3]
 
     def draw(rng: Generator) -> Field:
-        order = int(rng.integers(5, 13))
-        phase, swell, at = rng.uniform(0, 2 * np.pi), rng.uniform(0.1, 0.3), rng.uniform(0, 2 * np.pi)
+        order = int(rng.integers(4, 15))
+        phase, swell, at = rng.uniform(0, 2 * np.pi), rng.uniform(0.05, 0.45), rng.uniform(0, 2 * np.pi)
+        second, behind = rng.uniform(0.05, 0.35), rng.uniform(0, 2 * np.pi)
 
         def wave(angle: Array) -> Array:
-            shape = np.sin(order * angle + phase) + 0.2 * np.sin(2 * order * angle + 2.3 * phase)
+            shape = np.sin(order * angle + phase) + second * np.sin(2 * order * angle + behind)
             result: Array = shape * (1 + swell * np.sin(angle + at))
             return result
 
@@ -124,7 +125,7 @@ def _seat(joint: Joint, linear: str) -> Entry:
     along = letters(joint)[0]
 
     def draw(rng: Generator) -> Field:
-        phase, lean = rng.uniform(0, 2 * np.pi), spread(rng, 0.1, 0.4)
+        phase, lean = rng.uniform(0, 2 * np.pi), spread(rng, 0.05, 0.5)
 
         def signal(s: Situation) -> Array:
             u = s.u(linear)

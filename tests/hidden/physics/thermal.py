@@ -14,7 +14,6 @@ from ..situation import Situation
 from .entry import Entry, Field, field, spread, symbol
 
 FAMILY = "thermal"
-SESSION = 6.0 * 3600
 
 
 def entries(machine: Machine) -> list[Entry]:
@@ -40,14 +39,14 @@ def heated(rng: Generator, body: str) -> Callable[[Situation], Array]:
 
     Zero is its mean over a session, since a constant is the set-up's.
     """
-    late, share, soft = rng.uniform(600, 3600), rng.uniform(0.0, 0.5), rng.uniform(0.0, 0.15)
+    late, share, soft = np.exp(rng.uniform(np.log(300), np.log(6000))), rng.uniform(0.0, 0.7), rng.uniform(0.0, 0.25)
 
     def signal(s: Situation) -> Array:
         quick = s.climate.bodies[body]
         both = (1 - share) * quick + share * lagged(quick, late)
         size = np.max(np.abs(both)) + 1e-9
         bent = both * (1 - soft * np.abs(both) / size)
-        bent -= np.mean(bent[s.climate.grid < SESSION])
+        bent -= np.mean(bent[s.climate.grid < s.climate.session])
         result: Array = np.interp(s.time, s.climate.grid, bent)
         return result
 
@@ -81,10 +80,10 @@ def _swing(letter: str) -> Entry:
 
 
 def _scale(joint: Joint) -> Entry:
-    """A warm screw or scale: positioning in proportion to travel from where it is held, near its middle."""
+    """A warm screw or scale: positioning in proportion to travel from where it is held, somewhere about its middle."""
 
     def draw(rng: Generator) -> Field:
-        warm, held, bow = heated(rng, "bed"), rng.uniform(-0.35, 0.35), spread(rng, 0.05, 0.2)
+        warm, held, bow = heated(rng, "bed"), rng.uniform(-0.5, 0.5), spread(rng, 0.02, 0.3)
 
         def signal(s: Situation) -> Array:
             u = s.u(joint.name)
@@ -101,7 +100,7 @@ def _bend(joint: Joint, component: str) -> Entry:
     """A column warmer in front than behind leans: a rotation, so the lever decides."""
 
     def draw(rng: Generator) -> Field:
-        warm, more = heated(rng, "column"), spread(rng, 0.0, 0.2)
+        warm, more = heated(rng, "column"), spread(rng, 0.0, 0.35)
         return field({(joint.name, component): lambda s: warm(s) * (1 + more * s.u(joint.name))})
 
     name = symbol(component, joint.name)

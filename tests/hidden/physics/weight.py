@@ -59,9 +59,9 @@ def across(s: Situation, joint: Joint) -> tuple[Array, Array, Array]:
     return down[:, "XYZ".index(first)], down[:, "XYZ".index(second)], sign * s.column(joint.name)
 
 
-def mass(s: Situation) -> Array:
-    """Turning mass in units of 300 kg: table and workpiece."""
-    return 0.4 + s.load / 300.0
+def mass(s: Situation, own: float) -> Array:
+    """Turning mass in units of 300 kg: the table's own, and the workpiece."""
+    return own + s.load / 300.0
 
 
 def _curved(rng: Generator, joint: Joint, power: float) -> tuple[curves.Curve, curves.Curve]:
@@ -77,7 +77,7 @@ def _coupled(machine: Machine, joint: Joint, rng: Generator, power: float) -> Fi
     """Vertical deflection and the pitch that belongs to it: rotation vector = direction x slope of the deflection."""
     shape, slope = _curved(rng, joint, power)
     move, down = np.abs(np.asarray(joint.direction)), np.asarray(machine.gravity)
-    tilt = np.cross(move, down) * rng.uniform(0.8, 1.2)
+    tilt = np.cross(move, down) * rng.uniform(0.7, 1.3)
     parts: dict[tuple[str, str], Signal] = {}
     for i in range(3):
         if down[i]:
@@ -120,9 +120,9 @@ def _foundation_tilt(machine: Machine, joint: Joint) -> Entry:
     axis = "ABC"[int(np.argmax(np.abs(np.cross(joint.direction, machine.gravity))))]
 
     def draw(rng: Generator) -> Field:
-        stiff = spread(rng, 0.1, 0.35)
+        stiff, skew = spread(rng, 0.05, 0.4), rng.uniform(-0.8, 0.8)
         return field(
-            {("F", axis): lambda s: s.u(joint.name) + stiff * (s.u(joint.name) ** 3 - 0.6 * s.u(joint.name) ** 2)}
+            {("F", axis): lambda s: s.u(joint.name) + stiff * (s.u(joint.name) ** 3 + skew * s.u(joint.name) ** 2)}
         )
 
     return Entry(
@@ -142,7 +142,7 @@ def _nod(machine: Machine) -> Entry:
     inner, outer = tool[0], tool[-1]
 
     def draw(rng: Generator) -> Field:
-        product, lean = crossed(inner, outer), spread(rng, 0.1, 0.4)
+        product, lean = crossed(inner, outer), spread(rng, 0.05, 0.5)
         return field({(outer, "A"): lambda s: product(s) * (1 + lean * s.u(outer))})
 
     return Entry(f"column nod {outer}", 34, "column nod", outer, (symbol("A", outer),), f"{outer} geometry", draw)
@@ -153,7 +153,7 @@ def _stiffness(joint: Joint) -> Entry:
     first, second = tilts(joint)
 
     def draw(rng: Generator) -> Field:
-        at, ratio = rng.uniform(0, np.pi), rng.uniform(0.1, 0.3)
+        at, ratio = rng.uniform(0, np.pi), rng.uniform(0.05, 0.4)
 
         def response(s: Situation, part: int) -> Array:
             a, b, turn = across(s, joint)
@@ -174,7 +174,7 @@ def _unbalance(joint: Joint) -> Entry:
     about = letters(joint)[3]
 
     def draw(rng: Generator) -> Field:
-        phase, limit = rng.uniform(0, 2 * np.pi), rng.uniform(0.8, 1.6)
+        phase, limit = rng.uniform(0, 2 * np.pi), rng.uniform(0.7, 2.5)
 
         def signal(s: Situation) -> Array:
             a, b, turn = across(s, joint)
@@ -192,12 +192,13 @@ def _torque(joint: Joint) -> Entry:
     _, first, _, about = letters(joint)
 
     def draw(rng: Generator) -> Field:
-        phase, shift = rng.uniform(-0.6, 0.6), rng.uniform(10.0, 30.0)
+        phase, shift = rng.uniform(-0.8, 0.8), np.exp(rng.uniform(np.log(3.0), np.log(50.0)))
+        bend, own = rng.uniform(-0.3, 0.3), rng.uniform(0.2, 0.8)
 
         def signal(s: Situation) -> Array:
             a, b, turn = across(s, joint)
             lever = a * np.cos(turn + phase) + b * np.sin(turn + phase)
-            result: Array = mass(s) * (lever + 0.15 * lever**2)
+            result: Array = mass(s, own) * (lever + bend * lever**2)
             return result
 
         return field({(joint.name, about): signal, (joint.name, first): lambda s: shift * signal(s)})
@@ -210,13 +211,13 @@ def _twist(joint: Joint) -> Entry:
     along, _, _, about = letters(joint)
 
     def draw(rng: Generator) -> Field:
-        phase = rng.uniform(-0.6, 0.6)
+        phase, bend, own = rng.uniform(-0.8, 0.8), rng.uniform(-0.25, 0.25), rng.uniform(0.2, 0.8)
 
         def signal(s: Situation) -> Array:
             a, b, turn = across(s, joint)
-            torque = mass(s) * (a * np.cos(turn + phase) + b * np.sin(turn + phase))
+            torque = mass(s, own) * (a * np.cos(turn + phase) + b * np.sin(turn + phase))
             place = s.ball() @ np.asarray(joint.triad)["XYZ".index(along)] / 200.0
-            result: Array = torque * (place + 0.1 * place**2)
+            result: Array = torque * (place + bend * place**2)
             return result
 
         return field({(joint.name, about): signal})
@@ -233,7 +234,7 @@ def _tool_droop(machine: Machine) -> Entry:
     """A swivelled head lets a long tool hang: a tilt by the weight across the tool, growing with its length."""
 
     def draw(rng: Generator) -> Field:
-        power = rng.uniform(1.5, 2.2)
+        power = rng.uniform(1.2, 2.6)
 
         def weight(s: Situation, axis: int) -> Array:
             _, turn = s.machine.nominal(s.q, s.length)
