@@ -38,6 +38,18 @@ def exists_already(path: str) -> UsageError:
     return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
 
 
+def holds(path: str, data: bytes | Iterable[bytes]) -> bool:
+    """Whether a file has exactly this content; raises `SourceError` NCF002."""
+    try:
+        with open(path, "rb") as handle:
+            for part in (data,) if isinstance(data, bytes) else data:
+                if handle.read(len(part)) != part:
+                    return False
+            return not handle.read(1)
+    except OSError as error:
+        raise unreadable(path, error) from error
+
+
 def write_whole(path: str, data: bytes | Iterable[bytes], replace: bool = False) -> None:
     """Write a new file, or with `replace` in place of an existing one, whose mode is kept; NCF004, NCF007 if not."""
     with _coded(path):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.cli.targets import Target, targets
+from ncfix.cli.targets import Outputs, Target, targets
 from ncfix.diagnostics import UsageError
 
 
@@ -23,12 +23,12 @@ def parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def paths(*sources: str, output: str | None = None, in_place: bool = False, force: bool = False) -> list[str]:
-    return [target.path for target in targets(sources, output, in_place, force)]
+    return [target.path for target in targets(sources, Outputs(output, in_place, force))]
 
 
 def code(*sources: str, output: str | None = None, in_place: bool = False, force: bool = False) -> str:
     with pytest.raises(UsageError) as caught:
-        targets(sources, output, in_place, force)
+        targets(sources, Outputs(output, in_place, force))
     return caught.value.code
 
 
@@ -52,7 +52,7 @@ def test_standard_streams(parts: Path) -> None:
 
 
 def test_in_place_keeps_the_name(parts: Path) -> None:
-    (target,) = targets(["c.ngc"], None, True, False)
+    (target,) = targets(["c.ngc"], Outputs(None, True))
     assert (target.path, target.backup) == ("c.ngc", "c.ngc.orig")
 
 

@@ -1,1 +1,1 @@
-"""Many programs: who does the work, what is done, and how to go on after a stop."""
+"""Many programs: which they are, who does the work, what is done, and how to go on after a stop."""

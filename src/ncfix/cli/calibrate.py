@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import STREAM, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def calibrate(
     from ncfix.measure.calibrate import calibrate as calibrated
     from ncfix.measure.reader import reads
 
-    target = targets([measured[0]], output, False, force, (machine_path, *measured[1:]))[0]
+    target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):

@@ -62,4 +62,26 @@ CODES = {
         "what comes before it: a refusal that reaches far back, or frames that are set where the machine stands.",
         "Give the program as a file; then it is looked at as a whole before anything is written.",
     ),
+    "NCF014": Code(
+        "no program in a folder",
+        "Of a folder, the files with a suffix of a dialect are taken, below it too; hidden files, symbolic links and "
+        "`.orig` files are not.",
+        "`ncfix dialects` lists the suffixes; files with another one can be named.",
+    ),
+    "NCF015": Code(
+        "no such executor",
+        "`--executor` says what runs the programs of a batch: processes of this computer, or what a plugin reaches.",
+        "`ncfix plugins` lists what plugins bring.",
+    ),
+    "NCF016": Code(
+        "nothing to go on with",
+        "`--resume` goes on with the outputs in a folder where an earlier run stopped.",
+        "Say `-o FOLDER`, the same as then.",
+    ),
+    "NCF017": Code(
+        "a process was killed",
+        "With `--jobs`, a program was given to a process of its own, which was killed from outside (mostly because "
+        "memory ran out), and so was the one that tried again. The other programs are not concerned.",
+        "Fix the program alone, with `--jobs 1`, on a computer with more memory.",
+    ),
 }

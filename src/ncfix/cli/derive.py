@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine
-from ncfix.cli.targets import STREAM, targets
+from ncfix.cli.targets import STREAM, Outputs, targets
 
 if TYPE_CHECKING:
     from ncfix.machine.symbolic import Derivation
@@ -49,7 +49,7 @@ def derive(
     if (machine_path is None) == (chain_path is None):
         raise click.UsageError("give one of --machine and --chain")
     source = machine_path or chain_path or ""
-    target = targets([source], output, False, force)[0]
+    target = targets([source], Outputs(output, force=force))[0]
     from ncfix.machine import symbolic
 
     include = effects.split(",") if effects else None

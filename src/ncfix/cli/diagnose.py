@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import read, shown, targets
+from ncfix.cli.targets import Outputs, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def diagnose(
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
 
-    target = targets([measured[0]], output, False, force, (machine_path, *measured[1:]))[0] if output else None
+    target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0] if output else None
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     for each in data:
@@ -77,11 +77,11 @@ def _extras(
     """The plan of the next measurement and the report, where they were asked for."""
     inputs = (machine_path, *measured[1:])
     if next_path is not None:
-        _write_next(found, targets([measured[0]], next_path, False, force, inputs)[0])
+        _write_next(found, targets([measured[0]], Outputs(next_path, force=force), inputs)[0])
     if report is not None:
         from ncfix.report.diagnosis import page
 
-        targets([measured[0]], report, False, force, inputs)[0].write(page(found).encode())
+        targets([measured[0]], Outputs(report, force=force), inputs)[0].write(page(found).encode())
 
 
 def _write_next(found: Diagnosis, target: Target) -> None:

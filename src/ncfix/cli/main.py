@@ -13,7 +13,8 @@ import click
 
 from ncfix import __version__
 from ncfix.cli import console
-from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError
+from ncfix.cli.faults import fault
+from ncfix.diagnostics import ExitCode, Message, NcfixError
 from ncfix.plugins import PluginWarning, registry
 
 VERBS = (
@@ -112,16 +113,6 @@ def failed(error: NcfixError, as_json: bool) -> int:
         with suppress(NcfixError, console.ReaderGoneError):
             console.put_json(errors=[message.as_dict() for message in error.messages])
     return error.exit_code
-
-
-def fault(error: Exception) -> FaultError:
-    """Own up to a bug."""
-    import traceback
-
-    where = traceback.extract_tb(error.__traceback__)[-1]
-    at = f"{os.path.basename(where.filename)}:{where.lineno}"
-    text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"
-    return FaultError.of("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input")
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option, table_option
-from ncfix.cli.targets import STREAM, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 
 if TYPE_CHECKING:
     from ncfix.measure.candidates import Room
@@ -58,8 +58,8 @@ def plan(
     from ncfix.measure.writer import dumps
 
     sources = () if existing is None else (existing,)
-    target = targets([machine_path], output, False, force, sources)[0]
-    program = targets([machine_path], gcode, False, force, sources)[0] if gcode else None
+    target = targets([machine_path], Outputs(output, force=force), sources)[0]
+    program = targets([machine_path], Outputs(gcode, force=force), sources)[0] if gcode else None
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []

@@ -11,7 +11,7 @@ from ncfix.cli.following import Following, figures, lines_of
 from ncfix.cli.options import dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.table import as_csv, known
-from ncfix.cli.targets import STREAM, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 
 if TYPE_CHECKING:
     from ncfix.compensate.simulation import TipError
@@ -63,7 +63,7 @@ def simulate(
         return
     assert program is not None
     inputs = (machine_path, *given.files)
-    target = targets([program], output, False, force, inputs)[0] if output else None
+    target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"simulating {shown(program)}"):
         source, moves, error = following.simulated(program)
@@ -84,7 +84,7 @@ def _simulate_plan(
     from ncfix.measure.synthetic import simulate as filled
     from ncfix.measure.writer import dumps
 
-    target = targets([plan], output or STREAM, False, force, (machine_path,))[0]
+    target = targets([plan], Outputs(output or STREAM, force=force), (machine_path,))[0]
     machine = load_machine(machine_path)
     measurement = reads(read(plan), machine, shown(plan), plan=True)
     console.tell(*measurement.remarks)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from ncfix import files
+from ncfix.batch.gathering import Gathered, gathered
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 
@@ -39,12 +40,16 @@ class Target:
     path      the output; `-` is standard output
     in_place  the output takes the input's name, which is kept as `backup`
     force     an existing output may be replaced
+    resume    an existing output is left as it is, if it is what would be written
+    name      the output's way down from the output folder; empty if there is none
     """
 
     source: str
     path: str
     in_place: bool = False
     force: bool = False
+    resume: bool = False
+    name: str = ""
 
     @property
     def backup(self) -> str:
@@ -58,49 +63,80 @@ class Target:
                 console.put(part)
         elif self.in_place:
             files.replace_keeping(self.path, self.backup, data)
+        elif self.resume and not self.force and os.path.lexists(self.path):
+            if not files.holds(self.path, data):
+                raise files.exists_already(self.path)
         else:
             files.write_whole(self.path, data, replace=self.force)
 
 
-def targets(
-    sources: Sequence[str], output: str | None, in_place: bool, force: bool, others: Sequence[str | None] = ()
-) -> list[Target]:
-    """Where each output goes, which is none of the sources nor of the `others` that are read.
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where the outputs are to go, as the command line says.
 
-    Raises `UsageError` NCF003 ... NCF011 before anything is computed or written.
+    output    a file, a folder, `-` for standard output; None: not said
+    in_place  outputs take the places of their inputs
+    force     existing outputs may be replaced
+    resume    outputs that are there from an earlier run are not done again
     """
-    if in_place and output is not None:
-        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
-    if in_place:
-        found = [Target(source, source, in_place=True) for source in sources]
+
+    output: str | None = None
+    in_place: bool = False
+    force: bool = False
+    resume: bool = False
+
+    def folder(self, given: Sequence[str]) -> str | None:
+        """The folder that the outputs go to; None if they do not go to one."""
+        if self.in_place or self.output in (None, STREAM):
+            return None
+        assert self.output is not None
+        many = len(given) > 1 or any(os.path.isdir(path) for path in given)
+        return self.output if many or os.path.isdir(self.output) or self.output.endswith(os.sep) else None
+
+
+def targets(
+    given: Sequence[str], outputs: Outputs, others: Sequence[str | None] = (), folders: bool = False
+) -> list[Target]:
+    """Where each output goes, which is none of the programs nor of the `others` that are read.
+
+    folders  a folder among the inputs stands for all programs below it
+
+    Raises `UsageError` NCF003 ... NCF016 before anything is computed or written.
+    """
+    folder = outputs.folder(given)
+    _check_choices(outputs, folder)
+    programs = gathered(given, folder) if folders else [Gathered(path, os.path.basename(path)) for path in given]
+    if outputs.in_place:
+        found = [Target(program.path, program.path, in_place=True) for program in programs]
     else:
-        found = [
-            Target(source, path, force=force) for source, path in zip(sources, _paths(sources, output), strict=True)
-        ]
+        found = [_target(program, outputs, folder) for program in programs]
     _check_clash(found)
+    inputs = _files([*(program.path for program in programs), *(other for other in others if other)])
     for target in found:
         if target.in_place:
             _check_in_place(target)
         elif target.path != STREAM:
-            _check_output(target, [*sources, *(other for other in others if other)])
+            _check_output(target, inputs)
     return found
 
 
-def _paths(sources: Sequence[str], output: str | None) -> list[str]:
-    if output is None:
-        if list(sources) == [STREAM]:
-            return [STREAM]
+def _check_choices(outputs: Outputs, folder: str | None) -> None:
+    if outputs.in_place and outputs.output is not None:
+        raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
+    if outputs.resume and folder is None:
+        raise UsageError.of("NCF016", "--resume goes on with a folder of outputs, and there is none", hint="-o FOLDER")
+
+
+def _target(program: Gathered, outputs: Outputs, folder: str | None) -> Target:
+    if folder is not None:
+        if program.path == STREAM:
+            hint = f"-o {os.path.join(folder, 'NAME')}"
+            raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
+        path = os.path.join(folder, program.name)
+        return Target(program.path, path, force=outputs.force, resume=outputs.resume, name=program.name)
+    if outputs.output is None and program.path != STREAM:
         raise UsageError.of("NCF003", "no output given", hint="-o FILE, -o DIR, -o - or --in-place")
-    if output != STREAM and (len(sources) > 1 or os.path.isdir(output) or output.endswith(os.sep)):
-        return [os.path.join(output, _name(source, output)) for source in sources]
-    return [output] * len(sources)
-
-
-def _name(source: str, folder: str) -> str:
-    if source == STREAM:
-        hint = f"-o {os.path.join(folder, 'NAME')}"
-        raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
-    return os.path.basename(source)
+    return Target(program.path, outputs.output or STREAM, force=outputs.force)
 
 
 def _check_clash(found: Sequence[Target]) -> None:
@@ -122,12 +158,12 @@ def _check_in_place(target: Target) -> None:
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
 
 
-def _check_output(target: Target, inputs: Sequence[str]) -> None:
+def _check_output(target: Target, inputs: Collection[tuple[int, int]]) -> None:
     place = Place(target.path)
     _check_regular(target.path)
-    if any(_same(target.path, each) for each in inputs):
+    if _file(target.path) in inputs:
         raise UsageError.of("NCF005", "is an input too, and inputs are not changed", place, "--in-place, or another -o")
-    if os.path.lexists(target.path) and not target.force:
+    if os.path.lexists(target.path) and not (target.force or target.resume):
         raise files.exists_already(target.path)
     folder = os.path.dirname(target.path) or "."
     if os.path.lexists(folder) and not os.path.isdir(folder):
@@ -142,5 +178,14 @@ def _check_regular(path: str) -> None:
         raise UsageError.of("NCF005", "is not an ordinary file", Place(path), "-o - writes to standard output")
 
 
-def _same(path: str, source: str) -> bool:
-    return source != STREAM and os.path.exists(path) and os.path.exists(source) and os.path.samefile(path, source)
+def _files(paths: Iterable[str]) -> frozenset[tuple[int, int]]:
+    """The files behind these names, however they are called: device and number."""
+    return frozenset(found for found in map(_file, paths) if found is not None)
+
+
+def _file(path: str) -> tuple[int, int] | None:
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    return found.st_dev, found.st_ino

@@ -17,7 +17,7 @@ from ncfix.cli.options import (
 )
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.table import Columns, as_csv, known
-from ncfix.cli.targets import shown, targets
+from ncfix.cli.targets import Outputs, shown, targets
 
 if TYPE_CHECKING:
     from ncfix.machine import Machine
@@ -43,7 +43,7 @@ def trace(
     as_json: bool,
 ) -> None:
     """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
-    (target,) = targets([program], output, False, force, (machine_path, *given.files))
+    (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"following {shown(program)}"):
         source = following.read(program)

@@ -1,0 +1,73 @@
+"""Who works on many programs: this process, others beside it, or whatever the executor of a plugin reaches.
+
+What comes out does not depend on it: results come in the order of the tasks, and a worker that dies takes one task with
+it, not the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from difflib import get_close_matches
+from typing import TypeVar
+
+from ncfix.diagnostics import UsageError
+from ncfix.plugins import registry
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+Staff = Callable[[int], Executor]
+"""Makes an executor with so many workers."""
+
+BUILT_IN: Mapping[str, Staff] = {"processes": ProcessPoolExecutor}
+
+
+def staff(name: str) -> Staff:
+    """The executors of that name; raises `UsageError` NCF015."""
+    known: dict[str, Staff] = registry("executors", BUILT_IN)
+    if name not in known:
+        close = get_close_matches(name, known, 1)
+        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(sorted(known))}"
+        raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=hint)
+    return known[name]
+
+
+def each(
+    work: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    make: Staff,
+    workers: int,
+    lost: Callable[[Task], Result],
+) -> Iterator[Result]:
+    """The results of `work` for all tasks, in their order, by `workers` workers.
+
+    lost  the result for a task whose worker died over it twice, the second time alone
+    """
+    rest = list(tasks)
+    while rest:
+        with make(min(workers, len(rest))) as executor:
+            begun = [executor.submit(work, task) for task in rest]
+            try:
+                for future in begun:
+                    yield future.result()
+                    del rest[0]
+            except BrokenExecutor:
+                _forget(begun)
+            except BaseException:
+                _forget(begun)
+                raise
+        if rest:
+            yield _alone(work, rest.pop(0), make, lost)
+
+
+def _alone(work: Callable[[Task], Result], task: Task, make: Staff, lost: Callable[[Task], Result]) -> Result:
+    try:
+        with make(1) as executor:
+            return executor.submit(work, task).result()
+    except BrokenExecutor:
+        return lost(task)
+
+
+def _forget(begun: Sequence[Future[Result]]) -> None:
+    for future in begun:
+        future.cancel()

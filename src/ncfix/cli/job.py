@@ -1,0 +1,173 @@
+"""One program of `ncfix fix`: corrected, written, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import dataclass, field, replace
+from io import StringIO
+from typing import TYPE_CHECKING, Any
+
+from ncfix import __version__, fast
+from ncfix.batch.journal import Find, Noted, digest_of, text_digest
+from ncfix.cli import console
+from ncfix.cli.faults import fault
+from ncfix.cli.options import dialect_of, subprograms
+from ncfix.cli.parts import Fixed, Outlet, Source, outlet_for, part_bytes, source_of
+from ncfix.cli.targets import STREAM, Target, shown
+from ncfix.diagnostics import ExitCode, Message, NcfixError, Place
+
+if TYPE_CHECKING:
+    from ncfix.compensate.options import FixOptions
+    from ncfix.compensate.stream import Stream
+    from ncfix.machine import Machine
+    from ncfix.program.dialect import Dialect
+    from ncfix.program.setup import Setup
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of one program: its exit code, its entry in the JSON object, and the subprograms looked for."""
+
+    code: int
+    entry: dict[str, Any]
+    called: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def failed(cls, target: Target, error: NcfixError) -> Outcome:
+        """A program that ended in an error."""
+        entry = {"path": shown(target.source), "output": None}
+        return cls(error.exit_code, {**entry, "errors": [message.as_dict() for message in error.messages]})
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is the same for all programs."""
+
+    machine: Machine
+    setup: Setup
+    dialect: str | None
+    options: FixOptions
+
+    def key(self, target: Target) -> str:
+        """A digest of what the result for a program depends on, subprograms apart."""
+        options = (__version__, self.machine.hash, self.setup, self.dialect, self.options, digest_of(target.source))
+        return text_digest(repr(options).encode())
+
+    def heard(self, target: Target) -> tuple[Outcome, str]:
+        """Fix one program elsewhere: what came of it, and what there is to say; a fault ends this one only."""
+        with redirect_stderr(StringIO()) as said:
+            try:
+                outcome = self.outcome(target)
+            except Exception as error:
+                own = fault(error)
+                console.tell(*own.messages)
+                outcome = Outcome.failed(target, own)
+        return outcome, said.getvalue()
+
+    def outcome(self, target: Target, jobs: int = 1) -> Outcome:
+        """Fix one program and say what came of it; an error ends this program only."""
+        find = Noted(subprograms(target.source))
+        try:
+            with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
+                return replace(_written(fixed, target, self.options.allow_refused), called=find.called)
+        except NcfixError as error:
+            console.tell(*error.messages)
+            return Outcome.failed(target, error)
+
+    @contextmanager
+    def fixed(self, target: Target, find: Find, jobs: int) -> Iterator[Fixed]:
+        """The corrected program; a long one is corrected while it is read, if it can be."""
+        with source_of(target.source) as source:
+            head, long = source.looked_into()
+            if not long or self.options.flatten:
+                yield self._whole(source, source.everything() if long else head, find)
+                return
+            dialect = dialect_of(head, shown(target.source), self.dialect, self.machine)
+            with self._outlet(source, target, dialect, find, jobs) as (stream, outlet):
+                yield self._in_parts(source, stream, outlet, find)
+
+    def _whole(self, source: Source, text: bytes, find: Find) -> Fixed:
+        from ncfix.compensate.fix import fix_program
+        from ncfix.compensate.flat import fix_flat
+        from ncfix.program.reader import read
+
+        path = shown(source.path)
+        program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
+        fix = fix_flat if self.options.flatten else fix_program
+        fixed = fix(program, self.machine, self.setup, self.options, resolve=find)
+        return Fixed(fixed.text, fixed.changed, fixed.report)
+
+    @contextmanager
+    def _outlet(
+        self, source: Source, target: Target, dialect: Dialect, find: Find, jobs: int
+    ) -> Iterator[tuple[Stream, Outlet]]:
+        from ncfix.compensate.stream import Stream
+
+        fast.engage()
+        path = shown(source.path)
+        with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
+            stream = Stream(
+                self.machine,
+                self.setup,
+                self.options,
+                find,
+                path,
+                dialect,
+                source.read,
+                outlet.put,
+                part_bytes(),
+                jobs,
+            )
+            yield stream, outlet
+
+    def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:
+        from ncfix.program.parts import NotInPartsError
+
+        try:
+            done = stream.run()
+        except NotInPartsError:
+            fixed = self._whole(source, source.everything(), find)
+            assert isinstance(fixed.text, bytes)
+            return Fixed(outlet.after(fixed.text, source.path), fixed.changed, fixed.report)
+        return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
+
+
+def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:
+    entry: dict[str, Any] = fixed.report.as_dict()
+    console.tell_some([*fixed.report.warnings, *_refusals(target.source, entry["refused"])])
+    refused = bool(entry["refused"]) and not allow_refused
+    if not refused:
+        _write(fixed, target)
+        entry["output"] = target.path
+    for line in _summary(entry, refused):
+        console.say(line)
+    return Outcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry)
+
+
+def _write(fixed: Fixed, target: Target) -> None:
+    if target.in_place and not fixed.changed:
+        return
+    target.write(fixed.text)
+
+
+def _refusals(source: str, refused: Sequence[dict[str, Any]]) -> list[Message]:
+    return [Message(each["code"], each["reason"], Place(shown(source), each["line"])) for each in refused]
+
+
+def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
+    """What was done, for people."""
+    output = "nothing written" if refused else "<stdout>" if entry["output"] == STREAM else entry["output"]
+    counts = f"{entry['compensated']} corrected, {entry['passed']} passed by rule, {len(entry['refused'])} refused"
+    lines = [
+        f"{entry['path']} -> {output}",
+        f"  motion blocks       {counts}; {entry['inserted_blocks']} inserted",
+        f"  largest correction  {entry['max_correction_um']:.1f} um",
+    ]
+    if entry["error_before_um"]:
+        without = "; without what is refused" if entry["refused"] else ""
+        lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}{without}")
+        lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
+    if entry["leaves"]:
+        lines.append(f"  {entry['strategy']}: {entry['leaves']}")
+    return lines
