@@ -24,7 +24,14 @@ def parser() -> argparse.ArgumentParser:
         prog="python -m tests.hidden", description="The hidden-effect benchmark; see README.md beside it."
     )
     p.add_argument("--family", action="append", choices=list(FAMILIES), help="only these (default: all)")
-    p.add_argument("--count", type=int, help="at most so many scenarios a family")
+    p.add_argument(
+        "--count",
+        type=counted,
+        action="append",
+        default=[],
+        metavar="[FAMILY=]N",
+        help="only the first so many scenarios of every family, or of that one; repeatable",
+    )
     p.add_argument("--final", action="store_true", help="the final seeds: once, and reported as they came")
     p.add_argument("--command", default="ncfix", help="the program under test (default: ncfix)")
     p.add_argument("--without", default="--without", help="its option that takes a name out of the catalogue")
@@ -45,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: list[str] | None = None) -> int:
     """Run; 0 when every required line that was counted is met, else 1."""
     options = parser().parse_args(arguments)
-    wanted = tasks(options.family or list(FAMILIES), options.final, options.count)
+    wanted = tasks(options.family or list(FAMILIES), options.final, dict(options.count))
     if options.write:
         return write(wanted, options.write)
     records = known(options.records)
@@ -59,6 +66,14 @@ def main(arguments: list[str] | None = None) -> int:
         old = options.table.read_text() if options.table.exists() else ""
         options.table.write_text(tally.replaced(old, section))
     return int(any(line.met == "no" for line in tally.lines(chosen)))
+
+
+def counted(text: str) -> tuple[str, int]:
+    """`FAMILY=N`, or `N` for all."""
+    name, _, number = text.rpartition("=")
+    if name and name not in FAMILIES:
+        raise argparse.ArgumentTypeError(f"no family {name}")
+    return name, int(number)
 
 
 def program(options: argparse.Namespace) -> candidate.Program:

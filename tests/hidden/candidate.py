@@ -31,7 +31,7 @@ class Reported:
 @dataclass(frozen=True, slots=True)
 class Answer:
     """What `diagnose --json` said; `error` is why it said nothing. `machine` is the file with the effects added, if
-    any.
+    any; `seconds` went by, `cpu_seconds` of them were worked (a busy computer takes longer than it works).
     """
 
     verdict: str = ""
@@ -40,6 +40,7 @@ class Answer:
     next_poses: tuple[Mapping[str, float], ...] = ()
     machine: Path | None = None
     seconds: float = 0.0
+    cpu_seconds: float = 0.0
     error: str = ""
     raw: Mapping[str, Any] = field(default_factory=dict)
 
@@ -108,16 +109,24 @@ def ask(candidate: Candidate, folder: Path, without: Sequence[str] = (), more: S
     """One question: all measurement files of a folder (and some more) against its machine file."""
     output = folder / "found.toml"
     output.unlink(missing_ok=True)
-    start = time.perf_counter()
+    start, worked = time.perf_counter(), cpu()
     measured = [*sorted(folder.glob("measured-*.csv")), *more]
     try:
         said = candidate.diagnose(folder / "machine.toml", measured, output, without)
     except Exception as error:
-        return Answer(error=f"{type(error).__name__}: {error}", seconds=time.perf_counter() - start)
-    return read_answer(said, output, time.perf_counter() - start)
+        return Answer(
+            error=f"{type(error).__name__}: {error}", seconds=time.perf_counter() - start, cpu_seconds=cpu() - worked
+        )
+    return read_answer(said, output, time.perf_counter() - start, cpu() - worked)
 
 
-def read_answer(said: Mapping[str, Any], output: Path, seconds: float) -> Answer:
+def cpu() -> float:
+    """Processor seconds of this process and of the programs that it has run to their end."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def read_answer(said: Mapping[str, Any], output: Path, seconds: float, cpu_seconds: float = 0.0) -> Answer:
     """The parts of the JSON object that are scored (docs/formats.md section 4)."""
     effects = tuple(
         Reported(e["name"], e.get("title") or "", e.get("axis"), tuple(e.get("aliases") or ()))
@@ -133,6 +142,7 @@ def read_answer(said: Mapping[str, Any], output: Path, seconds: float) -> Answer
         tuple(p for p in poses if p),
         machine,
         seconds,
+        cpu_seconds,
         "",
         said,
     )

@@ -7,6 +7,7 @@ and lie in another range; they are run once and reported as they came.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from . import designs
@@ -22,7 +23,7 @@ class Family:
 
     `source` says where hidden effects come from: "catalogue", "foreign", "mistake", "location" (a line error the file
     lacks) or "pair" (one of two that only a second tool tells apart). `alone`: the code under test must do without
-    the true effect's name.
+    the true effect's name. `gap`: whether the new machine file is judged on the held-out poses.
     """
 
     name: str
@@ -36,12 +37,13 @@ class Family:
     alone: bool = False
     layouts: tuple[Design, ...] = (designs.BALLS, designs.FREE, designs.BARS)
     extra: bool = False
+    gap: bool = False
 
 
 FAMILIES = {
     family.name: family
     for family in (
-        Family("single", "one effect, 5 to 20 um", 200),
+        Family("single", "one effect, 5 to 20 um", 200, gap=True),
         Family("weak", "one effect, 2.5 um", 80, amplitudes_um=(2.5,)),
         Family("clean", "nothing hidden, no clutter", 100, hidden=0, clutter_um=0.0, clean=True),
         Family("clutter", "nothing hidden, 1 um of everything", 100, hidden=0),
@@ -71,14 +73,18 @@ class Task:
     seed: int
 
 
-def tasks(names: list[str], final: bool = False, count: int | None = None) -> list[Task]:
-    """The scenarios of these families; `count` at most per family."""
-    result = []
+def tasks(names: list[str], final: bool = False, counts: Mapping[str, int] | None = None) -> list[Task]:
+    """The first scenarios of these families, `counts` at most of each ("" for those it does not name).
+
+    Families take turns, so that a run that is broken off has some of all.
+    """
+    most = counts or {}
+    seed = final_seed if final else development_seed
+    shares = []
     for name in names:
-        total = FAMILIES[name].count if count is None else min(count, FAMILIES[name].count)
-        seed = final_seed if final else development_seed
-        result += [Task(name, index, seed(name, index)) for index in range(total)]
-    return result
+        total = min(FAMILIES[name].count, most.get(name, most.get("", FAMILIES[name].count)))
+        shares += [((index + 0.5) / total, Task(name, index, seed(name, index))) for index in range(total)]
+    return [task for _, task in sorted(shares, key=lambda pair: pair[0])]
 
 
 def development_seed(family: str, index: int) -> int:

@@ -51,6 +51,7 @@ class Record:
     resolved: bool | None
     resolved_by_random: bool | None
     seconds: float
+    cpu_seconds: float
     error: str
 
 
@@ -61,7 +62,7 @@ def run(task: Task, candidate: Candidate, keep: Path | None = None) -> Record:
         base = (keep / f"{task.family}-{task.index:03d}") if keep else Path(folder)
         scene.write(base / "handed", base / "truth")
         answer = ask(candidate, base / "handed", scene.truth.without)
-        after = _gap_after(scene, candidate, answer, base)
+        after = _gap_after(scene, candidate, answer, base) if FAMILIES[task.family].gap else None
         resolved = _resolved(scene, candidate, answer, base) if FAMILIES[task.family].source == "pair" else (None, None)
     return judged(task, scene, answer, after, resolved)
 
@@ -91,7 +92,8 @@ def judged(
         unknown=flagged, closest=max(truth.relatives.values(), default=0.0),
         family_right=_family_right(scene, first) if truth.without else None,
         gap_before_um=gaps["before"], gap_after_um=after, gap_file_um=gaps["file"], floor_um=gaps["floor"],
-        resolved=resolved[0], resolved_by_random=resolved[1], seconds=answer.seconds, error=answer.error,
+        resolved=resolved[0], resolved_by_random=resolved[1], seconds=answer.seconds,
+        cpu_seconds=answer.cpu_seconds, error=answer.error,
     )  # fmt: skip
 
 
@@ -130,9 +132,10 @@ def _named(entry: Any) -> Named:
 
 
 def _gap_after(scene: Scenario, candidate: Candidate, answer: Answer, base: Path) -> float | None:
-    """The held-out gap of the machine file that the answer wrote, um; None where there is none to judge."""
-    if answer.error or scene.draft.mistake is not None:
-        return None
+    """The held-out gap of the machine file that the answer wrote, um: the one that was handed over if it wrote none.
+
+    None where that file cannot be read.
+    """
     machine = answer.machine or base / "handed" / "machine.toml"
     plan = base / "handed" / "plan.csv"
     plan.write_text(scene.plan)
@@ -143,18 +146,26 @@ def _gap_after(scene: Scenario, candidate: Candidate, answer: Answer, base: Path
 
 
 def _resolved(scene: Scenario, candidate: Candidate, answer: Answer, base: Path) -> tuple[bool, bool]:
-    """Whether the truth stands alone after the proposed poses are measured, and after as many random ones."""
+    """Whether the truth stands alone after the proposed poses are measured, and after as many random ones.
+
+    Who proposes none has given the last answer already.
+    """
     seed = scene.truth.seed
     proposed = answer.next_poses[:EXTRA_POSES]
-    chosen = remeasure.at_poses(scene, proposed, seed) if proposed else None
-    chance = remeasure.at_random(scene, EXTRA_POSES, seed)
-    return tuple(_alone(scene, candidate, base, text) if text else False for text in (chosen, chance))  # type: ignore[return-value]
+    chance = _asked_again(scene, candidate, base, remeasure.at_random(scene, EXTRA_POSES, seed))
+    if not proposed:
+        return _alone(scene, answer), _alone(scene, chance)
+    chosen = _asked_again(scene, candidate, base, remeasure.at_poses(scene, proposed, seed))
+    return _alone(scene, chosen), _alone(scene, chance)
 
 
-def _alone(scene: Scenario, candidate: Candidate, base: Path, text: str) -> bool:
+def _asked_again(scene: Scenario, candidate: Candidate, base: Path, text: str) -> Answer:
     more = base / "handed" / "more.csv"
     more.write_text(text)
-    answer = ask(candidate, base / "handed", more=[more])
+    return ask(candidate, base / "handed", more=[more])
+
+
+def _alone(scene: Scenario, answer: Answer) -> bool:
     first = answer.effects[0] if answer.effects else None
     return bool(first and _is(first, scene.truth.named()[0]) and _size(first) == 1)
 

@@ -80,16 +80,21 @@ def mean(
 
 
 def removed(record: Record) -> float | None:
-    """Share of the excess gap that is gone: 1 - (after^2 - floor^2) / (before^2 - floor^2), not above 1."""
+    """Share of the excess gap that is gone: 1 - (after^2 - floor^2) / (before^2 - floor^2), not above 1.
+
+    Nothing is gone where the file that came out cannot be read; None where there is no excess to begin with.
+    """
     excess = record.gap_before_um**2 - record.floor_um**2
-    if record.gap_after_um is None or excess <= 0:
+    if excess <= 0:
         return None
+    if record.gap_after_um is None:
+        return 0.0
     return 1 - max(record.gap_after_um**2 - record.floor_um**2, 0.0) / excess
 
 
-def worse(record: Record) -> bool | None:
-    """Whether the machine file that came out is worse than the one that went in."""
-    return None if record.gap_after_um is None else record.gap_after_um > WORSE * record.gap_file_um
+def worse(record: Record) -> bool:
+    """Whether the machine file that came out is worse than the one that went in, or cannot be read."""
+    return record.gap_after_um is None or record.gap_after_um > WORSE * record.gap_file_um
 
 
 def lines(records: Sequence[Record]) -> list[Line]:
@@ -106,6 +111,7 @@ def lines(records: Sequence[Record]) -> list[Line]:
         mean("one effect 5 to 20 um: mean size of the set", [r.set_size for r in single if r.set_size], 1.3, True),
         mean("one effect 5 to 20 um: wrong names a scenario", false, prototype="0.15 to 0.20"),
         share("one effect 2.5 um: first name right", of["weak"], lambda r: r.first_right, 0.88, prototype="0.88"),
+        share("one effect 2.5 um: true name in the set", of["weak"], lambda r: r.in_set),
         share("clean null: any name", of["clean"], named, 0.02, True, "0.038"),
         share("null with 1 um clutter: any name", of["clutter"], named, 0.05, True, "0.04 to 0.10"),
         share("foreign effect: said to be unknown", of["foreign"], unknown_or_right, 0.97, prototype="0.99"),
@@ -117,14 +123,15 @@ def lines(records: Sequence[Record]) -> list[Line]:
         quantile("excess gap removed: median", gone, 0.5, 0.97, prototype="0.986"),
         quantile("excess gap removed: worst tenth", gone, 0.1, 0.90, prototype="0.96"),
         share("gap made worse", single, worse, 0.01, True, "0"),
+        share("ambiguous pairs: true name in the set before more is measured", of["pair"], lambda r: r.in_set),
         share("ambiguous pairs resolved by 12 poses proposed", of["pair"], lambda r: r.resolved, 0.7, prototype="0.45"),
         share("ambiguous pairs resolved by 12 poses by chance", of["pair"], lambda r: r.resolved_by_random),
         share("line error the file lacks: first name right", of["location"], lambda r: r.first_right),
         share("poor design: true name in the set", of["poor"], lambda r: r.in_set),
         share("110 rows: first name right", of["small"], lambda r: r.first_right, prototype="0.92"),
         share("hidden from these poses: any other name", of["blind"], lambda r: r.false_names > 0),
-        quantile("seconds for one answer: median", [r.seconds for r in records], 0.5, 5.0, True),
-        quantile("seconds for one answer: 95 %", [r.seconds for r in records], 0.95),
+        quantile("seconds of one core for one answer: median", [r.cpu_seconds for r in records], 0.5, 5.0, True),
+        quantile("seconds of one core for one answer: 95 %", [r.cpu_seconds for r in records], 0.95),
         share("no answer (fault, time out)", records, lambda r: bool(r.error), 0.0, True),
     ]  # fmt: skip
 

@@ -178,7 +178,7 @@ def test_a_fault_is_an_answer_too(tmp_path: Path) -> None:
 
 
 def test_entry_runs_writes_and_resumes(program: Program, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["--family", "clean", "--count", "2", "--command", " ".join(program.command), "-j", "2"]
+    arguments = ["--family", "clean", "--count", "clean=2", "--command", " ".join(program.command), "-j", "2"]
     arguments += ["--records", str(tmp_path / "r.jsonl"), "--table", str(tmp_path / "accuracy.md")]
     assert entry.main(arguments) == 0
     first = (tmp_path / "r.jsonl").read_text()
