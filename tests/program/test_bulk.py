@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ncfix import fast
 from ncfix.program import bulk, number_text
 from ncfix.program.bulk import Stretch
 from ncfix.program.emit import Emission, closure_of_refusals, emit
@@ -50,23 +51,28 @@ def moved(moves: Moves, seed: int, size: float) -> Pieces:
     return Pieces(move, np.where(last, 1.0, 0.5), end, arc, moves.centre[move].copy(), kept[move])
 
 
-def both(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emission, Emission]:
-    """Written many at a time, and one by one."""
-    with mock.patch.object(bulk, "SHORTEST", 1):
-        fast = emit(program, moves, pieces, STEPS)
+def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emission, ...]:
+    """Written many at a time, the same compiled if that is installed, and one by one."""
+    found = []
+    for switch in (fast.disengage, fast.engage):
+        switch()
+        with mock.patch.object(bulk, "SHORTEST", 1):
+            found.append(emit(program, moves, pieces, STEPS))
+    fast.disengage()
     one_by_one = replace(language_of(program.dialect), bulk=None)
     with mock.patch("ncfix.program.emit.language_of", return_value=one_by_one):
-        return fast, emit(program, moves, pieces, STEPS)
+        return *found, emit(program, moves, pieces, STEPS)
 
 
 def assert_same(program: Program, moves: Moves, pieces: Pieces) -> None:
-    fast, slow = both(program, moves, pieces)
+    *many, slow = in_all_ways(program, moves, pieces)
     text = apply(program.source, slow.edits)
-    assert spliced(program.source, fast.splices).decode("latin-1") == text.decode("latin-1")
-    assert fast.conflicts == slow.conflicts
-    assert fast.added_blocks == slow.added_blocks
-    for name in ("start", "end", "centre"):
-        assert np.allclose(getattr(fast, name), getattr(slow, name), rtol=0, atol=1e-12, equal_nan=True), name
+    for each in many:
+        assert spliced(program.source, each.splices).decode("latin-1") == text.decode("latin-1")
+        assert each.conflicts == slow.conflicts
+        assert each.added_blocks == slow.added_blocks
+        for name in ("start", "end", "centre"):
+            assert np.allclose(getattr(each, name), getattr(slow, name), rtol=0, atol=1e-12, equal_nan=True), name
 
 
 NUMBERS = st.one_of(

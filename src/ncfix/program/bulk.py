@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import fast
+from ncfix.program.bulk_layouts import Layouts
 from ncfix.program.frames import FrameMap
-from ncfix.program.language import BulkLayout, Language
-from ncfix.program.layout import AXIS_LETTERS
+from ncfix.program.language import Language
 from ncfix.program.moves import Frame, Kind, Moves, Rule
 from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
-from ncfix.program.tree import START, Anchor, Program
+from ncfix.program.tree import Program
 from ncfix.program.writer import Splices
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +45,7 @@ class Bulk:
     moves: Moves
     pieces: Pieces
     first_piece: IntArray
-    layouts: dict[int, BulkLayout]
+    layouts: Layouts
     stop: IntArray
     reach: int = FIRST
     parts: list[Splices] = field(default_factory=list)
@@ -62,7 +63,7 @@ class Bulk:
     ) -> Bulk:
         """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
         first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
-        layouts = _layouts(language, program, moves)
+        layouts = Layouts.of(language, program, moves)
         fit = _qualified(program, moves, pieces, first_piece, layouts) & ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         breaks = np.ones(len(moves) + 1, dtype=np.bool_)
@@ -81,6 +82,8 @@ class Bulk:
 
         Returns the commands (k, n_axes) at the ends of the motions written.
         """
+        if fast.engaged():
+            return self._compiled(row, position, frame, decimals)
         stop = min(int(self.stop[row]), row + self.reach)
         if stop - row < SHORTEST:
             return None
@@ -93,6 +96,36 @@ class Bulk:
         self.parts.append(stretch.splices())
         return stretch.commands()
 
+    def _compiled(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+        """The same, compiled."""
+        from ncfix.program import writing_kernels
+
+        stop = int(self.stop[row])
+        if stop == row:
+            return None
+        program, blocks, layouts = self.program, self.moves.block[row:stop], self.layouts
+        ends = self.pieces.end[self.first_piece[row] : self.first_piece[stop]]
+        commands, start, end, length, data = writing_kernels.write(
+            np.frombuffer(program.source, dtype=np.uint8),
+            (program.blocks, blocks, program.first_number, program.template),
+            (program.numbers, program.number_spans),
+            (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
+            ends,
+            position,
+            (frame.frame.offset, frame.scale),
+            (decimals, _halves(decimals)),
+        )
+        if not len(commands):
+            return None
+        self.parts.append(Splices(start, end, length, data.tobytes()))
+        return np.asarray(commands)
+
+
+def _halves(decimals: IntArray) -> FloatArray:
+    """Half output steps."""
+    halves: FloatArray = 0.5 * 10.0 ** -decimals.astype(float)
+    return halves
+
 
 def _is_plain(frame: Frame) -> bool:
     """Whether each number in a frame stands for one axis, with a point or without."""
@@ -100,28 +133,15 @@ def _is_plain(frame: Frame) -> bool:
     return not (turned or frame.diameter) and frame.increments == (1.0, 1.0)
 
 
-def _layouts(language: Language, program: Program, moves: Moves) -> dict[int, BulkLayout]:
-    """The layouts of the shapes that occur and can be written in bulk."""
-    if language.bulk is None or not len(moves):
-        return {}
-    shapes, at = np.unique(program.template[moves.block], return_index=True)
-    found = {int(shape): language.bulk(program, int(moves.block[row])) for shape, row in zip(shapes, at, strict=True)}
-    return {shape: layout for shape, layout in found.items() if layout is not None}
-
-
-def _qualified(
-    program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: dict[int, BulkLayout]
-) -> Mask:
+def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
     """(n,) motions that may be written in bulk, as far as their own data say."""
     first = first_piece[:-1]
-    shapes = np.zeros(len(program.templates), dtype=np.bool_)
-    shapes[list(layouts)] = True
     turns = (moves.kind == Kind.FEED) & (moves.end == moves.start)[:, ~moves.rotary].all(axis=1)
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
     fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
     fit &= (np.diff(first_piece) == 1) & ~pieces.kept[first] & ~pieces.arc[first]
     fit &= np.isfinite(pieces.end[first]).all(axis=1)
-    fit &= shapes[program.template[moves.block]]
+    fit &= layouts.known[program.template[moves.block]]
     fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
     fit[1:] &= moves.block[1:] > moves.block[:-1]
     return fit
@@ -159,7 +179,7 @@ class Stretch:
         words = _words(bulk, row, stop)
         present = words >= 0
         wanted = frame.program(bulk.pieces.end[bulk.first_piece[row:stop]].copy())
-        half = 0.5 * 10.0 ** -decimals.astype(float)
+        half = _halves(decimals)
         original = np.where(present, program.numbers[np.maximum(words, 0)], 0.0)
         rewrite = present & (np.abs(wanted - original) >= half)
         styles = styles_of(np.frombuffer(program.source, dtype=np.uint8), program.number_spans[words[present]])
@@ -200,34 +220,14 @@ class Stretch:
 
     def _added(self) -> Splices:
         """The words that are missing, in the order in which programs write them."""
-        program, moves = self.bulk.program, self.bulk.moves
-        order = np.array(sorted(range(len(moves.axes)), key=lambda column: AXIS_LETTERS.index(moves.axes[column])))
-        rows, columns = np.nonzero(self.add[:, order])
-        columns = order[columns]
-        blocks = moves.block[self.row + rows].astype(np.int64)
+        program, layouts = self.bulk.program, self.bulk.layouts
+        rows, columns = np.nonzero(self.add[:, layouts.by_letter])
+        columns = layouts.by_letter[columns]
+        blocks = self.bulk.moves.block[self.row + rows].astype(np.int64)
         shapes = program.template[blocks]
-        at, heads = np.empty(len(rows), dtype=np.int64), np.empty((len(rows), 2), dtype=np.uint8)
-        for shape in np.unique(shapes).tolist():
-            layout, mine = self.bulk.layouts[shape], shapes == shape
-            at[mine] = _places(program, blocks[mine], layout.words_at)
-            heads[mine] = np.array([_head(layout, letter) for letter in moves.axes], dtype=np.uint8)[columns[mine]]
-        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads)
+        at = layouts.places(program, blocks)
+        texts = plain(self.wanted[rows, columns], self.decimals[columns], layouts.heads[shapes, columns])
         return Splices(at, at, texts.length, texts.data)
-
-
-def _head(layout: BulkLayout, letter: str) -> tuple[int, int]:
-    """What stands before the number of a new word: a blank, or nothing, and the letter."""
-    return ord(layout.blank) if layout.blank else 0, ord(letter.lower() if layout.lower else letter)
-
-
-def _places(program: Program, blocks: IntArray, anchor: Anchor) -> IntArray:
-    """The bytes that an anchor stands for in blocks of one shape."""
-    if anchor.slot < 0:
-        base = program.blocks[blocks, 0 if anchor.slot == START else 1]
-    else:
-        base = program.number_spans[program.first_number[blocks] + anchor.slot, 1]
-    places: IntArray = base + anchor.offset
-    return places
 
 
 def _missing(
@@ -243,23 +243,18 @@ def _missing(
     rows = np.arange(len(values))[:, None]
     last_word = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
     left_at = np.where(last_word >= 0, np.take_along_axis(values, np.maximum(last_word, 0), axis=0), start)
-    away = np.abs(wanted - left_at) >= half
+    away = ~(np.abs(wanted - left_at) < half)
     last_away = np.maximum.accumulate(np.where(away & ~present, rows, -1), axis=0)
     held = np.vstack((np.full(len(start), -1), last_away[:-1])) <= last_word
     before = np.where(held, left_at, np.vstack((start, values[:-1])))
-    add: Mask = ~present & (np.abs(wanted - before) >= half)
+    add: Mask = ~present & ~(np.abs(wanted - before) < half)
     clear |= ~present & held & ~away
     return add
 
 
 def _words(bulk: Bulk, row: int, stop: int) -> IntArray:
     """(k, n_axes) the number of each axis word, -1 where there is none."""
-    program, moves = bulk.program, bulk.moves
-    blocks = moves.block[row:stop]
-    shapes = program.template[blocks]
-    slots = np.full((len(program.templates), len(moves.axes)), -1, dtype=np.int64)
-    for shape in np.unique(shapes).tolist():
-        slots[shape] = [bulk.layouts[shape].slots.get(letter, -1) for letter in moves.axes]
-    found = slots[shapes]
-    words: IntArray = np.where(found >= 0, program.first_number[blocks][:, None] + found, -1)
+    blocks = bulk.moves.block[row:stop]
+    found = bulk.layouts.slots[bulk.program.template[blocks]]
+    words: IntArray = np.where(found >= 0, bulk.program.first_number[blocks][:, None] + found, -1)
     return words

@@ -1,0 +1,183 @@
+"""A stretch of corrected motions as text, compiled: one pass over its words, digits put where they belong.
+
+What `bulk.Stretch` does by columns, with the same operations on each number, so that the bytes are the same; a test
+holds the two together.
+"""
+
+# numba finds out the types.
+# mypy: disable-error-code="untyped-decorator"
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ncfix.program.number_text import LARGEST, MINUS, MOST_DECIMALS, PLUS, TIE, ZERO
+from ncfix.program.numbers import POINT
+
+Bytes = NDArray[np.uint8]
+Ints = NDArray[np.int64]
+Rows = NDArray[np.int32]
+Floats = NDArray[np.float64]
+
+POWERS = 10.0 ** np.arange(19)
+TENS = 10 ** np.arange(19)
+LONGEST = MOST_DECIMALS + 8
+"""Bytes of the longest number that is rewritten here."""
+ROOM = 32
+"""Bytes that a number takes at most, besides its decimals."""
+
+
+@njit(cache=True, nogil=True)
+def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, bool]:
+    """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that."""
+    first = start + (text[start] == PLUS or text[start] == MINUS)
+    point = -1
+    for place in range(first, stop):
+        character = text[place]
+        if character == POINT and point < 0:
+            point = place
+        elif character < ZERO or character > ZERO + 9:
+            return 0, False, False, 0, False
+    decimals = stop - point - 1 if point >= 0 else 0
+    clear = stop - start <= LONGEST and decimals <= MOST_DECIMALS
+    return decimals, point >= 0, text[start] == PLUS, stop - first - decimals - (point >= 0), clear
+
+
+@njit(cache=True, nogil=True)
+def steps_of(value: float, decimals: int) -> int:
+    """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
+    steps = abs(value) * POWERS[decimals]
+    if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE):
+        return -1
+    return np.int64(np.rint(steps))
+
+
+@njit(cache=True, nogil=True)
+def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, point: bool) -> int:
+    """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero."""
+    whole, fraction = steps // TENS[decimals], steps % TENS[decimals]
+    if sign:
+        data[at] = sign
+        at += 1
+    count = max(least, 0 if whole == 0 and least < 0 and decimals > 0 else 1)
+    while count < 18 and whole >= TENS[count]:
+        count += 1
+    for place in range(at + count - 1, at - 1, -1):
+        data[place] = ZERO + whole % 10
+        whole //= 10
+    at += count
+    if point or decimals > 0:
+        data[at] = POINT
+        at += 1
+    for place in range(at + decimals - 1, at - 1, -1):
+        data[place] = ZERO + fraction % 10
+        fraction //= 10
+    return at + decimals
+
+
+@njit(cache=True, nogil=True)
+def put_in_style(
+    data: Bytes, at: int, text: Bytes, start: int, stop: int, value: float, decimals: int
+) -> tuple[int, float]:
+    """Write a value in the style of the number at a span, as `NumberStyle.write`; -1 where that is not clear.
+
+    Returns where the next byte goes, and what a reader makes of the number.
+    """
+    own, point, plus, whole, clear = style_of(text, start, stop)
+    if not clear:
+        return -1, 0.0
+    most = max(own, decimals)
+    steps = steps_of(value, most)
+    if steps < 0:
+        return -1, 0.0
+    read = np.copysign(steps / POWERS[most], value) + 0.0
+    while most > own and steps % 10 == 0:
+        steps //= 10
+        most -= 1
+    sign = MINUS if value < 0 and steps != 0 else PLUS if plus else 0
+    padded = whole > 1 and text[stop - own - point - whole] == ZERO
+    least = whole if padded else -1 if whole == 0 else 1
+    return put(data, at, steps, most, sign, least, point), read
+
+
+@njit(cache=True, nogil=True)
+def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> tuple[int, float]:
+    """Write a missing word: what stands before its number, and the number with all decimals; -1 if not clear."""
+    steps = steps_of(value, decimals)
+    if steps < 0:
+        return -1, 0.0
+    for character in head:
+        if character:
+            data[at] = character
+            at += 1
+    sign = MINUS if np.signbit(value) else 0
+    return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
+
+
+@njit(cache=True, nogil=True)
+def write(
+    text: Bytes,
+    blocks: tuple[Ints, Rows, Ints, Rows],
+    numbers: tuple[Floats, Ints],
+    layouts: tuple[Ints, Ints, Ints, Ints, Bytes],
+    ends: Floats,
+    position: Floats,
+    frame: tuple[Floats, Floats],
+    digits: tuple[Ints, Floats],
+) -> tuple[Floats, Ints, Ints, Ints, Bytes]:
+    """Write motions up to the first one that is not clear.
+
+    blocks    of the program: their spans, which of them are written (k,), the first number and the shape of each
+    numbers   of the program: values and spans
+    layouts   slots, by_place, by_letter, anchors, heads of `Layouts`
+    ends      (k, axes) commands to be written; `position` (axes,) where the control stands before
+    frame     offset and scale (axes,): a command is `offset + scale * number`
+    digits    decimals that the least increment needs, and half output steps (axes,)
+
+    Returns the commands at the ends of the motions written, and what changes in the source, as in `Splices`.
+    """
+    (edges, rows, first, shapes), (values, spans), (offset, scale), (decimals, half) = blocks, numbers, frame, digits
+    slots, by_place, by_letter, anchors, heads = layouts
+    count, axes = ends.shape
+    most = count * axes
+    start, stop, length = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
+    data = np.empty(most * (ROOM + decimals.max()), np.uint8)
+    commands, here = np.empty((count, axes)), position.copy()
+    edits, size, done, clear = 0, 0, 0, True
+    while done < count:
+        block, before, was = rows[done], edits, size
+        shape, number = shapes[block], first[block]
+        for axis in by_place[shape]:
+            if axis < 0 or not clear:
+                break
+            word = number + slots[shape, axis]
+            value, wanted = values[word], (ends[done, axis] - offset[axis]) / scale[axis]
+            if abs(wanted - value) >= half[axis]:
+                begin, end = spans[word, 0], spans[word, 1]
+                at, value = put_in_style(data, size, text, begin, end, wanted, decimals[axis])
+                clear = at >= 0
+                start[edits], stop[edits], length[edits] = begin, end, at - size
+                edits, size = edits + 1, at
+            here[axis] = value * scale[axis] + offset[axis]
+        for axis in by_letter:
+            if slots[shape, axis] >= 0 or not clear:
+                continue
+            wanted = (ends[done, axis] - offset[axis]) / scale[axis]
+            if abs(wanted - (here[axis] - offset[axis]) / scale[axis]) < half[axis]:
+                continue
+            at, value = put_new(data, size, heads[shape, axis], wanted, decimals[axis])
+            clear = at >= 0
+            slot = anchors[shape, 0]
+            edge = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
+            start[edits], length[edits] = edge + anchors[shape, 1], at - size
+            stop[edits] = start[edits]
+            edits, size = edits + 1, at
+            here[axis] = value * scale[axis] + offset[axis]
+        if not clear:
+            edits, size = before, was
+            break
+        commands[done] = here
+        done += 1
+    return commands[:done], start[:edits].copy(), stop[:edits].copy(), length[:edits].copy(), data[:size].copy()
