@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     import click
 
     from ncfix.machine.basis import Basis
+    from ncfix.measure.measurement import Measurement
     from ncfix.program.dialect import Dialect
+    from ncfix.report.document import Document
     from ncfix.tables.control import Control
 
 GROUP = "ncfix"
@@ -55,8 +57,8 @@ def register_effects(register: Register[Any]) -> None:
 
 
 @hookspec
-def register_readers(register: Register[Any]) -> None:
-    """Readers of measurement files: from an instrument's own format to rows of observations."""
+def register_readers(register: Register[Callable[[str, str], Measurement | None]]) -> None:
+    """Readers of instruments' own files: `reader(text, path)` is the measurement in them, None if it knows them not."""
 
 
 @hookspec
@@ -65,8 +67,8 @@ def register_controls(register: Register[Callable[[], Control]]) -> None:
 
 
 @hookspec
-def register_reporters(register: Register[Any]) -> None:
-    """Forms of a report, by file suffix."""
+def register_reporters(register: Register[Callable[[Document], bytes]]) -> None:
+    """Forms of a report: `form(document)` is the content of a file; register it with the file's suffix as its name."""
 
 
 @hookspec

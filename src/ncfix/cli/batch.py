@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import click
-
 from ncfix.batch.journal import Journal, Record, digest_of
 from ncfix.batch.work import Staff, each
 from ncfix.cli import console
@@ -49,7 +47,8 @@ class Batch:
                 yield self.job.outcome(target, jobs)
             return
         for outcome, said in each(self.job.heard, rest, make, jobs, _lost):
-            click.echo(said, err=True, nl=False)
+            for line in said:
+                console.say(line)
             yield outcome
 
     def _holds(self, target: Target, record: Record | None) -> bool:
@@ -67,8 +66,8 @@ def _kept(target: Target, record: Record) -> Outcome:
     return Outcome(ExitCode.DONE, {**record.entry, "resumed": True}, record.called)
 
 
-def _lost(target: Target) -> tuple[Outcome, str]:
+def _lost(target: Target) -> tuple[Outcome, list[str]]:
     """What to say of a program over which two processes died: too large for the memory, or a fault in compiled code."""
     text = "the process that worked on it was killed, and so was another one"
     error = FaultError.of("NCF017", text, Place(shown(target.source)), "fix it alone, where there is more memory")
-    return Outcome.failed(target, error), "".join(f"{message}\n" for message in error.messages)
+    return Outcome.failed(target, error), [str(message) for message in error.messages]

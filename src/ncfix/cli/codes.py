@@ -84,4 +84,14 @@ CODES = {
         "memory ran out), and so was the one that tried again. The other programs are not concerned.",
         "Fix the program alone, with `--jobs 1`, on a computer with more memory.",
     ),
+    "NCF018": Code(
+        "a report of another form",
+        "The suffix of the file says what form a report has. There are HTML and Markdown, and what plugins bring.",
+        "Write it to FILE.html or FILE.md.",
+    ),
+    "NCF019": Code(
+        "not a result",
+        "A report is made of machine files (TOML) and of what verbs print with `--json`: one object with a `schema`.",
+        "Keep what the verb prints: `ncfix fix ... --json > result.json`.",
+    ),
 }

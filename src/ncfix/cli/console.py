@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from dataclasses import replace
 from threading import Timer
 from typing import Any
@@ -32,9 +33,27 @@ class ReaderGoneError(Exception):
     """Whoever read standard output has closed it."""
 
 
+_kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
+
+
 def say(text: str) -> None:
     """A line for people, on standard error."""
-    click.echo(text, err=True, color=colour())
+    kept = _kept.get()
+    if kept is None:
+        click.echo(text, err=True, color=colour())
+    else:
+        kept.append(text)
+
+
+@contextmanager
+def keeping() -> Iterator[list[str]]:
+    """Keep what is said, instead of saying it, in this thread; `say` may say it elsewhere."""
+    lines: list[str] = []
+    token = _kept.set(lines)
+    try:
+        yield lines
+    finally:
+        _kept.reset(token)
 
 
 def tell(*messages: Message) -> None:
@@ -118,7 +137,7 @@ def _drawn(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 @contextmanager
 def busy(what: str) -> Iterator[None]:
     """Show what is going on while it lasts, on a terminal, if it lasts."""
-    if not sys.stderr.isatty():
+    if _kept.get() is not None or not sys.stderr.isatty():
         yield
         return
     from rich.console import Console

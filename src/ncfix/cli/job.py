@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 from ncfix import __version__, fast
@@ -54,16 +53,16 @@ class Job:
         options = (__version__, self.machine.hash, self.setup, self.dialect, self.options, digest_of(target.source))
         return text_digest(repr(options).encode())
 
-    def heard(self, target: Target) -> tuple[Outcome, str]:
+    def heard(self, target: Target) -> tuple[Outcome, list[str]]:
         """Fix one program elsewhere: what came of it, and what there is to say; a fault ends this one only."""
-        with redirect_stderr(StringIO()) as said:
+        with console.keeping() as said:
             try:
                 outcome = self.outcome(target)
             except Exception as error:
                 own = fault(error)
                 console.tell(*own.messages)
                 outcome = Outcome.failed(target, own)
-        return outcome, said.getvalue()
+        return outcome, said
 
     def outcome(self, target: Target, jobs: int = 1) -> Outcome:
         """Fix one program and say what came of it; an error ends this program only."""

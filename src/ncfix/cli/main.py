@@ -28,6 +28,7 @@ VERBS = (
     "diagnose",
     "export",
     "emulate",
+    "report",
     "derive",
     "machine",
     "effects",

@@ -39,14 +39,15 @@ def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array
 
 def _grid(machine: Machine, axes: list[int]) -> Array:
     """Positions over the travel of these axes, the others at zero, shape (n, n_axes)."""
-    columns = [_travel(machine, axis) for axis in axes]
+    columns = [travel(machine, axis) for axis in axes]
     places = np.stack([each.ravel() for each in np.meshgrid(*columns)], axis=-1) if columns else np.empty((1, 0))
     q = np.zeros((len(places), len(machine.axes)))
     q[:, axes] = places
     return q
 
 
-def _travel(machine: Machine, axis: int) -> Array:
+def travel(machine: Machine, axis: int) -> Array:
+    """(n,) positions of an axis over its travel, with its kinks, mm or rad; NaN if it has no end."""
     low, high = (0.0, 2 * np.pi) if machine.axes[axis].endless else machine.ranges[axis]
     kinks = machine.breakpoints(machine.axis_names[axis])
     inside = kinks[(kinks >= low) & (kinks <= high)]

@@ -1,8 +1,8 @@
 """Files of instruments and controls that hold error motions: Renishaw `.rtl`, ISG VOLCOMP CSV, Etalon exchange.
 
-Each becomes a measurement of kind `axis`. They are recognised by what they look like, not by their names. Values of
-`.rtl` are taken as micrometres of positioning of the axis that the file names; those of the others are mm and rad, and
-already relative to their zero, so nothing of a set-up is unknown.
+Each becomes a measurement of kind `axis`; plugins add readers of other files, of any kind. Files are recognised by
+what they look like, not by their names. Values of `.rtl` are taken as micrometres of positioning of the axis that the
+file names; those of the others are mm and rad, and already relative to their zero, so nothing of a set-up is unknown.
 """
 
 from __future__ import annotations
@@ -17,10 +17,14 @@ from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.measure import checks
 from ncfix.measure.measurement import Measurement
+from ncfix.plugins import registry
 
 GRID = re.compile(r"\[(\w+)\]")
 ERROR = re.compile(r"E[XYZABC][A-Z]")
 MICROMETRE = 1e-3
+
+Reader = Callable[[str, str], Measurement | None]
+"""Makes a measurement of a text and its path, or None if the text is not of its kind."""
 
 
 @dataclass
@@ -60,7 +64,14 @@ class Rows:
 def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
     """The measurement in an instrument's file, or None; raises `ConfigError` NCF609 ... NCF618."""
     reader = _reader(text)
-    return None if reader is None else checks.checked(reader(text, path), machine)
+    found = reader(text, path) if reader is not None else _by_plugin(text, path)
+    return None if found is None else checks.checked(found, machine)
+
+
+def _by_plugin(text: str, path: str) -> Measurement | None:
+    """What the first reader of a plugin makes of it that knows it."""
+    readers: dict[str, Reader] = registry("readers")
+    return next((found for read in readers.values() if (found := read(text, path)) is not None), None)
 
 
 def _reader(text: str) -> Callable[[str, str], Measurement] | None:

@@ -1,0 +1,62 @@
+"""`ncfix report`: machines and results as a page to be read, printed or filed."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ncfix.cli import console
+from ncfix.cli.options import force_option
+from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.diagnostics import Place, SourceError
+
+if TYPE_CHECKING:
+    from ncfix.report.document import Section
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, metavar="MACHINE|RESULT...")
+@click.option("-o", "--output", metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
+@force_option
+def report(sources: tuple[str, ...], output: str, force: bool) -> None:
+    """Put machine files, and what other verbs printed with --json, on one page.
+
+    Of a machine: its chain, its errors with their curves and uncertainty, and how far they lead the tool tip. Of a
+    result: its tables.
+    """
+    from ncfix.report.document import Document
+    from ncfix.report.forms import form_of
+
+    target = targets([STREAM], Outputs(output, force=force), sources)[0]
+    form = form_of(output)
+    with console.busy("writing the report"):
+        found = [section for source in sources for section in _sections(source)]
+        title = found[0].heading if len(sources) == 1 else f"{len(sources)} machines and results"
+        target.write(form(Document(title, found)))
+
+
+def _sections(path: str) -> list[Section]:
+    """What one file has to say: a machine if it is TOML, a result if it is JSON."""
+    text = read(path)
+    if text.lstrip().startswith(b"{"):
+        from ncfix.report.result import sections as of_result
+
+        return of_result(_result(text, path), shown(path))
+    from ncfix.machine import loads
+    from ncfix.report.machine import sections as of_machine
+
+    return of_machine(loads(text.decode("utf-8", "replace"), shown(path)), shown(path))
+
+
+def _result(text: bytes, path: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except ValueError as error:
+        hint = "give what a verb printed with --json, or a machine file"
+        raise SourceError.of("NCF019", f"is not a result: {error}", Place(shown(path)), hint) from error
+    if not isinstance(found, dict) or found.get("schema") != console.SCHEMA:
+        problem = f'is JSON, but no result: it has no "schema": {console.SCHEMA}'
+        raise SourceError.of("NCF019", problem, Place(shown(path)), "give what a verb printed with --json")
+    return found

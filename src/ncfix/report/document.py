@@ -1,0 +1,65 @@
+"""What a report says, whatever it looks like: sections of text, tables and plots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ncfix.machine.se3 import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph."""
+
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of cells under a header; a header of no names has none."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A curve of a plot.
+
+    x, y    (n,)
+    spread  (n,) half the width of the band around it; None: no band
+    label   what it is, empty if there is only one
+    """
+
+    x: Array
+    y: Array
+    spread: Array | None = None
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """Curves over one axis; the caption says what is up and what is across, with the units."""
+
+    caption: str
+    lines: Sequence[Line]
+
+
+Part = Text | Table | Plot
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A heading and what belongs to it."""
+
+    heading: str
+    parts: Sequence[Part]
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A report."""
+
+    title: str
+    sections: Sequence[Section]

@@ -1,0 +1,69 @@
+"""`ncfix report`: machines and results on a page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from ncfix.diagnostics import ExitCode
+
+from .conftest import Ncfix, Shop
+
+
+def test_every_shipped_machine_has_a_page(ncfix: Ncfix, examples: Path, tmp_path: Path) -> None:
+    machines = sorted((examples / "machines").glob("*.toml"))
+    assert ncfix("report", *machines, "-o", tmp_path / "machines.html").code == ExitCode.DONE
+    page = (tmp_path / "machines.html").read_text()
+    assert page.count("Error of the tool tip") == len(machines)
+    assert "NaN" not in page
+    assert "nan" not in page
+
+
+def test_a_perfect_machine_has_one_too(ncfix: Ncfix, shop: Shop) -> None:
+    assert ncfix("report", shop.perfect, "-o", shop.folder / "page.md").code == ExitCode.DONE
+    assert "None: a perfect machine." in (shop.folder / "page.md").read_text()
+
+
+def results(ncfix: Ncfix, shop: Shop) -> dict[str, bytes]:
+    """What verbs print with --json."""
+    on, fixed, tables = ("-m", shop.machine), shop.folder / "fixed.ngc", shop.folder / "tables"
+    fix = ncfix("fix", shop.program, *on, "--assume-zero", "-o", fixed, "--json").out
+    return {
+        "Programs": fix,
+        "Verification": ncfix("verify", shop.program, fixed, *on, "--assume-zero", "--json").out,
+        "Simulation": ncfix("simulate", *on, "--program", shop.program, "--assume-zero", "--json").out,
+        "Compensation tables": ncfix("export", "linuxcnc", *on, "-o", tables, "--json").out,
+    }
+
+
+def test_results_of_verbs_become_tables(ncfix: Ncfix, shop: Shop) -> None:
+    found = results(ncfix, shop)
+    paths = []
+    for number, text in enumerate(found.values()):
+        paths.append(shop.folder / f"result{number}.json")
+        paths[-1].write_bytes(text)
+    page = shop.folder / "page.md"
+    assert ncfix("report", *paths, shop.machine, "-o", page).code == ExitCode.DONE
+    text = page.read_text()
+    assert all(f"## {heading}: " in text for heading in found)
+    entry = json.loads(found["Programs"])["files"][0]
+    assert f"{entry['error_before_um']['max']:.2f} ({entry['error_before_um']['rms']:.2f})" in text
+    assert "NCF206" in text or "assumed" in text or "zero" in text
+
+
+@pytest.mark.parametrize("text", ['{"a": 1}', "{nothing", '{"schema": 7}'])
+def test_what_is_no_result_is_refused(ncfix: Ncfix, shop: Shop, text: str) -> None:
+    path = shop.folder / "result.json"
+    path.write_text(text)
+    result = ncfix("report", path, "-o", shop.folder / "page.html")
+    assert result.code == ExitCode.UNREADABLE
+    assert "NCF019" in result.err
+    assert not (shop.folder / "page.html").exists()
+
+
+def test_a_page_is_not_written_over_what_it_shows(ncfix: Ncfix, shop: Shop) -> None:
+    result = ncfix("report", shop.machine, "-o", shop.machine, "--force")
+    assert result.code == ExitCode.USAGE
+    assert "NCF005" in result.err or "NCF018" in result.err

@@ -1,0 +1,83 @@
+"""What a report looks like: pages that stand alone, and text that means nothing but itself."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import UsageError
+from ncfix.report import html, markdown
+from ncfix.report.document import Document, Line, Plot, Section, Table, Text
+from ncfix.report.forms import form_of
+
+X = np.linspace(-10.0, 10.0, 5)
+NASTY = "<script>alert('a|b')</script> & \"EXX\""
+DOCUMENT = Document(
+    NASTY,
+    [
+        Section("Errors", [Text(NASTY), Table(("name", NASTY), [("EXX", "1"), (NASTY, "2")]), Table((), [("a", "b")])]),
+        Section("Curves", [Plot("um over X", [Line(X, X**2, 0.5 * abs(X), "up"), Line(X, -(X**2), label="down")])]),
+        Section("Flat", [Plot("um over Y", [Line(X, 0 * X)])]),
+    ],
+)
+
+
+class Balanced(HTMLParser):
+    """Notes tags that are not closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.wrong: list[str] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.add(tag)
+        if tag not in ("meta",):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+
+def test_a_page_is_well_formed_and_stands_alone() -> None:
+    text = html.rendered(DOCUMENT).decode()
+    page = Balanced()
+    page.feed(text)
+    assert (page.open, page.wrong) == ([], [])
+    assert "script" not in page.seen
+    assert {"table", "svg", "polyline", "polygon", "figure"} <= page.seen
+    assert not re.search(r"(src|href)=", text)
+
+
+def test_a_plot_holds_its_curves_their_bands_and_zero() -> None:
+    frame = html.Frame.around([Line(X, X + 20.0, np.full(5, 3.0))])
+    assert frame.across == (-10.0, 10.0)
+    assert frame.up == (0.0, 33.0)
+    places = [tuple(map(float, each.split(","))) for each in frame.points(X, X + 20.0).split()]
+    assert all(0 <= a <= html.WIDTH and 0 <= b <= html.HEIGHT for a, b in places)
+    assert [b for _, b in places] == sorted((b for _, b in places), reverse=True)
+
+
+def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
+    text = markdown.rendered(DOCUMENT).decode()
+    for row in re.findall(r"^\|.*\|$", text, re.MULTILINE):
+        assert len(re.findall(r"(?<!\\)\|", row)) == 3
+    assert "<script>" not in text
+    assert "up +0 to +100; down -100 to -0" in text
+
+
+def test_the_suffix_says_the_form() -> None:
+    assert form_of("a/b.html") is html.rendered
+    assert form_of("page") is html.rendered
+    assert form_of("PAGE.MD") is markdown.rendered
+    with pytest.raises(UsageError) as caught:
+        form_of("page.docx")
+    assert caught.value.code == "NCF018"
