@@ -21,6 +21,8 @@ SAME = 1e-6
 STRAY = 1.0
 """mm and rad; more than earlier corrections can shift a motion that is kept (or `STRAYS` times the largest of them)."""
 STRAYS = 10.0
+TURN = 1.0
+"""rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
 ATTEMPTS = 4
 """A second attempt knows the frames that moved with the first; the others are for frames that depend on frames."""
 
@@ -92,7 +94,16 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
     differs[arcs[_differs(off, np.zeros_like(off))]] = True
+    differs[arcs] |= np.abs(again.sweep[arcs] - _sweeps(settled)[rows[arcs]]) > TURN
     return differs
+
+
+def _sweeps(settled: Settled) -> Array:
+    """(m,) about how far each piece of an arc turns, rad: its share of what its motion does."""
+    pieces = settled.plan.pieces
+    before = np.where(np.diff(pieces.move, prepend=-1) == 0, np.append(0.0, pieces.fraction[:-1]), 0.0)
+    sweep: Array = settled.moves.sweep[pieces.move] * (pieces.fraction - before)
+    return sweep
 
 
 def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:

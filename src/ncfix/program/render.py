@@ -24,6 +24,11 @@ LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be stated anew: G0 to G3."""
 
+CLOSED, EXACT = 1e-6, 1e-9
+"""Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
+NEAR = 3.0
+"""Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
+
 
 class BlockRenderer:
     """Renders one motion of one block. A short-lived worker: `render()` is called once."""
@@ -62,9 +67,12 @@ class BlockRenderer:
     def _first_piece(self, position: FloatArray, end: FloatArray) -> FloatArray:
         self._motion_code()
         base = position.copy()
+        closed = self._closed(position, end)
         for column, letter in self.columns:
             word = self.layout.axes.get(letter)
-            if word is None:
+            if closed[column]:
+                self._stay(position, column, word)
+            elif word is None:
                 self._absent_axis(position, column, end[column])
             else:
                 self._present_axis(position, column, end[column], word)
@@ -91,6 +99,31 @@ class BlockRenderer:
         text = f"{end - base:.{self.target.decimals[column]}f}"
         self._add(self.target.letters[column], text)
         position[column] = base + float(text)
+
+    def _closed(self, position: FloatArray, end: FloatArray) -> NDArray[np.bool_]:
+        """The axes of the plane of a full circle: it has to end where it starts to the last digit.
+
+        An output step beside it, a control would make an arc of a thousandth of a degree of it.
+        """
+        target, closed = self.target, np.zeros(len(position), dtype=bool)
+        plane = [target.spatial[index] for index in target.plane[:2]]
+        if target.arc and len(target.ends) == 1 and -1 not in plane:
+            chord = (self._xyz(target.nominal) - target.origin)[list(target.plane[:2])]
+            near = np.abs(end - position)[plane] < NEAR * self.half[plane]
+            closed[plane] = bool((np.abs(chord) < CLOSED).all() and near.all())
+        return closed
+
+    def _stay(self, position: FloatArray, column: int, word: Word | None) -> None:
+        """An axis that ends where it starts; a word that cannot say so to the last digit is left out."""
+        if word is None:
+            return
+        start = float(position[column])
+        self._present_axis(position, column, start, word)
+        if abs(position[column] - start) > EXACT:
+            first, last = self.program.span(self.block, word.span)
+            self.out.edits = [edit for edit in self.out.edits if not first <= edit[0] < last]
+            self._remove(word)
+            position[column] = start
 
     def _motion_code(self) -> None:
         wanted, word = self.target.code, self.layout.motion

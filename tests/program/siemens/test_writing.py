@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import random
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from classes.judging import SETUP, machine
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import traced
 from ncfix.machine import load
+from ncfix.program.moves import Kind, Moves
 from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.program.setup import Setup, Tool
 
 
 def written(body: str) -> str:
@@ -70,3 +74,36 @@ def test_a_turn_past_zero_is_not_split(turn: str) -> None:
     assert "C=IC(" in after[1]
     (step,) = re.findall(r"C=IC\(([\d.]+)\)", text)
     assert 0 < float(step) <= 90
+
+
+def on_the_cradle(body: str) -> tuple[str, Moves]:
+    """A corrected program, the direction of the tool included, and its motions."""
+    source = f"T1 D1 M6\nG54\nTRAORI\nORIAXES\n{body}\nM30\n".encode()
+    cradle, setup = load(CRADLE), Setup(tools={1: Tool(80.0)}, assume_zero=True)
+    options = FixOptions(strategy="full", verify=False)
+    fixed = fix_program(read(source, "part.mpf", "siemens"), cradle, setup, options)
+    assert not fixed.report.refused
+    again = read(fixed.text, "part.mpf", "siemens")
+    return fixed.text.decode(), traced(again, cradle, setup).moves
+
+
+def test_a_full_circle_ends_where_it_starts() -> None:
+    """An output step beside its start it would be next to nothing; in a turned frame no number says where that is."""
+    chance = random.Random(3)
+    lines = []
+    for code in (2, 3, 2, 2, 3, 3, 2, 3):
+        x, y, turn, i, j = (
+            round(chance.uniform(*limits), 2) for limits in (*[(-20, 20)] * 2, (-60, 60), *[(2, 5)] * 2)
+        )
+        words = f"X{x} Y{y}" if code == 2 else ""
+        lines += [f"ROT RPL={turn}", f"G0 X{x} Y{y} Z20 A{x} C{y}", f"G{code} {words} I{i} J{j} F500"]
+    _, moves = on_the_cradle("\n".join(lines))
+    turns = moves.sweep[moves.kind == Kind.ARC]
+    assert np.allclose(np.abs(turns), 2 * np.pi, atol=1e-9)
+    assert len(turns) == 8
+
+
+def test_a_turn_that_hardly_turns_does_not_go_the_other_way_round() -> None:
+    text, moves = on_the_cradle("G0 X0 Y0 Z40 A20 C30\nG1 X20 C=ACN(30) F100\nX-5 C=ACP(30)\nX7 C=DC(30)")
+    assert "C=IC(" in text
+    assert np.abs(np.degrees(moves.end[:, moves.axes.index("C")]) - 30).max() < 0.01

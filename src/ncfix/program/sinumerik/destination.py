@@ -16,6 +16,8 @@ RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
 TURN = 2 * math.pi
+STILL = 1e-9
+"""rad; an axis that is nearer to where it shall be stands there already."""
 
 
 @dataclass(slots=True)
@@ -109,10 +111,10 @@ def turned(form: str, here: float, angle: float, *, known: bool) -> float:
     """The angle at which a rotary axis arrives: on the shortest way, or in the positive or negative sense, rad."""
     if not known:
         return angle
-    step = (angle - here) % TURN
+    step = (angle - here + STILL) % TURN - STILL
     if form == "dc":
-        return here + (step if step <= math.pi else step - TURN)
-    return here + step if form == "acp" or step == 0.0 else here + step - TURN
+        return here + (step if step <= math.pi + STILL else step - TURN)
+    return here + step if form == "acp" or step <= STILL else here + step - TURN
 
 
 def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:

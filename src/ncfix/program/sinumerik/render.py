@@ -13,6 +13,7 @@ from ncfix.program.number_style import NumberStyle
 from ncfix.program.pointing import Pointing
 from ncfix.program.render import BlockRenderer
 from ncfix.program.sinumerik.circles import VIA, circle_through
+from ncfix.program.sinumerik.destination import turned
 from ncfix.program.sinumerik.layout import SinumerikLayout
 from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
@@ -69,20 +70,34 @@ class SinumerikRenderer(BlockRenderer):
         form = self._form(word)
         if not form:
             super()._present_axis(position, column, end, word)
-            return
-        base = position[column] if form == INCREMENTAL else 0.0
-        value = end - base
-        turns = 0.0
-        if form not in (ABSOLUTE, INCREMENTAL):
-            turns = np.floor(value / 360.0 + 1e-12) * 360.0
-        written = self._value(word, np.nan)
+        elif form in (ABSOLUTE, INCREMENTAL):
+            self._formed(position, column, end, word, 0.0)
+        else:
+            start = float(position[column])
+            self._formed(position, column, end, word, float(np.floor(end / 360.0 + 1e-12)) * 360.0)
+            if abs(arrival(form, start, float(position[column])) - position[column]) > 180.0:
+                position[column] = self._by_increment(start, column, end, word)
+
+    def _formed(self, position: FloatArray, column: int, end: float, word: Word, turns: float) -> None:
+        """A word that says how it is meant; `turns`, in degrees, are not written."""
+        incremental = self._form(word) == INCREMENTAL
+        base = position[column] if incremental else turns
+        value, written = end - base, self._value(word, np.nan)
         whole = len(self.target.ends) == 1
-        same = np.isfinite(written) and abs(value - turns - written) < self.half[column]
-        unchanged = abs(end - self.target.nominal[column]) < self.half[column] and form != INCREMENTAL
+        same = np.isfinite(written) and abs(value - written) < self.half[column]
+        unchanged = abs(end - self.target.nominal[column]) < self.half[column] and not incremental
         if whole and (same or (unchanged and not np.isfinite(written))):
-            position[column] = base + (written + turns if np.isfinite(written) else value)
+            position[column] = base + (written if np.isfinite(written) else value)
             return
-        position[column] = base + turns + self._rewrite(word, value - turns, int(self.target.decimals[column]))
+        position[column] = base + self._rewrite(word, value, int(self.target.decimals[column]))
+
+    def _by_increment(self, start: float, column: int, end: float, word: Word) -> float:
+        """Where a rotary axis stands after IC instead of DC, ACP or ACN, which would lead it the other way round."""
+        first, last = self.program.span(self.block, word.value_span)
+        self.out.edits = [edit for edit in self.out.edits if not first <= edit[0] < last]
+        text = f"{end - start:.{self.target.decimals[column]}f}"
+        self.out.edits.append((first, last, f"{self._cased(INCREMENTAL.upper())}({text})"))
+        return start + float(text)
 
     def _has_words(self, column: int) -> bool:
         """With a vector for the direction of the tool, rotary axes have no words of their own."""
@@ -244,3 +259,8 @@ class SinumerikRenderer(BlockRenderer):
     def _is_incremental(self, word: Word) -> bool:
         form = self._form(word)
         return form == INCREMENTAL or (not form and self.target.incremental)
+
+
+def arrival(form: str, start: float, angle: float) -> float:
+    """Where DC, ACP or ACN lead a rotary axis, degrees."""
+    return math.degrees(turned(form, math.radians(start), math.radians(angle), known=math.isfinite(start)))

@@ -354,8 +354,13 @@ class Sinumerik(Control):
         return None if tool is None else tool.length
 
     def tool_length(self) -> tuple[int, float]:
-        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown.
+
+        With D0 a transformation leads the point where a tool of no length has its tip.
+        """
         if self.tools.offset is not None:
             return self.tools.offset, self.offsets.tool[2]
+        if self.tcp:
+            return self.tools.spindle, 0.0
         known = self.given_length(self.tools.spindle)
         return self.tools.spindle, math.nan if known is None else known
