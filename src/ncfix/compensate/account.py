@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnostics import Message
+from ncfix.diagnostics import Message, Place
 from ncfix.program.moves import Kind, Moves, Rule
+
+CLEARLY = 1.5
+"""What is left is said to be beyond the tolerance from that many times on: below, it may be the control's digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,3 +111,14 @@ class FixReport:
             "refused": [refusal.as_dict() for refusal in self.refused],
             "warnings": [warning.as_dict() for warning in self.warnings],
         }
+
+
+def with_what_is_left(report: FixReport, tolerance_um: float) -> FixReport:
+    """The report with a warning (NCF416) if more is left at the tool tip than the tolerance allows."""
+    left, line = report.error_after_um.get("max"), report.error_after_um.get("where")
+    if left is None or left <= CLEARLY * tolerance_um:
+        return report
+    text = f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um"
+    hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
+    warning = Message("NCF416", text, Place(report.path, int(line or 0)), hint)
+    return replace(report, warnings=(*report.warnings, warning))

@@ -92,6 +92,14 @@ CODES = {
         "straight pieces may not be put in its place here (cutter radius compensation).",
         "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
     ),
+    "NCF416": Code(
+        "more is left than the tolerance",
+        "The program was corrected, and the simulation of the result shows a place where the tool tip is farther off "
+        "than `--tolerance-um`. Where motions are passed by rule or refused, those beside them begin or end on them; "
+        "depths and retract planes of some cycles stay as they are.",
+        "`ncfix verify` looks along the whole path and says where; a larger tolerance makes the warning go away, not "
+        "the error.",
+    ),
     "NCF420": Code(
         "the corrected program does not follow the original",
         "The motions of the two programs cannot be put side by side: somewhere the second does not come to where the "

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import __version__
-from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.options import FixOptions
@@ -155,7 +155,7 @@ def _report(
         for finding in settled.plan.findings
         for message in finding.messages(lambda row: program.place(int(moves.block[row])))
     ]
-    return FixReport(
+    report = FixReport(
         path=program.path,
         blocks=len(program),
         moves=len(moves),
@@ -171,6 +171,7 @@ def _report(
         strategy=options.strategy,
         leaves=leaves,
     )
+    return with_what_is_left(report, options.tolerance_um)
 
 
 def refusals(program: Program, account: Account) -> list[Refusal]:

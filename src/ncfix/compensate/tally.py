@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.compensate.account import Account, FixReport, Refusal
+from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.findings import MOST, Finding, Mask
 from ncfix.compensate.fix import largest_correction, refusals
 from ncfix.compensate.options import FixOptions
@@ -118,7 +118,7 @@ class Tally:
         """The report; `messages` are those of following the program."""
         figures = options.verify
         after = self.after.as_dict(self.way) | {"where": self.after.line}
-        return FixReport(
+        report = FixReport(
             path=path,
             blocks=self.blocks,
             moves=self.moves,
@@ -134,3 +134,4 @@ class Tally:
             strategy=options.strategy,
             leaves=leaves,
         )
+        return with_what_is_left(report, options.tolerance_um)
