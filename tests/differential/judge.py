@@ -187,7 +187,8 @@ class _Judge:
 
     def ends(self, segments: Segments) -> None:
         """Half a step at the ends of lines, tolerance plus half a step at those of arcs, in the program's axes."""
-        done = np.flatnonzero(segments.fate == Fate.COMPENSATED)
+        said = np.isin(self.original.line, list(self.terms.refused))
+        done = np.flatnonzero((segments.fate == Fate.COMPENSATED) & ~said)
         last = segments.last[done]
         off = np.abs(_turn_back(self.seen[last] - self.original.end[done], self.original.rotation[done]))
         half = self.halves(done, last)

@@ -91,6 +91,18 @@ TRACE_CODES: dict[str, Code] = {
         "that are given here.",
         "Give the variables that the program checks, as variables in the setup file.",
     ),
+    "NCF217": Code(
+        "Tool length without a number",
+        "G43 stands in a block without H, and the program has named no H before. Controls take the H that was last in "
+        "force, which cannot be seen in the program; ncfix takes the tool in the spindle.",
+        "State H in the block of G43.",
+    ),
+    "NCF218": Code(
+        "Tool-centre-point control switched on with the axes turned",
+        "G43.4 is switched on while a rotary axis is not at zero. Whether X Y Z then ride on the workpiece as it lies "
+        "with all rotary axes at zero, or as it lies at that moment, is set on the control; ncfix takes the first.",
+        "Switch G43.4 on with the rotary axes at zero, or make sure of the parameters (19696 WKP, 19754 RPS).",
+    ),
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",

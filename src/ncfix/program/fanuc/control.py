@@ -19,6 +19,8 @@ class MacroControl(Control):
     """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
     polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
+    length_number  the last H; None if the program has named none
     """
 
     def __init__(
@@ -32,6 +34,8 @@ class MacroControl(Control):
         super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
+        self.length_code = 0
+        self.length_number: int | None = None
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

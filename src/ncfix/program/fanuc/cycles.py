@@ -10,7 +10,12 @@ from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS
 from ncfix.program.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.systems import check_system
+from ncfix.program.rs274.systems import check_system, words_of
+
+BACK_BORING = 870
+"""G87 goes in to R, below, and cuts upwards to its depth."""
+
+AFTER_NONE = "where the axis {} stands after a cycle without a hole (K0, L0) differs from control to control"
 
 
 def cycle(control: Control, block: Block, code: int) -> None:
@@ -23,11 +28,14 @@ def cycle(control: Control, block: Block, code: int) -> None:
     initial = program[across] if modal.cycle.initial is None else modal.cycle.initial
     take_levels(control, block, initial)
     modal.cycle.initial, modal.cycle.level, modal.motion = initial, modal.cycle.r, code
-    if modal.cycle.r < modal.cycle.depth:
+    if modal.cycle.r < modal.cycle.depth and code != BACK_BORING:
         levels = f"{modal.cycle.r:g} and {modal.cycle.depth:g} mm"
         raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({levels})")
     clear = modal.cycle.r if modal.retract_to_r else max(initial, modal.cycle.r)
-    for _ in range(repeats(control, block)):
+    count = repeats(control, block)
+    if count == 0:
+        control.lose([index for index in words_of(block) if index != across], AFTER_NONE)
+    for _ in range(count):
         place_hole(control, block, program)
         drill(control, block, code, program, modal.cycle.depth, clear)
 

@@ -6,7 +6,6 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 from __future__ import annotations
 
 from ncfix.program.moves import Kind
-from ncfix.program.rs274 import lengths
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
@@ -22,8 +21,6 @@ from ncfix.program.rs274.systems import (
 
 WORK_OFFSETS = 6
 FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
-LENGTH_ALONE = "NCF214"
-ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
 AFTER_ENGRAVING = "where the axis {} stands after engraving (G47) is not followed"
 LENGTHS = (10,)
 UNFOLLOWED = {
@@ -33,18 +30,6 @@ UNFOLLOWED = {
 }
 HARMLESS = frozenset({3, 12, 13})
 """Tool life, and tool radii, which only the control's cutter compensation uses."""
-
-
-def tool_offset(control: Control, block: Block, code: int) -> None:
-    """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
-    before = control.offsets.tool[Z]
-    lengths.tool_offset(control, block, code)
-    if control.offsets.tool[Z] != before and "Z" not in block.values:
-        control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
-
-
-def nothing(control: Control, block: Block, code: int) -> None:
-    """A code without an effect on the path."""
 
 
 def extended(control: Control, block: Block, code: int) -> None:

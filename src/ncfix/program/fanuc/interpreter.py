@@ -11,13 +11,15 @@ from ncfix.program.fanuc import polar, system
 from ncfix.program.fanuc.arithmetic import variable_number
 from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
-from ncfix.program.fanuc.flow import MacroFlow
+from ncfix.program.fanuc.flow import BAD_JUMP, MacroFlow
+from ncfix.program.fanuc.lengths import lone_number
 from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.coordinates import INCH
+from ncfix.program.rs274.coordinates import INCH, LETTERS
 from ncfix.program.rs274.expressions import Evaluate
+from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import NON_MODAL
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.order import DWELL
@@ -32,7 +34,9 @@ DRILLING = frozenset("KLQ")
 """K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 SCALED = frozenset("XYZABCUVWIJKRQ")
 NO_UNIT = "NCF215"
-CORNER = frozenset((",R", ",C", ",A"))
+ANGLE = ",A"
+CORNER = frozenset((",R", ",C", ANGLE))
+AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 ROUNDED_CORNER = "the control rounds or breaks the corner (,R ,C) by itself"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
@@ -77,7 +81,7 @@ class MacroInterpreter(Interpreter):
 
     def takes_stretches(self) -> bool:
         """Not while a macro is called after every motion, or words are polar."""
-        return not self.modal_calls and self.control.polar is None
+        return super().takes_stretches() and not self.modal_calls and self.control.polar is None
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
@@ -109,7 +113,15 @@ class MacroInterpreter(Interpreter):
         ended = super().execute_words(plan, index)
         if plan.letters & CORNER:
             self.control.refusal = refusal
+            self.note_angle(plan)
         return ended
+
+    def note_angle(self, plan: Plan) -> None:
+        """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
+        plane = self.control.modal.plane
+        if ANGLE in plan.letters:
+            missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
+            self.control.lose(missing, AFTER_ANGLE)
 
     def note_command(self, plan: Plan) -> None:
         """A command of a machine's own: nobody knows what it does."""
@@ -152,6 +164,11 @@ class MacroInterpreter(Interpreter):
         if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
             block = polar.cartesian(self.control, block)
         return block
+
+    def settings(self, codes: Codes, block: Block) -> None:
+        """What a block sets before its motion; H alone sets something, too."""
+        super().settings(codes, block)
+        lone_number(self.control, block, codes)
 
     def is_scaled(self, letter: str, codes: Codes | None) -> bool:
         """Whether the number of a word counts least increments when it has no point."""
@@ -215,15 +232,20 @@ class MacroInterpreter(Interpreter):
         return False
 
     def subprogram(self, block: Block) -> None:
-        """M98 Pn Ln; the repeats may stand before four digits of the number."""
-        name = self.named_program()
-        if name:
-            self.flow.begin(name, whole(block.get("L", 1.0), "L of M98"), None)
-            return
-        number, times = whole(block.get("P"), "P of M98"), whole(block.get("L", 1.0), "L of M98")
-        if "L" not in block.values and number > LAST_PROGRAM and not self.is_there(str(number)):
-            times, number = divmod(number, LAST_PROGRAM + 1)
-        self.flow.begin(str(number), times, None)
+        """M98 Pn Ln Qn; the repeats may stand before four digits of the number, Q is the block to begin at."""
+        if "H" in block.values:
+            raise Fault(BAD_JUMP, "M98 with H means other things on other controls", "split the subprogram in two")
+        name, times = self.named_program(), whole(block.get("L", 1.0), "L of M98")
+        if not name:
+            number = whole(block.get("P"), "P of M98")
+            if "L" not in block.values and number > LAST_PROGRAM and not self.is_there(str(number)):
+                times, number = divmod(number, LAST_PROGRAM + 1)
+            name = str(number)
+        self.flow.begin(name, times, None)
+        if "Q" in block.values:
+            if times != 1:
+                raise Fault(BAD_JUMP, "where a repeated call begins that names a block (Q of M98) is not certain")
+            self.flow.go_to(whole(block.values["Q"], "Q of M98"))
 
     def is_there(self, label: str) -> bool:
         """Whether there is a program of that number."""

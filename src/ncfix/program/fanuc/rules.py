@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix.program.fanuc import data, polar, tilt
+from ncfix.program.fanuc import data, lengths, polar, references, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
 from ncfix.program.fanuc.variables import is_system
@@ -66,8 +66,9 @@ FANUC = Rules(
         100: data.set_data,
         150: polar.switch,
         160: polar.switch,
-        270: data.nothing,
-        **dict.fromkeys((430, 434, 435, 440, 490, 491), data.tool_offset),
+        270: references.check,
+        300: references.further,
+        **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: unfollowed,
         531: tilt.align,
         680: tilt.rotate,
@@ -91,6 +92,7 @@ HAAS = replace(
     g_groups=FANUC_G | {470: groups.NON_MODAL} | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
     steps={**FANUC.steps, 470: data.engrave, **dict.fromkeys(HAAS_OFFSETS, data.extended)},
     takes=FANUC.takes | {470},
+    adds_rotations=True,
 )
 """Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), and engraves texts."""
 

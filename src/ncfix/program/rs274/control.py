@@ -85,6 +85,7 @@ class Control:
     ends       where the motions of a block end, if somebody wants to know
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
+    unnamed    axes of the plane of which a rotation has gone on or off since the program named them
     saved      the modal states that M70 saved, one place for each call level
     """
 
@@ -119,6 +120,7 @@ class Control:
         self.extended_name = ""
         self.tilted = False
         self.tip_control = False
+        self.unnamed: frozenset[int] = frozenset()
         self.ends: list[Vector] | None = None
         self.external = ""
         self.tcp = setup.tcp
@@ -160,10 +162,11 @@ class Control:
         centre = offsets.centre
         if offsets.rotation is not IDENTITY:
             turned = rotated(offsets.rotation, centre)
-            parts = zip(offsets.shift, centre, turned, offsets.feature, strict=True)
-            inner = [s + c - t + f for s, c, t, f in parts]
+            parts = zip(offsets.shift, offsets.local, centre, turned, offsets.feature, strict=True)
+            inner = [shift + own + c - t + f for shift, own, c, t, f in parts]
         else:
-            inner = [s + f for s, f in zip(offsets.shift, offsets.feature, strict=True)]
+            shifts = zip(offsets.shift, offsets.local, offsets.feature, strict=True)
+            inner = [shift + own + f for shift, own, f in shifts]
         outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
         tool = zeros() if self.tcp else offsets.tool
         self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]

@@ -13,7 +13,7 @@ from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, dot
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.feeds import INVERSE_TIME
 from ncfix.program.rs274.systems import check_system
-from ncfix.program.rs274.targets import unknown_after
+from ncfix.program.rs274.targets import unknown_after, unnamed
 
 BAD_CYCLE = "NCF226"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
@@ -126,6 +126,8 @@ def hole_unknown(control: Control, block: Block) -> Unknown:
         unknown.pop(modal.plane.across, None)
         if modal.plane.across in control.shaky:
             unknown[modal.plane.across] = control.shaky[modal.plane.across]
+    if control.unnamed:
+        unknown |= unnamed(control, block)
     if control.is_rotated and unknown.keys() & {0, 1, 2}:
         reason = unknown[min(unknown)]
         unknown |= {index: reason for index in (0, 1, 2) if index in control.machine}

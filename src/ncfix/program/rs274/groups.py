@@ -69,8 +69,7 @@ LINUXCNC_G = grouped(
 )
 
 ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 80, *SPLINES, 53)} | grouped(
-    NON_MODAL=(220, 600),
-    MOTION=(310,),
+    NON_MODAL=(220, 310, 600),
     LENGTH=(434, 435, 440),
     SYSTEM=(541,),
     ROTATION=(680, 690),
@@ -103,6 +102,7 @@ class Rules:
     steps       G code -> what is done for it instead of what `order` says
     cycles      G codes of canned cycles
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    adds_rotations  in G91 the angle of G68 is added to that in force
     system      whether a numbered parameter is one of the control's own, so that setting it does something
     compiled    (expression, the address it stands behind) -> the function that computes it
     """
@@ -114,6 +114,7 @@ class Rules:
     steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
     cycles: frozenset[int] = frozenset(CYCLES)
     takes: frozenset[int] = frozenset()
+    adds_rotations: bool = False
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
 

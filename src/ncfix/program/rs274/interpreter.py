@@ -121,7 +121,7 @@ class Interpreter:
 
     def takes_stretches(self) -> bool:
         """Whether plain motions may be taken many at once: nothing is done between them."""
-        return True
+        return not self.control.unnamed
 
     def spend(self, blocks: int) -> None:
         """Count executed blocks; raises `Fault` when there are too many."""
@@ -202,13 +202,17 @@ class Interpreter:
         if plan.command is not None:
             self.command(plan.command)
         self.note_foreign(plan)
-        for step, code in codes.steps:
-            step(control, block, code)
+        self.settings(codes, block)
         if motion is not None:
             self.move(block, codes, motion)
         if self.recorder:
             self.recorder.words(self.flow.unit, index, plan, codes, block)
         return self.after(codes, block)
+
+    def settings(self, codes: Codes, block: Block) -> None:
+        """What a block sets before its motion."""
+        for step, code in codes.steps:
+            step(self.control, block, code)
 
     def evaluate(self, plan: Plan, index: int) -> Block:
         """The values of a block; its assignments take effect when all have been read."""

@@ -120,7 +120,7 @@ def set_tool(control: Control, block: Block, kind: int) -> None:
     if kind != 1:
         control.settle((Z,))
         system = control.modal.system if kind == 10 else len(SYSTEM_NAMES)
-        shift = control.offsets.shift[Z] if kind == 10 else 0.0
+        shift = control.offsets.shift[Z] + control.offsets.local[Z] if kind == 10 else 0.0
         length = control.position[Z] - stored(control, first_parameter(system))[Z] - shift - length
     control.tools.lengths[number] = length
     if "Z" in block.runtime or (kind != 1 and Z in control.unknown):

@@ -82,13 +82,16 @@ class Saved:
 class Offsets:
     """What lies between a program's numbers and commands, mm and rad, each a position in the order of `LETTERS`.
 
-    `command = origin + tool + turn @ (shift + feature + centre + rotation @ (program - centre))`, `turn` that of the
-    work offset (G10 R), `rotation` that of G68, or of the tilted plane (G68.2) whose origin is `feature`.
+    `command = origin + tool + turn @ (shift + local + feature + centre + rotation @ (program - centre))`, `turn` that
+    of the work offset (G10 R), `shift` that of G92, `local` that of G52 where it is another, `rotation` that of G68, or
+    of the tilted plane (G68.2) whose origin is `feature`. `doubtful`: letters whose `local` is known at run time only.
     """
 
     origin: Vector = field(default_factory=zeros)
     turn: Rotation = IDENTITY
     shift: Vector = field(default_factory=zeros)
+    local: Vector = field(default_factory=zeros)
+    doubtful: frozenset[int] = frozenset()
     tool: Vector = field(default_factory=zeros)
     centre: Vector = field(default_factory=zeros)
     feature: Vector = field(default_factory=zeros)

@@ -22,6 +22,9 @@ AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
 NO_CODE = -2
 """The motion code of blocks with axis words while none is in force."""
 
+ONE_SHOT_PROBE = 310
+"""G31 holds for its block only; the motion code before it stays in force."""
+
 AFTER_NO_CODE = "where the axis {} stands after a motion without a code is not known"
 
 REFUSALS = {
@@ -137,7 +140,8 @@ def probe(control: Control, block: Block, code: int) -> None:
             raise Fault("NCF225", "probing, and no feed (F) is set")
         if control.modal.feed_mode == PER_REVOLUTION:
             raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
-    control.modal.motion = code
+    if code != ONE_SHOT_PROBE:
+        control.modal.motion = code
     target, unknown = destination(control, block)
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:

@@ -42,8 +42,14 @@ CONFLICT = "NCF208"
 UNKNOWN_M = "NCF229"
 MAX_M_CODES = 4
 
-AXES_TAKEN = frozenset((100, 220, 280, 300, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
+AXES_TAKEN = frozenset((100, 220, 280, 300, 310, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
 """G codes that take the axis words of their block for themselves, so that it has no motion."""
+
+FIRST_SYSTEM, EXTENDED_SYSTEM = 540, 541
+"""G54, and what ISO controls make of it where the block has a P: G54.1 Pn."""
+
+P_USERS = frozenset((*(40, 100, 300, 650, 660, 661, 682), *groups.CYCLES, *(190, 970, 980, 990, 1980)))
+"""G and M codes that have a use for P."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +198,9 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
             enter_m(m, word, code, rules)
     if rules.strict and sum(word.address == "M" for word, _ in pairs) > MAX_M_CODES:
         raise Fault(CONFLICT, f"more than {MAX_M_CODES} M codes in a block", span=pairs[-1][0].span)
+    if not rules.strict and g.get(groups.SYSTEM) == FIRST_SYSTEM and "P" in letters:
+        free = P_USERS.isdisjoint((*g.values(), *m.values()))
+        g[groups.SYSTEM] = EXTENDED_SYSTEM if free else FIRST_SYSTEM
     return Codes(
         g,
         m,

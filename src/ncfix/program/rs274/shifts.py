@@ -1,6 +1,7 @@
 """Shifts and rotations of all coordinate systems: G52, G92 to G92.3, and G68 of ISO controls.
 
-Source: LinuxCNC documentation, "G52", "G92"; for G68 and G69 the Fanuc 30i programming manual.
+Source: LinuxCNC documentation, "G52", "G92", which are one shift there; for G52 and G92 of ISO controls, which are two,
+and for G68 and G69 the Fanuc 30i programming manual.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.settings import unfollowed
+from ncfix.program.rs274.settings import ENDS, unfollowed
 from ncfix.program.rs274.systems import SHIFT, mark_shaky, store, stored, words_of
 
 SHIFT_ACTIVE = 5210
@@ -20,6 +21,10 @@ def shift_system(control: Control, block: Block, code: int) -> None:
         if control.rules.strict:
             raise Fault("NCF221", f"G{code // 10} needs an axis word")
         return
+    if not control.rules.strict and code in (520, 920):
+        set_local(control, block, cancelled=code == 920)
+    if code == 520 and not control.rules.strict:
+        return
     if code in (520, 920):
         set_shift(control, block, from_position=code == 920)
     else:
@@ -28,6 +33,17 @@ def shift_system(control: Control, block: Block, code: int) -> None:
         for index in range(N_LETTERS):
             store(control, SHIFT, index, 0.0, runtime=False)
     control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
+    mark_shaky(control)
+    control.refresh()
+
+
+def set_local(control: Control, block: Block, *, cancelled: bool) -> None:
+    """G52 of ISO controls, which is not the shift of G92; G92 takes it away along the axes that it names."""
+    offsets, local = control.offsets, control.offsets.local[:]
+    for index in words_of(block):
+        local[index] = 0.0 if cancelled else control.scale[index] * block.values[LETTERS[index]]
+    runtime = set() if cancelled else {index for index in words_of(block) if LETTERS[index] in block.runtime}
+    offsets.local, offsets.doubtful = local, (offsets.doubtful - set(words_of(block))) | runtime
     mark_shaky(control)
     control.refresh()
 
@@ -48,13 +64,30 @@ def set_shift(control: Control, block: Block, *, from_position: bool) -> None:
 
 def rotate_system(control: Control, block: Block, code: int) -> None:
     """G68 X Y R turns the coordinates of the plane about a point, G69 ends it."""
-    control.offsets.rotation, before = IDENTITY, control.offsets.rotation
+    before = control.offsets.rotation
+    if code == 680 and (why := uncertain(control, block)):
+        control.suspended[ENDS[690]] = why
+        return
+    control.offsets.rotation = IDENTITY
     if code == 680:
         turn_about_point(control, block, before if control.modal.incremental else IDENTITY)
     else:
         control.offsets.centre = zeros()
         unfollowed(control, block, code)
+    if control.offsets.rotation != before:
+        control.unnamed = frozenset((control.modal.plane.first, control.modal.plane.second))
     control.refresh()
+
+
+def uncertain(control: Control, block: Block) -> str:
+    """Why a rotation (G68) is not certain; empty if it is."""
+    if "R" not in block.values:
+        return "the angle of the rotation (G68) is not in the program"
+    centred = any(LETTERS[index] in block.values for index in (control.modal.plane.first, control.modal.plane.second))
+    again = control.offsets.rotation != IDENTITY and not control.rules.adds_rotations
+    if control.modal.incremental and (centred or again):
+        return "what the words of a rotation (G68) count from in G91 differs from control to control"
+    return ""
 
 
 def turn_about_point(control: Control, block: Block, before: tuple[tuple[float, float, float], ...]) -> None:

@@ -103,7 +103,7 @@ def activate(control: Control, system: int) -> None:
     control.modal.system = system
     control.offsets.origin = stored(control, first_parameter(system))
     turn = turn_of(control, system)
-    if turn != control.offsets.turn and any(control.offsets.shift[:2]):
+    if turn != control.offsets.turn and (any(control.offsets.shift[:2]) or any(control.offsets.local[:2])):
         control.lose((X, Y), TURNED_WITH_SHIFT)
     control.offsets.turn = turn
     control.offset_checked = False
@@ -122,6 +122,7 @@ def mark_shaky(control: Control) -> None:
     runtime = control.parameters.numbers.runtime
     first = first_parameter(control.modal.system)
     marked = {index for index in control.machine if first + index in runtime or SHIFT + index in runtime}
+    marked |= control.offsets.doubtful & set(control.machine)
     turned = control.offsets.turn is not IDENTITY
     if turned and (marked & {X, Y} or first + 9 in runtime):
         marked |= {X, Y} & set(control.machine)
@@ -141,7 +142,7 @@ def extended_system(control: Control, block: Block) -> None:
     control.modal.system = 0
     control.offsets.turn = IDENTITY
     control.offset_checked = True
-    control.shaky = {}
+    mark_shaky(control)
     control.refresh()
 
 
@@ -204,7 +205,8 @@ def origin_for_position(control: Control, block: Block, system: int, origin: Vec
     involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
     control.settle(tuple(involved))
     outer = [p - o - t for p, o, t in zip(control.position, origin, control.offsets.tool, strict=True)]
-    now = [a - s for a, s in zip(rotated(transposed(turn), outer), control.offsets.shift, strict=True)]
+    shifts = zip(control.offsets.shift, control.offsets.local, strict=True)
+    now = [a - s - local for a, (s, local) in zip(rotated(transposed(turn), outer), shifts, strict=True)]
     wanted = now[:]
     for index in words_of(block):
         wanted[index] = control.scale[index] * block.values[LETTERS[index]]

@@ -14,12 +14,34 @@ from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, X, Y, Z, rot
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.systems import check_system
 
+AFTER_ROTATION = "where the axis {} goes after G68 or G69 differs from control to control until both axes are named"
 RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
 
 
 def destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
     """The command at which a motion of this block ends."""
+    target, unknown = words_destination(control, block)
+    return (target, unknown | unnamed(control, block)) if control.unnamed else (target, unknown)
+
+
+def unnamed(control: Control, block: Block) -> Unknown:
+    """Axes of the plane that cannot be known until both are named, after a rotation has gone on or off (G68, G69)."""
+    named = {index for index in control.unnamed if block.axes >> index & 1}
+    if not named:
+        return {}
+    if control.modal.incremental:
+        doubtful = set() if control.is_rotated else {*control.unnamed}
+    else:
+        doubtful = {*control.unnamed} if control.is_rotated else control.unnamed - named
+        doubtful = doubtful if named < control.unnamed else set()
+    if doubtful or not control.modal.incremental:
+        control.unnamed = frozenset()
+    return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)
+
+
+def words_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
+    """The command to which the words of a block lead."""
     incremental = control.modal.incremental
     if not incremental and not control.offset_checked:
         check_system(control)

@@ -1,0 +1,73 @@
+"""Tool lengths of these controls: H stays in force, and another H alone is another length at once.
+
+Source: Fanuc 30i operator's manual (machining centre), "Tool length offset": the number of H is modal, H0 is no offset.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.program.rs274 import lengths
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.coordinates import Z
+from ncfix.program.rs274.groups import LENGTH
+
+if TYPE_CHECKING:
+    from ncfix.program.fanuc.control import MacroControl
+    from ncfix.program.rs274.control import Block
+    from ncfix.program.rs274.plans import Codes
+
+LENGTH_ALONE = "NCF214"
+ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
+NO_NUMBER = "NCF217"
+SPINDLE = "a tool length without H is taken as that of the tool in the spindle"
+TURNED = "NCF218"
+TURNED_TEXT = (
+    "rotary axes stand turned where G43.4 is switched on; X Y Z are taken to ride on the workpiece as it lies with all"
+    " of them at zero (parameters 19696 WKP, 19754 RPS)"
+)
+TIP_CONTROL = (434, 435)
+NOTHING = 1e-12
+PLAIN_CANCEL = 490
+CANCEL = (PLAIN_CANCEL, 491)
+
+
+def tool_offset(control: MacroControl, block: Block, code: int) -> None:
+    """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
+    before = control.offsets.tool[Z]
+    if code in CANCEL:
+        control.length_code = 0
+    else:
+        control.length_code = code
+        take_number(control, block)
+        if code in TIP_CONTROL:
+            note_turned(control)
+    lengths.tool_offset(control, block, PLAIN_CANCEL if code in CANCEL else code)
+    if control.offsets.tool[Z] != before and "Z" not in block.values:
+        control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
+
+
+def note_turned(control: MacroControl) -> None:
+    """What X Y Z count from if rotary axes stand turned where G43.4 is switched on depends on the control."""
+    if not control.tcp and any(control.rotary[i] and abs(control.position[i]) > NOTHING for i in control.machine):
+        control.warn(TURNED, TURNED_TEXT, "switch G43.4 on with the rotary axes at zero, or check the parameters")
+
+
+def take_number(control: MacroControl, block: Block) -> None:
+    """H of the block, or that in force; a program that has never named one means the tool in the spindle."""
+    if "H" in block.values:
+        control.length_number = whole(block.values["H"], "H")
+    elif control.length_number is not None:
+        block.values["H"] = float(control.length_number)
+    else:
+        control.warn(NO_NUMBER, SPINDLE, "state H in the block of G43")
+
+
+def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:
+    """An H word in a block without G43: another length, at once where one is in force."""
+    if "H" not in block.values or LENGTH in codes.g or codes.call is not None:
+        return
+    if control.length_code:
+        tool_offset(control, block, control.length_code)
+    else:
+        control.length_number = whole(block.values["H"], "H")

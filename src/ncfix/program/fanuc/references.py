@@ -1,0 +1,37 @@
+"""Reference points of these controls: G27 checks one, G30 Pn goes to the second, third or fourth.
+
+Source: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words.
+"""
+
+from __future__ import annotations
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, go_to_reference
+from ncfix.program.rs274.targets import destination
+
+CHECKED = "reference point check (G27)"
+SECOND = 2
+
+
+def check(control: Control, block: Block, code: int) -> None:
+    """G27: to the words, which should be a reference point."""
+    if block.axes:
+        target, unknown = destination(control, block)
+        control.move(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED)
+
+
+def further(control: Control, block: Block, code: int) -> None:
+    """G30 Pn: by way of the words; where the third and fourth reference points are is not given."""
+    number = whole(block.get("P", SECOND), "P of G30")
+    if number == SECOND:
+        go_to_reference(control, block, code)
+        return
+    way, unknown = destination(control, block)
+    passing = REFERENCE_POINT.format(f"G30 P{number}")
+    if way != control.position:
+        control.move(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing)
+    taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
+    unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
+    control.move(Kind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing)

@@ -1,0 +1,110 @@
+"""What is in force on Fanuc controls from one block to the next, where LinuxCNC differs or has no such thing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import SourceError
+from ncfix.program.setup import Setup, Tool
+from program.tracing import ends, follow, last, reasons
+
+SETUP = Setup(
+    work_offsets={"G54": {}, "G55": {"X": 100.0}, "G54.1P2": {"X": 1000.0, "Y": 0.0, "Z": 0.0}},
+    tools={number: Tool(10.0 * number, 3.0) for number in range(5)},
+    initial={"X": 0.0, "Y": 0.0, "Z": 0.0},
+    references={"G28": {"Z": 300.0}, "G30": {"Z": 290.0}},
+    no_point="calculator",
+    assume_zero=True,
+)
+
+
+def motions(text: str) -> list[list[float]]:
+    return ends(follow(text, setup=SETUP, dialect="fanuc"))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G54P2X5.G0", [[1005, 0, 0]]),
+        ("G54G4P2\nG0X5.", [[0, 0, 0], [5, 0, 0]]),
+        ("G54M98P7\nM30\nO7\nG0X1.\nM99", [[1, 0, 0]]),
+        ("G0X5.\nG92X0.\nG52X3.\nX1.\nG52X0.\nX1.", [[5, 0, 0], [9, 0, 0], [6, 0, 0]]),
+        ("G52X3.Y1.\nG0X0.Y0.\nG92X10.\nX10.Y0.", [[3, 1, 0], [3, 1, 0]]),
+        ("G52X3.\nG55G0X1.", [[104, 0, 0]]),
+        ("G43H2G0Z0.\nH3Z0.\nH0Z0.\nG49Z0.", [[0, 0, 20], [0, 0, 30], [0, 0, 0], [0, 0, 0]]),
+        ("G43H3G0Z0.\nG49Z0.\nG43Z0.", [[0, 0, 30], [0, 0, 0], [0, 0, 30]]),
+        ("H4\nG43G0Z0.\nG49.1Z0.", [[0, 0, 40], [0, 0, 0]]),
+        ("G27Z5.\nG0X1.", [[0, 0, 5], [1, 0, 5]]),
+        ("G30P2Z0.\nG0X1.", [[0, 0, 290], [1, 0, 290]]),
+        ("G0X5.Y1.\nG98G87X1.R-9.Z-5.F50.\nG80\nG0X0.", [[5, 1, 0], [1, 1, -5], [0, 1, 0]]),
+        ("G81X1.Z-5.R2.F50.\nR4.\nG99X2.\nG80\nY1.G0", [[1, 0, -5], [1, 0, -5], [2, 0, -5], [2, 1, 4]]),
+        ("M98P7Q20\nM30\nO7\nG0X1.\nN20G0Y2.\nM99", [[0, 2, 0]]),
+        ("G1X1.F50.\nG31Z-5.\nG0Z9.\nX2.", [[1, 0, 0], [1, 0, np.nan], [1, 0, 9], [2, 0, 9]]),
+    ],
+)
+def test_codes(text: str, expected: list[list[float]]) -> None:
+    np.testing.assert_allclose(motions(text), expected, atol=1e-9)
+
+
+def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
+    found = follow("G1X1.F50.\nG31Z-5.\nX2.\nG0X3.Y0.Z9.\nG1G31X0.\nZ8.", setup=SETUP, dialect="fanuc")
+    assert reasons(found)[1] == "probing"
+    assert reasons(found)[2] == "where the axis Z stands after probing is known only at run time"
+    assert found.moves.modal.tolist() == [10, 310, 10, 0, 310, 10]
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("G30P3Z0.\nG0X1.", "reference point"),
+        ("G81X1.Y1.Z-5.R2.K0F50.\nX3.", "cycle without a hole"),
+        ("G1F50.\nX5.,A45.\nX9.", "given by its angle"),
+        ("G68X0Y0\nG0X1.Y1.", "the angle of the rotation"),
+        ("G91G68X1.Y0R30.\nG90G0X1.Y1.", "count from in G91"),
+        ("G68R30.\nG91G68R30.\nG90G0X1.Y1.", "count from in G91"),
+        ("G0X1.Y1.\nG68X0Y0R30.\nX2.", "until both axes are named"),
+        ("G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\nX1.", "until both axes are named"),
+        ("G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\nG91X1.", "until both axes are named"),
+        ("G0X1.Y1.\nG68X0Y0R30.\nG81X2.Z-5.R2.F50.", "until both axes are named"),
+    ],
+)
+def test_what_differs_from_control_to_control_is_refused(text: str, reason: str) -> None:
+    assert reason in reasons(follow(text, setup=SETUP, dialect="fanuc"))[-1]
+
+
+def test_heights_do_not_depend_on_a_rotation_in_the_plane() -> None:
+    found = follow("G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\nZ5.\nX1.Y1.", setup=SETUP, dialect="fanuc")
+    assert reasons(found) == [""] * 4
+    assert last(found) == [1, 1, 5]
+
+
+def test_haas_adds_rotations() -> None:
+    found = follow("G68X0Y0R30.\nG91G68R60.\nG90G0X1.Y0", setup=SETUP, dialect="haas")
+    assert last(found) == pytest.approx([0, 1, 0])
+
+
+def test_a_stretch_after_a_rotation_is_taken_block_by_block() -> None:
+    lines = "\n".join(f"X{n}." for n in range(1, 31))
+    found = follow(f"G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\n{lines}", setup=SETUP, dialect="fanuc")
+    assert all("until both" in why for why in reasons(found)[2:])
+
+
+@pytest.mark.parametrize("text", ["M98P7H20\nM30\nO7\nM99", "M98P7Q20L2\nM30\nO7\nN20\nM99"])
+def test_calls_that_are_not_certain_are_errors(text: str) -> None:
+    with pytest.raises(SourceError) as caught:
+        follow(text, setup=SETUP, dialect="fanuc")
+    assert caught.value.messages[0].code == "NCF242"
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("G43G0Z0.", "NCF217"),
+        ("G0A90.\nG43.4H1", "NCF218"),
+        ("G43.4H1\nG0A90.\nH2", ""),
+    ],
+)
+def test_what_cannot_be_seen_in_the_program_is_said(text: str, code: str) -> None:
+    codes = {message.code for message in follow(text, "XYZA", setup=SETUP, dialect="fanuc").messages}
+    assert codes & {"NCF217", "NCF218"} == ({code} if code else set())
