@@ -18,15 +18,22 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     """Refuse what is not text (NCF101), holds nothing (NCF102), or is another family's language (NCF103)."""
     if source.startswith(UTF16_MARKS):
         raise SourceError.of("NCF101", "the text is UTF-16", Place(path, 1), "save it as ASCII, Latin-1 or UTF-8")
-    zero = source.find(b"\0")
-    if zero >= 0:
-        raise SourceError.of("NCF101", "there is a zero byte in the file", place_of(source, zero, path))
+    check_zeros(source, path)
     if not source.removeprefix(UTF8_MARK).strip():
         raise SourceError.of("NCF102", "there is no block in the program", Place(path))
     for family, pattern in dialect.foreign:
         if found := re.search(pattern, source[:PROBE_BYTES]):
             text = f"this is {family}, not {dialect.title}"
             raise SourceError.of("NCF103", text, place_of(source, found.start(), path, "utf-8"), "see `ncfix dialects`")
+
+
+def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:
+    """Refuse zero bytes (NCF101); `first_line` is that of the file on which the text begins."""
+    zero = source.find(b"\0")
+    if zero >= 0:
+        found = place_of(source, zero, path)
+        place = Place(path, found.line + first_line - 1, found.column)
+        raise SourceError.of("NCF101", "there is a zero byte in the file", place)
 
 
 def place_of(source: bytes, byte: int, path: str, encoding: str = "") -> Place:

@@ -1,6 +1,6 @@
-"""The scan of a text, compiled: numbers and shapes in one pass each.
+"""The scan of a text, compiled: numbers, comments and shapes of its blocks in one pass over the bytes.
 
-They find what `numbers` and `shapes` find, to the last bit; a test holds the two together.
+It finds what `shapes.scan` finds, to the last bit; a test holds the two together.
 """
 
 # numba finds out the types.
@@ -15,127 +15,167 @@ from numpy.typing import NDArray
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Tables = tuple[Bytes, Mask, Mask, Mask]
 
-POINT, ZERO, MINUS = ord("."), ord("0"), ord("-")
+POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
 OFFSET, PRIME = np.uint64(14695981039346656037), np.uint64(1099511628211)
 """Of the hash FNV-1a."""
+UNTOUCHED = -1
+"""Instead of the number of blocks scanned: there is one that must be taken as it is."""
+NONE, BROKEN = -1, -2
+LITERAL, NUMERIC, SIGN, COMMENT, ODD = range(5)
+"""Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
 
-PLAIN, BROKEN, LONG = 0, 1, 2
-"""What a number is: converted, no number at all, or one with too many digits to be converted here."""
 
-
-@njit(inline="always")
+@njit(cache=True, nogil=True)
 def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
     """Where the last character before a place is that is no blank: as `numbers.last_before`."""
     at = place - 1
-    for _ in range(blanks):
-        if at > 0 and blank[text[at]]:
-            at -= 1
+    least = max(at - blanks, 0)
+    while at > least and blank[text[at]]:
+        at -= 1
     return at
 
 
 @njit(cache=True, nogil=True)
-def numbers(
-    text: Bytes,
-    numeric: Mask,
-    hidden: Ints,
-    fixed: Mask,
-    sign: Mask,
-    unsigned_after: Mask,
-    blank: Mask,
-    blanks: int,
-    digits_most: int,
-) -> tuple[Ints, NDArray[np.float64], Bytes]:
-    """Spans, values and kinds of the numbers of a text: as `numbers.find_numbers`.
-
-    numeric  (256,) bytes that may belong to a number
-    hidden   (k, 2) stretches of the text that are not looked at, ascending
-    """
-    most = len(text) // 2 + 1
-    spans, values, kinds = np.empty((most, 2), np.int64), np.empty(most), np.empty(most, np.uint8)
-    count, place, next_hidden, size = 0, 0, 0, len(text)
-    powers = 10.0 ** np.arange(digits_most + 1)
-    while place < size:
-        if next_hidden < len(hidden) and place == hidden[next_hidden, 0]:
-            place = max(hidden[next_hidden, 1], place)
-            next_hidden += 1
-            continue
-        if not numeric[text[place]]:
-            place += 1
-            continue
-        stop, points, digits, decimals, mantissa = place, 0, 0, 0, np.int64(0)
-        limit = hidden[next_hidden, 0] if next_hidden < len(hidden) else size
-        while stop < limit and numeric[text[stop]]:
-            if text[stop] == POINT:
-                points += 1
-            else:
-                digits += 1
-                decimals += points > 0
-                if digits <= digits_most:
-                    mantissa = mantissa * 10 + (np.int64(text[stop]) - ZERO)
-            stop += 1
-        at = before(text, place, blank, blanks)
-        character = text[at] if at >= 0 else np.uint8(0)
-        if not fixed[character]:
-            further = before(text, max(at, 0), blank, blanks)
-            last = text[further] if further >= 0 else np.uint8(0)
-            signed = sign[character] and not unsigned_after[last]
-            spans[count, 0], spans[count, 1] = at if signed else place, stop
-            negative = signed and character == MINUS
-            kinds[count] = BROKEN if points > 1 or digits == 0 else PLAIN if digits <= digits_most else LONG
-            value = float(mantissa) / powers[min(decimals, digits_most)]
-            values[count] = -value if negative else value
-            count += 1
-        place = stop
-    return spans[:count].copy(), values[:count].copy(), kinds[:count].copy()
+def run_of(text: Bytes, place: int, stop: int) -> tuple[int, int, int, int, np.uint64]:
+    """A run of digits and points: where it ends, its points, digits, decimals, and its digits as a whole number."""
+    begin, points, point, mantissa = place, 0, stop, np.uint64(0)
+    while place < stop:
+        digit = np.uint64(text[place]) - np.uint64(ZERO)
+        if digit < np.uint64(10):
+            mantissa = np.uint64(10) * mantissa + digit
+        elif text[place] == POINT:
+            points += 1
+            point = min(point, place)
+        else:
+            break
+        place += 1
+    decimals = place - point - 1 if points else 0
+    return place, points, place - begin - points, decimals, mantissa
 
 
 @njit(cache=True, nogil=True)
-def shapes(
-    text: Bytes, blocks: Ints, spans: Ints, marks: Bytes, comments: Ints, comment_mark: int
-) -> tuple[Bytes, Ints, NDArray[np.uint64], Ints]:
-    """The shapes of blocks one after the other, where each begins, their hashes, and where the numbers of each begin.
+def takes_sign(text: Bytes, at: int, unsigned_after: Mask, blank: Mask, blanks: int) -> bool:
+    """Whether the sign at a place belongs to the number after it."""
+    further = before(text, at, blank, blanks)
+    return not unsigned_after[text[further] if further >= 0 else np.uint8(0)]
 
-    As `shapes.shape_keys`. `marks` stand for the numbers; `comments` (k, 2) are those that end their blocks, ascending.
+
+@njit(cache=True, nogil=True)
+def comment_end(text: Bytes, place: int, stop: int, kinds: Bytes) -> int:
+    """Where the comment that begins at a place ends; `NONE` if none does, `BROKEN` if there is something odd in it."""
+    tail = text[place] == TAIL
+    for at in range(place + 1, stop):
+        if kinds[text[at]] == ODD:
+            return BROKEN
+        if not tail and text[at] == CLOSE:
+            return at + 1
+        if not tail and text[at] == OPEN:
+            return NONE
+    return stop if tail else NONE
+
+
+@njit(cache=True, nogil=True)
+def is_last(text: Bytes, place: int, stop: int, blank: Mask) -> bool:
+    """Whether nothing but blanks follows in the block."""
+    while place < stop and blank[text[place]]:
+        place += 1
+    return place == stop
+
+
+@njit(cache=True, nogil=True)
+def size_of_table(n: int) -> int:
+    """The size of a table of hashes for n shapes: a power of two."""
+    size = 1
+    while size < 2 * n:
+        size *= 2
+    return size
+
+
+@njit(cache=True, nogil=True)
+def entry(table: Ints, code: np.uint64, shapes: Bytes, begin: int, end: int, starts: Ints) -> np.int64:
+    """Where in a table of hashes the shape from `begin` to `end` is, or is to be entered (-1 stands there)."""
+    mask = len(table) - 1
+    at = np.int64(code & np.uint64(mask))
+    while table[at] >= 0:
+        first, k = starts[table[at]], 0
+        same = starts[table[at] + 1] - first == end - begin
+        while same and begin + k < end:
+            same = shapes[first + k] == shapes[begin + k]
+            k += 1
+        if same:
+            break
+        at = (at + 1) & mask
+    return at
+
+
+@njit(cache=True, nogil=True)
+def scan(
+    text: Bytes, blocks: Ints, tables: Tables, blanks: int, digits_most: int, marks: tuple[int, int, int]
+) -> tuple[int, Ints, Ints, Ints, Ints, NDArray[np.float64], Bytes, Ints]:
+    """Scan the blocks of a text.
+
+    tables  of the 256 bytes: their kinds, and fixed, unsigned_after, blank (see `numbers` and `shapes`)
+    blanks, digits_most   see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
+    marks   of a number, of one without a point, of the comment that ends a block
+
+    Returns how many blocks were scanned, or `UNTOUCHED`; which shape each has, where its last comment begins, and its
+    first number; spans and values of the numbers; the shapes one after the other, and where each begins.
     """
+    kinds, fixed, unsigned_after, blank = tables
+    number_mark, pointless_mark, comment_mark = marks
     n = len(blocks)
-    out, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)
-    hashes, first = np.empty(n, np.uint64), np.empty(n + 1, np.int64)
-    size, number, comment = 0, 0, 0
+    group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
+    spans, values = np.empty((len(text) // 2 + 1, 2), np.int64), np.empty(len(text) // 2 + 1)
+    shapes, starts = np.empty(len(text) + 1, np.uint8), np.zeros(n + 1, np.int64)
+    table = np.full(size_of_table(n), -1, np.int64)
+    powers = 10.0 ** np.arange(digits_most + 1)
+    count, known, end = 0, 0, 0
     for block in range(n):
-        starts[block], code, place, stop = size, OFFSET, blocks[block, 0], blocks[block, 1]
-        while number < len(spans) and spans[number, 0] < place:
-            number += 1
-        while comment < len(comments) and comments[comment, 0] < place:
-            comment += 1
-        first[block] = number
+        first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
+        end, code, code_at_sign, end_at_sign = begin, OFFSET, OFFSET, begin
         while place < stop:
-            character = text[place]
-            if number < len(spans) and place == spans[number, 0]:
-                character, place = marks[number], spans[number, 1]
-                number += 1
-            elif comment < len(comments) and place == comments[comment, 0]:
-                character, place = np.uint8(comment_mark), comments[comment, 1]
-                comment += 1
-            else:
-                place += 1
-            out[size] = character
-            size += 1
-            code = (code ^ np.uint64(character)) * PRIME
-        hashes[block] = code
-    starts[n], first[n] = size, len(spans)
-    return out[:size].copy(), starts, hashes, first
-
-
-@njit(cache=True, nogil=True)
-def alike(shapes: Bytes, starts: Ints, group: Ints, model: Ints) -> bool:
-    """Whether every block has the same shape as the model of its group: no two shapes share a hash."""
-    for block in range(len(group)):
-        a, b = starts[block], starts[model[group[block]]]
-        length = starts[block + 1] - a
-        if starts[model[group[block]] + 1] - b != length:
-            return False
-        for k in range(length):
-            if shapes[a + k] != shapes[b + k]:
-                return False
-    return True
+            character, past = text[place], place + 1
+            kind = kinds[character]
+            if kind == NUMERIC:
+                past, points, digits, decimals, mantissa = run_of(text, place, stop)
+                at = before(text, place, blank, blanks)
+                leader = text[at] if at >= 0 else np.uint8(0)
+                if not fixed[leader]:
+                    if points > 1 or digits == 0 or digits > digits_most:
+                        return UNTOUCHED, group, comment, first, spans, values, shapes, starts
+                    start, value = place, float(mantissa) / powers[decimals]
+                    if kinds[leader] == SIGN and takes_sign(text, at, unsigned_after, blank, blanks):
+                        start, value = at, -value if leader == MINUS else value
+                        code, end = code_at_sign, end_at_sign
+                    spans[count, 0], spans[count, 1], values[count] = start, past, value
+                    count += 1
+                    place, character = past - 1, np.uint8(number_mark if points else pointless_mark)
+            elif kind == COMMENT:
+                close = comment_end(text, place, stop, kinds)
+                if close > 0 and is_last(text, close, stop, blank):
+                    comment[block], place, past = place, close - 1, close
+                    character = np.uint8(comment_mark)
+                elif close > 0:
+                    past = close
+                kind = ODD if close == BROKEN else kind
+            elif kind == SIGN:
+                code_at_sign, end_at_sign = code, end
+            if kind == ODD:
+                return UNTOUCHED, group, comment, first, spans, values, shapes, starts
+            while True:
+                shapes[end] = character
+                code = (code ^ np.uint64(character)) * PRIME
+                place, end = place + 1, end + 1
+                if place >= past:
+                    break
+                character = text[place]
+        at = entry(table, code, shapes, begin, end, starts)
+        if table[at] < 0:
+            table[at] = known
+            known += 1
+            starts[known] = end
+        group[block] = table[at]
+    first[n] = count
+    return n, group, comment, first, spans[:count].copy(), values[:count].copy(), shapes, starts[: known + 1]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
-from ncfix.program.content import check_content, header_length
+from ncfix.program.content import check_content, check_zeros, header_length
 from ncfix.program.dialect import Dialect
 from ncfix.program.language import Language, language_of
 from ncfix.program.moves import Moves
@@ -76,7 +76,10 @@ class PartReader:
     def read(self, source: bytes) -> Program:
         """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
         begun = self.first_line > 1
-        check_content(source if source.strip() or not begun else b"(blank)", self.path, self.dialect)
+        if begun:
+            check_zeros(source, self.path, self.first_line)
+        else:
+            check_content(source, self.path, self.dialect)
         blocks = self.language.split(source)
         if not begun:
             blocks[0, 0] = header_length(source)
@@ -91,6 +94,8 @@ class PartReader:
 
     def _end_later(self, source: bytes, blocks: NDArray[np.int64]) -> int:
         """The block that ends the text, where this is not the first part."""
+        if b"%" not in source:
+            return len(blocks)
         before = b"X\n"
         return self.language.end(before + source, np.vstack(([[0, 1]], blocks + len(before)))) - 1
 

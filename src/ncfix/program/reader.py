@@ -97,7 +97,7 @@ class Reading:
     tape_end   the block that ends the tape
     templates  the templates found so far
     index      shape -> its template; for a block without a shape, its text and a line feed
-    rows       the template of each block so far
+    rows       the template of each block, as far as blocks are read: `done` of them
     reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
     first_line the line of the file on which the text begins
     """
@@ -110,10 +110,14 @@ class Reading:
     tape_end: int
     templates: list[Template] = field(default_factory=list)
     index: dict[bytes | None, int] = field(default_factory=dict)
-    rows: list[int] = field(default_factory=list)
+    rows: NDArray[np.int32] = field(init=False)
+    done: int = 0
     reach: Reach = field(default_factory=Reach)
     followed: int = 0
     first_line: int = 1
+
+    def __post_init__(self) -> None:
+        self.rows = np.empty(len(self.blocks), dtype=np.int32)
 
     def program(self) -> Program:
         """Read all parts, then what follows the end of the tape."""
@@ -125,7 +129,7 @@ class Reading:
             path=self.path,
             dialect=self.dialect,
             templates=tuple(self.templates),
-            template=np.array(self.rows, dtype=np.int32),
+            template=self.rows,
             blocks=self.blocks,
             first_number=np.concatenate(([0], np.cumsum(counts))),
             number_spans=spans,
@@ -145,25 +149,31 @@ class Reading:
     def part(self, first: int, stop: int) -> Columns:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
-        if found.group is not None:
-            numbers = [self.index.get(shape, -1) for shape in found.shapes]
-            if min(numbers) >= 0:
-                self.rows += np.array(numbers)[found.group].tolist()
-                return Columns(np.diff(found.first_number), found.spans + self.blocks[first, 0], found.values)
-            found = found.expanded()
+        known = list(map(self.index.get, found.shapes))
+        if None not in known:
+            shapes = np.array(known, dtype=np.int32)
+            self.take(shapes if found.group is None else shapes[found.group])
+            return Columns(np.diff(found.first_number), found.spans + self.blocks[first, 0], found.values)
+        found = found.expanded()
         exact: dict[int, Parsed] = {}
         for row, shape in enumerate(found.shapes):
-            known = self.index.get(shape)
-            self.rows.append(self.learn(first, row, found, exact) if known is None else known)
+            template = self.index.get(shape)
+            self.take(self.learn(first, row, found, exact) if template is None else template)
         counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
         return Columns(counts, spans + self.blocks[first, 0], values)
 
     def tail(self) -> Columns:
         """The blocks after the end of the tape."""
-        count = len(self.blocks) - len(self.rows)
+        count = len(self.blocks) - self.done
         if count:
-            self.rows += [self.number(b"\n", AFTER_TAPE.template)] * count
+            self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
         return Columns(np.zeros(count, np.int64), np.empty((0, 2), np.int64), np.empty(0))
+
+    def take(self, templates: NDArray[np.int32] | int) -> None:
+        """Note the templates of the next blocks, or the one of the next block."""
+        stop = self.done + (1 if isinstance(templates, int) else len(templates))
+        self.rows[self.done : stop] = templates
+        self.done = stop
 
     def scan(self, first: int, stop: int) -> Scan:
         """The shapes and numbers of a part; a line that is too long has no shape."""
@@ -224,7 +234,7 @@ class Reading:
 
     def in_doubt(self, block: int) -> bool:
         """Whether the control may never get to a block."""
-        for row in self.rows[self.followed : block]:
+        for row in self.rows[self.followed : block].tolist():
             self.reach.follow(self.templates[row])
         self.followed = block
         return self.reach.in_doubt

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,11 +92,11 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
 def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -> Scan:
     """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
     text = np.frombuffer(source, dtype=np.uint8)
-    starts, stops, last = comments_of(source)
     if fast.engaged():
-        found = scan_compiled(text, blocks, np.stack((starts, stops), axis=1), last, pointless)
+        found = scan_compiled(text, blocks, pointless)
         if found is not None:
             return found
+    starts, stops, last = comments_of(source)
     numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), starts, stops), FIXED)
     block_of_number = block_of(blocks, numbers.spans[:, 0])
     comment = np.full(len(blocks), -1, dtype=np.int64)
@@ -110,31 +111,22 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
     return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
 
 
-def scan_compiled(
-    text: NDArray[np.uint8],
-    blocks: NDArray[np.int64],
-    comments: NDArray[np.int64],
-    last: NDArray[np.bool_],
-    pointless: bool,
-) -> Scan | None:
-    """As `scan`, by the compiled kernels; None where there are blocks that must be taken as they are."""
+def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless: bool) -> Scan | None:
+    """As `scan`, compiled; None where there are blocks that must be taken as they are."""
     from ncfix.program import kernels
 
-    tables = NUMERIC, comments, FIXED, SIGN, UNSIGNED_AFTER, BLANK, BLANKS, EXACT_DIGITS
-    spans, values, kinds = kernels.numbers(text, *tables)
-    if kinds.any() or odd_blocks(text, blocks):
+    kinds = np.zeros(256, dtype=np.uint8)
+    for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (ODD, kernels.ODD)):
+        kinds[members] = kind
+    kinds[list(b"(;")] = kernels.COMMENT
+    tables = kinds, FIXED, UNSIGNED_AFTER, BLANK
+    marks = NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK
+    done, group, comment, first, spans, values, shapes, starts = kernels.scan(
+        text, blocks, tables, BLANKS, EXACT_DIGITS, marks
+    )
+    if done == kernels.UNTOUCHED:
         return None
-    marks = np.full(len(spans), NUMBER_MARK, dtype=np.uint8)
-    if pointless:
-        marks[without_point(text, spans)] = POINTLESS_MARK
-    ending = np.ascontiguousarray(comments[last])
-    marked, begins, hashes, first = kernels.shapes(text, blocks, spans, marks, ending, COMMENT_MARK)
-    _, model, group = np.unique(hashes, return_index=True, return_inverse=True)
-    if not kernels.alike(marked, begins, group, model):
-        return None
-    keys: list[bytes | None] = [marked[begins[block] : begins[block + 1]].tobytes() for block in model]
-    comment = np.full(len(blocks), -1, dtype=np.int64)
-    comment[block_of(blocks, ending[:, 0])] = ending[:, 0]
+    keys: list[bytes | None] = [shapes[slice(*edges)].tobytes() for edges in pairwise(starts.tolist())]
     return Scan(keys, comment, first, spans, values, group)
 
 

@@ -51,7 +51,7 @@ def steps_of(value: float, decimals: int) -> int:
     steps = abs(value) * POWERS[decimals]
     if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE):
         return -1
-    return np.int64(np.rint(steps))
+    return int(np.rint(steps))
 
 
 @njit(cache=True, nogil=True)
