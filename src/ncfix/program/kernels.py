@@ -171,11 +171,11 @@ def scan(
                 if place >= past:
                     break
                 character = text[place]
-        at = entry(table, code, shapes, begin, end, starts)
-        if table[at] < 0:
-            table[at] = known
+        found = entry(table, code, shapes, begin, end, starts)
+        if table[found] < 0:
+            table[found] = known
             known += 1
             starts[known] = end
-        group[block] = table[at]
+        group[block] = table[found]
     first[n] = count
     return n, group, comment, first, spans[:count].copy(), values[:count].copy(), shapes, starts[: known + 1]

@@ -22,7 +22,9 @@ from ncfix.program.numbers import (
     POINT,
     SIGN,
     UNSIGNED_AFTER,
+    fill,
     find_numbers,
+    is_numeric,
     table,
 )
 
@@ -97,18 +99,20 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
         if found is not None:
             return found
     starts, stops, last = comments_of(source)
-    numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), starts, stops), FIXED)
-    block_of_number = block_of(blocks, numbers.spans[:, 0])
+    numeric = is_numeric(text)
+    if len(starts):
+        numeric &= ~cover(len(text), starts, stops)
+    numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, starts[last])] = starts[last]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
     if pointless:
         marks[without_point(text, numbers.spans)] = POINTLESS_MARK
-    shapes = shape_keys(text, blocks, numbers.spans, np.stack((starts[last], stops[last]), axis=1), marks)
-    for block in {*block_of_number[numbers.broken].tolist(), *odd_blocks(text, blocks)}:
+    ending = np.stack((starts[last], stops[last]), axis=1)
+    shapes = shape_keys(text, blocks, numbers.spans, ending, marks, numbers.covered)
+    for block in {*block_of(blocks, numbers.spans[numbers.broken, 0]).tolist(), *odd_blocks(text, blocks)}:
         shapes[block] = None
-    first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
-    return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
 
 
 def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless: bool) -> Scan | None:
@@ -132,9 +136,16 @@ def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless:
 
 def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
     """The blocks that hold an `ODD` byte."""
-    places = np.flatnonzero(ODD[text])
+    suspicious = np.flatnonzero(text <= ord("\r"))
+    places = suspicious[ODD[text[suspicious]]]
     owner = block_of(blocks, places)
     return list(map(int, owner[places < blocks[owner, 1]]))
+
+
+def first_numbers(blocks: NDArray[np.int64], numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n + 1,) the first number of each block."""
+    starts = np.ascontiguousarray(numbers[:, 0])
+    return np.append(np.searchsorted(starts, blocks[:, 0]), len(starts))
 
 
 def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -164,17 +175,19 @@ def shape_keys(
     numbers: NDArray[np.int64],
     comments: NDArray[np.int64],
     marks: NDArray[np.uint8],
+    covered: NDArray[np.bool_] | None = None,
 ) -> list[bytes | None]:
-    """The key of each block: its bytes, with one mark for each number and for the comment at its end."""
-    keep = cover(len(text) + 1, blocks[:, 0], blocks[:, 1])
-    for spans in (numbers, comments):
-        keep[:-1] &= ~cover(len(text), spans[:, 0], spans[:, 1])
-    marked = np.append(text, ord("\n")).astype(np.uint8)
-    marked[numbers[:, 0]] = marks
-    marked[comments[:, 0]] = COMMENT_MARK
-    marked[blocks[:, 1]] = ord("\n")
-    for places in (numbers[:, 0], comments[:, 0], blocks[:, 1]):
-        keep[places] = True
+    """The key of each block: its bytes, with one mark for each number and for the comment at its end.
+
+    covered  (n,) the bytes that belong to numbers, if they are known already
+    """
+    keep = np.append(~cover(len(text), *numbers.T) if covered is None else ~covered, True)
+    if len(comments):
+        keep[:-1] &= ~cover(len(text), *comments.T)
+    marked = np.append(text, np.uint8(ord("\n")))
+    for places, mark in ((numbers[:, 0], marks), (comments[:, 0], COMMENT_MARK), (blocks[:, 1], ord("\n"))):
+        marked[places], keep[places] = mark, True
+    fill(keep, np.stack((np.append(0, blocks[:, 1] + 1), np.append(blocks[:, 0], len(text) + 1)), axis=1), False)
     return list(marked[keep].tobytes().split(b"\n")[: len(blocks)])
 
 
