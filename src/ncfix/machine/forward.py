@@ -31,14 +31,15 @@ class Joint:
 
     def at(self, position: Array, small: Mapping[Slot, Array]) -> JointPose:
         """The joint at a position (n,), with the small motions worked out for these poses."""
-        location, offset = self._location(small)
-        error = self._composed(self.motion, small, position)
-        carried = self._composed(self.carried, small, None)
+        location, offset = self.axis_line(small)
+        error = self.together(self.motion, small, position)
+        carried = self.together(self.carried, small, None)
         return JointPose(self.axis, position if offset is None else position + offset, error, location, carried)
 
-    def _composed(
+    def together(
         self, slots: tuple[Slot, ...], small: Mapping[Slot, Array], position: Array | None
     ) -> SmallMotion | None:
+        """The small motion that slots make together at positions (n,); None: with the axis at zero."""
         if not slots:
             return None
         terms = [(self._turned(small[slot], position), self._carried_along(slot, position)) for slot in slots]
@@ -59,7 +60,7 @@ class Joint:
         turned = advance(self.axis, position, pair, weight=0.0)
         return np.concatenate([turned[:, 0], turned[:, 1]])
 
-    def _location(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
+    def axis_line(self, small: Mapping[Slot, Array]) -> tuple[SmallMotion | None, Array | None]:
         """The motion of the axis line, and the zero offset: the component along or about the axis itself."""
         if not self.location or self.axis is None:
             return None, None

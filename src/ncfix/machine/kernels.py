@@ -11,9 +11,17 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from ncfix.machine import loops, steps
+
 Array = NDArray[np.float64]
+
+for function in (*steps.FORMULAS, *loops.HELPERS):
+    register_jitable(function)
+tips = njit(cache=True, nogil=True, error_model="numpy")(loops.tips)
+follows = njit(cache=True, nogil=True, error_model="numpy")(loops.follows)
 
 
 @njit(inline="always")

@@ -17,9 +17,11 @@ from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects
 from ncfix.machine.forward import Chain, build_chain, carry
 from ncfix.machine.jacobian import Jacobians
+from ncfix.machine.route import Route, route_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.signals import with_lags
 from ncfix.machine.state import Poses, State, flatten
+from ncfix.machine.steps import SMALL
 from ncfix.machine.transport import columns
 
 POSE_COLUMNS = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -99,6 +101,14 @@ class Machine:
     @cached_property
     def _chain(self) -> Chain:
         return build_chain(self.axes, self._model)
+
+    @cached_property
+    def _route(self) -> Route | None:
+        return route_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
+
+    @cached_property
+    def _perfect_route(self) -> Route | None:
+        return route_of(self.axes, self.tool, self._chain.joints, None, self.workpiece_offset)
 
     @cached_property
     def hash(self) -> str:
@@ -208,12 +218,24 @@ class Machine:
         return shape, with_lags(poses, model.signals)
 
     def _tip(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
+        route = self._perfect_route if model is None else self._route
+
         def tips(part: Poses) -> Array:
-            start = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
-            tip: Array = carry(self._chain.at(part, model), start) - columns(self.workpiece_offset)
-            return tip
+            if route is None:
+                return self._carried_tips(part, model)
+            tip, largest = route.tips(part)
+            large = np.flatnonzero(largest >= SMALL)
+            if large.size:
+                tip[:, large] = self._carried_tips(part, model)[:, 0, large]
+            return tip[:, None]
 
         return self._evaluated(tips, q, state, model, 1)[..., 0]
+
+    def _carried_tips(self, part: Poses, model: ErrorModel | None) -> Array:
+        """The tip by any chain, with small motions of any size, (3, 1, n)."""
+        start = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
+        tip: Array = carry(self._chain.at(part, model), start) - columns(self.workpiece_offset)
+        return tip
 
     def _pose(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
         def poses(part: Poses) -> Array:

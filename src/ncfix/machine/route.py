@@ -1,0 +1,238 @@
+"""The way of the tool tip through a machine, written out as numbers: what `steps` go by.
+
+Motions that are the same at all poses are worked into the steps when the route is made: where the axes really lie,
+their zero offsets, the workpiece offset. Each is moved ahead of the steps before it, which are seen from behind it from
+then on, until it has arrived at the tip of the tool. So a pose costs little more than on a machine without such errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ncfix import fast
+from ncfix.machine import se3, steps
+from ncfix.machine.axis import Axis, Tool, Vector
+from ncfix.machine.error_model import ErrorModel, Group, Slot
+from ncfix.machine.forward import Joint, lies_on_axis
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import Poses
+from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Steps
+from ncfix.machine.terms import Place, Terms, terms_of
+from ncfix.machine.transport import SmallMotion, columns, versine
+
+
+@dataclass(frozen=True)
+class Route:
+    """The steps of a machine in two forms: lists, to go through with columns, and arrays for compiled kernels.
+
+    terms   what the small motions are made of
+    rotary  the columns of the rotary axes
+    """
+
+    plain: tuple[Steps, Functions]
+    compiled: tuple[Steps, Functions]
+    terms: Terms
+    rotary: tuple[int, ...]
+
+    def tips(self, poses: Poses) -> tuple[Array, Array]:
+        """The tip (3, n), and the largest squared angle of a small motion at each pose (n,)."""
+        sine, versed = self.turns(poses)
+        given, n = self.terms.given(poses), poses.positions.shape[1]
+        if _are_many(n):
+            from ncfix.machine import kernels
+
+            stack = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
+            return kernels.tips(*self.compiled, poses.tool_length, poses.positions, sine, versed, stack)
+        legs, functions = self.plain
+        found, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
+        steps.work_out_functions(functions, poses.positions, sine, versed, given, found)
+        steps.add_up(functions, found, values)
+        tip, largest = np.empty((3, n)), np.zeros(n)
+        *point, largest = steps.carried(legs, values, poses.tool_length, poses.positions, sine, versed, largest)
+        tip[0], tip[1], tip[2] = point
+        return tip, largest
+
+    def follows(self, poses: Poses, axes: Sequence[int]) -> Array:
+        """How the tip follows linear axes, (3, axes, n) mm per mm; of a route without errors."""
+        sine, versed = self.turns(poses)
+        if _are_many(poses.positions.shape[1]):
+            from ncfix.machine import kernels
+
+            return kernels.follows(self.compiled[0], np.array(axes), sine, versed)
+        out = np.empty((3, len(axes), poses.positions.shape[1]))
+        for place, axis in enumerate(axes):
+            out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, sine, versed)
+        return out
+
+    def turns(self, poses: Poses) -> tuple[Array, Array]:
+        """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""
+        q, held = poses.positions, self.terms.held
+        sine, versed = (np.empty((len(q) + len(held), q.shape[1])) for _ in range(2))
+        for axis in self.rotary:
+            np.sin(q[axis], out=sine[axis])
+            versed[axis] = versine(q[axis])
+        for row, (axis, low, high) in enumerate(held, start=len(q)):
+            angle = np.minimum(np.maximum(q[axis], low), high)
+            if (angle == q[axis]).all():
+                sine[row], versed[row] = sine[axis], versed[axis]
+            else:
+                sine[row], versed[row] = np.sin(angle), versine(angle)
+        return sine, versed
+
+
+def _are_many(n: int) -> bool:
+    return fast.engaged() and n > 1
+
+
+def route_of(
+    axes: tuple[Axis, ...], tool: Tool, joints: tuple[Joint, ...], model: ErrorModel | None, offset: Vector
+) -> Route | None:
+    """The route through joints with the errors of a model, or without; None where it cannot be written as steps.
+
+    That is where the place of an axis changes from pose to pose, and where errors of a rotary axis refer to several
+    points of which one does not lie on it.
+    """
+    groups = () if model is None else model.groups
+    links: list[Link] = []
+    for index in reversed(range(len(joints))):
+        own = _forth(index, joints[index], groups) if model is not None else _nominal(index, joints[index])
+        if own is None:
+            return None
+        axis = joints[index].axis
+        links += [link.undone() for link in reversed(own)] if axis is not None and axis.workpiece_side else own
+    links.append(Link(rigid=se3.shift(-np.asarray(offset))))
+    found, ahead = _constants_ahead(links)
+    places = [Place(link.slots, link.seen_from[:3, :3]) for link in found if link.slots]
+    functions, terms = terms_of(axes, groups, places)
+    start = np.array([ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)])
+    legs = _numbers(start, found)
+    listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
+    return Route(listed, (legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One step, not yet as numbers; `axis`, `direction`, `point` and `center` as in `Steps`.
+
+    slots      of a small motion: those whose sum it is
+    seen_from  (4, 4) takes what it is given in to what it is done in
+    rigid      (4, 4) a motion that is the same at all poses; the rest means nothing then
+    """
+
+    kind: int = SHIFT
+    axis: int = -1
+    direction: Array = field(default_factory=lambda: np.zeros(3))
+    point: Array = field(default_factory=lambda: np.zeros(3))
+    center: Array = field(default_factory=lambda: np.zeros(3))
+    slots: tuple[Slot, ...] = ()
+    rotates: bool = False
+    seen_from: Array = field(default_factory=lambda: np.eye(4))
+    rigid: Array | None = None
+
+    def undone(self) -> Link:
+        """The step that undoes it."""
+        if self.rigid is not None:
+            return replace(self, rigid=se3.inverse(self.rigid))
+        return replace(self, kind=BACK) if self.slots else replace(self, direction=-self.direction)
+
+    def behind(self, motion: Array) -> Link:
+        """The step as it is done when `motion` has been done before it, and no longer after it."""
+        turn, way = motion[:3, :3], motion[:3, 3]
+        point, center = turn @ self.point + way, turn @ self.center + way
+        return replace(self, direction=turn @ self.direction, point=point, center=center, seen_from=motion)
+
+
+def _nominal(index: int, joint: Joint) -> list[Link]:
+    """What a joint does to what lies outward of it."""
+    axis = joint.axis
+    if axis is None:
+        return []
+    return [Link(TURN if axis.rotary else SHIFT, index, np.asarray(axis.direction), np.asarray(axis.point))]
+
+
+def _forth(index: int, joint: Joint, groups: tuple[Group, ...]) -> list[Link] | None:
+    """The same with its errors; None where it cannot be written as steps."""
+    placed = (*joint.location, *joint.carried)
+    if any(slot in group.slots and _varies(group) for group in groups for slot in placed):
+        return None
+    moving = _error_motion(index, joint)
+    if moving is None:
+        return None
+    small = {slot: _constant(slot, groups) for slot in placed}
+    line, zero = joint.axis_line(small)
+    carried = joint.together(joint.carried, small, None)
+    links = list(moving)
+    if zero is not None and joint.axis is not None:
+        links.insert(0, Link(rigid=joint.axis.motion(zero[0])))
+    if line is not None:
+        links = [Link(rigid=se3.inverse(_rigid(line))), *links, Link(rigid=_rigid(line))]
+    return links if carried is None else [*links, Link(rigid=_rigid(carried))]
+
+
+def _error_motion(index: int, joint: Joint) -> list[Link] | None:
+    """The motion of a joint and its error motion, in the order in which the center of the error motion stays in place.
+
+    The error motion of a linear axis, or in a frame that turns with its axis, is the same before the motion of the axis
+    about its center as it is with all axes at zero.
+    """
+    axis, moved = joint.axis, _nominal(index, joint)
+    if not joint.motion:
+        return moved
+    center = np.asarray(joint.motion[0].reference)
+    small = Link(FORTH, center=center, slots=joint.motion, rotates=any(slot in joint.rotating for slot in joint.motion))
+    if axis is None or not axis.rotary or axis.moving_frame:
+        return [small, *moved]
+    if not all(lies_on_axis(axis, columns(slot.reference)) for slot in joint.motion):
+        if len(joint.motion) > 1:
+            return None
+        small = replace(small, axis=index, direction=moved[0].direction, point=moved[0].point)
+    return [*moved, small]
+
+
+def _varies(group: Group) -> bool:
+    return group.signal is not None or group.factor is not None
+
+
+def _constant(slot: Slot, groups: tuple[Group, ...]) -> Array:
+    """A small motion that is the same at all poses, (6, 1)."""
+    total = np.zeros((6, 1))
+    for group in groups:
+        if slot in group.slots:
+            total += group.gains[group.slots.index(slot)] @ group.basis.rows(np.zeros(1), np.zeros(1))
+    return total
+
+
+def _rigid(small: SmallMotion) -> Array:
+    """A small motion of one pose as a matrix."""
+    way, turn = (np.zeros(3) if part is None else part.ravel() for part in (small.translation, small.rotation))
+    motion: Array = se3.shift(way) @ se3.turn(turn, small.center.ravel())
+    return motion
+
+
+def _constants_ahead(links: list[Link]) -> tuple[list[Link], Array]:
+    """The steps without those that are the same at all poses, and the motion (4, 4) to be done before them instead."""
+    found, ahead = [], np.eye(4)
+    for link in reversed(links):
+        if link.rigid is not None:
+            ahead = ahead @ link.rigid
+        else:
+            found.append(link.behind(ahead))
+    return found[::-1], ahead
+
+
+def _numbers(start: Array, links: list[Link]) -> Steps:
+    small = np.cumsum([bool(link.slots) for link in links]) - 1
+    return Steps(
+        start.ravel(),
+        np.array([link.kind for link in links], dtype=np.int64),
+        np.array([link.axis for link in links], dtype=np.int64),
+        np.array([link.direction for link in links]).ravel(),
+        np.array([link.point for link in links]).ravel(),
+        np.array([link.center for link in links]).ravel(),
+        np.where([bool(link.slots) for link in links], small, -1).astype(np.int64),
+        np.array([link.rotates for link in links], dtype=np.int64),
+        np.array([len(link.slots) > 1 for link in links], dtype=np.int64),
+    )

@@ -1,0 +1,216 @@
+"""The tool tip carried through a machine step by step: formulas for numbers and for columns of numbers alike.
+
+The plain way gives them columns, many poses at a time; the compiled way (`kernels`) gives them numbers, pose after
+pose. Since both go through the same operations in the same order, and sines come from numpy in both, the results are
+the same to the last bit, and those of a pose do not depend on what other poses are worked out together with it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+Number = Any
+"""A number, or a column of numbers (n,)."""
+Numbers = Any
+"""A row of them: an array of numbers, or a sequence of columns."""
+Sequence = Any
+"""An array, or a list (faster to go through where nothing is compiled)."""
+
+SHIFT, TURN, FORTH, BACK = 0, 1, 2, 3
+"""Kinds of steps: along a linear axis, about a rotary axis, by a small motion, and back by one."""
+POWERS, WAVES, GIVEN = 0, 1, 2
+"""Kinds of functions: powers of an axis position, harmonics of a rotary axis, and columns that come from elsewhere."""
+PARTS = 9
+"""Numbers of a small motion: translation, rotation vector, velocity of the center by rotations about other points."""
+SMALL = 0.0064
+"""rad^2; squared angles of small motions below which the power series are exact to double precision."""
+
+
+class Steps(NamedTuple):
+    """Steps from the tool tip to the workpiece, m of them, in order.
+
+    start      (6,) the tip of a tool of no length, mm, and what each mm of length adds
+    kind       (m,) SHIFT, TURN, FORTH or BACK
+    axis       (m,) that moves; of a small motion the rotary axis that carries its center along, -1 for none
+    direction  (3 m,) of that axis
+    point      (3 m,) on that axis, mm
+    center     (3 m,) of a small motion, mm
+    small      (m,) which small motion, -1 for none
+    rotates    (m,) the small motion is more than a translation
+    screws     (m,) it has rotations about several points
+    """
+
+    start: Sequence
+    kind: Sequence
+    axis: Sequence
+    direction: Sequence
+    point: Sequence
+    center: Sequence
+    small: Sequence
+    rotates: Sequence
+    screws: Sequence
+
+
+class Functions(NamedTuple):
+    """What small motions are made of: f functions in g groups, and t terms, each gain times function.
+
+    family    (g,) POWERS, WAVES or GIVEN
+    axis      (g,) whose position is the signal, -1 for none
+    signal    (5 g,) unit, low, high, center, scale: u = (x - center) / scale, x = position / unit held in the range
+    first     (g + 1,) the first function of each group
+    order     (f,) the power or harmonic, ascending; of harmonics the cosine comes first, then the sine
+    part      (t,) the number that the term adds to: `PARTS` times the small motion, plus its place there; ascending
+    function  (t,) the function
+    gain      (t,) mm or rad
+    """
+
+    family: Sequence
+    axis: Sequence
+    signal: Sequence
+    first: Sequence
+    order: Sequence
+    part: Sequence
+    function: Sequence
+    gain: Sequence
+
+
+def turned(x: Number, y: Number, z: Number, d: Numbers, p: Numbers, at: int, sine: Number, versine: Number) -> Any:
+    """A point turned about an axis whose direction and point stand in d and p from `at`; versine is 1 - cosine."""
+    dx, dy, dz = d[at], d[at + 1], d[at + 2]
+    ex, ey, ez = twice_crossed(dx, dy, dz, sine, versine, x - p[at], y - p[at + 1], z - p[at + 2])
+    return x + ex, y + ey, z + ez
+
+
+def factors(s: Number) -> Any:
+    """The factors of Rodrigues' formula, sin a / a and (1 - cos a) / a^2, for small squared angles s."""
+    first = 1 - s * (1 / 6) * (1 - s * (1 / 20) * (1 - s * (1 / 42) * (1 - s * (1 / 72))))
+    second = 0.5 - s * (1 / 24) * (1 - s * (1 / 30) * (1 - s * (1 / 56) * (1 - s * (1 / 90))))
+    return first, second
+
+
+def screw_factor(s: Number) -> Any:
+    """The factor (a - sin a) / a^3 of a screw's translation, for small squared angles s."""
+    return 1 / 6 - s * (1 / 120) * (1 - s * (1 / 42) * (1 - s * (1 / 72) * (1 - s * (1 / 110))))
+
+
+def twice_crossed(u: Number, v: Number, w: Number, a: Number, b: Number, x: Number, y: Number, z: Number) -> Any:
+    """a times (u v w) x (x y z), plus b times (u v w) x that product."""
+    ox, oy, oz = v * z - w * y, w * x - u * z, u * y - v * x
+    tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
+    return a * ox + b * tx, a * oy + b * ty, a * oz + b * tz
+
+
+def held_signal(position: Number, unit: float, low: float, high: float, center: float, scale: float) -> Number:
+    """What a power is taken of: u = (x - center) / scale with x = position / unit, held at the ends of its range."""
+    return (np.minimum(np.maximum(position / unit, low), high) - center) / scale
+
+
+def next_wave(c: Number, s: Number, cosine: Number, sine: Number) -> Any:
+    """Cosine and sine of an angle that is larger by the one with this cosine and sine."""
+    return c * cosine - s * sine, s * cosine + c * sine
+
+
+def work_out_functions(
+    functions: Functions, q: Numbers, sine: Numbers, versine: Numbers, given: Numbers, found: Numbers
+) -> None:
+    """Put the functions at axis positions q into `found`; `given` are those that come from elsewhere, in order."""
+    used = 0
+    for g in range(len(functions.family)):
+        axis = functions.axis[g]
+        if functions.family[g] == GIVEN:
+            for f in range(functions.first[g], functions.first[g + 1]):
+                found[f] = given[used]
+                used += 1
+        elif functions.family[g] == POWERS:
+            u = held_signal(q[axis], *functions.signal[5 * g : 5 * g + 5])
+            power, value = 1, u
+            for f in range(functions.first[g], functions.first[g + 1]):
+                while power < functions.order[f]:
+                    power, value = power + 1, value * u
+                found[f] = value if functions.order[f] > 0 else 1.0
+        else:
+            cosine, k = 1 - versine[axis], 1
+            c, s = cosine, sine[axis]
+            for f in range(functions.first[g], functions.first[g + 1], 2):
+                while k < functions.order[f]:
+                    k += 1
+                    c, s = next_wave(c, s, cosine, sine[axis])
+                found[f], found[f + 1] = c, s
+
+
+def add_up(functions: Functions, found: Numbers, values: Numbers) -> None:
+    """Put the numbers of the small motions into `values`; those without any term are left as they are."""
+    last = -1
+    for t in range(len(functions.part)):
+        part, term = functions.part[t], functions.gain[t] * found[functions.function[t]]
+        if part == last:
+            values[part] = values[part] + term
+        else:
+            values[part] = term
+        last = part
+
+
+def carried(
+    steps: Steps, values: Numbers, length: Number, q: Numbers, sine: Numbers, versine: Numbers, largest: Number
+) -> Any:
+    """Where the tip of a tool of this length goes: x, y, z, and the largest squared angle of a small motion.
+
+    values         the numbers of the small motions
+    q              axis positions, mm and rad
+    sine, versine  of the rotary ones
+    largest        zero
+    """
+    start, d, center = steps.start, steps.direction, steps.center
+    x, y, z = start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
+    for i in range(len(steps.kind)):
+        kind, axis, j = steps.kind[i], steps.axis[i], 3 * i
+        if kind == SHIFT:
+            way = q[axis]
+            x, y, z = x + d[j] * way, y + d[j + 1] * way, z + d[j + 2] * way
+        elif kind == TURN:
+            x, y, z = turned(x, y, z, d, steps.point, j, sine[axis], versine[axis])
+        else:
+            at = PARTS * steps.small[i]
+            tx, ty, tz = values[at], values[at + 1], values[at + 2]
+            if not steps.rotates[i]:
+                sign = 1.0 if kind == FORTH else -1.0
+                x, y, z = x + sign * tx, y + sign * ty, z + sign * tz
+            else:
+                u, v, w = values[at + 3], values[at + 4], values[at + 5]
+                s = u * u + v * v + w * w
+                largest = np.maximum(largest, s)
+                first, second = factors(s)
+                if steps.screws[i]:
+                    a, b, c = values[at + 6], values[at + 7], values[at + 8]
+                    ex, ey, ez = twice_crossed(u, v, w, second, screw_factor(s), a, b, c)
+                    tx, ty, tz = tx + (a + ex), ty + (b + ey), tz + (c + ez)
+                a, b, c = center[j], center[j + 1], center[j + 2]
+                if axis >= 0:
+                    a, b, c = turned(a, b, c, d, steps.point, j, sine[axis], versine[axis])
+                if kind == FORTH:
+                    ex, ey, ez = twice_crossed(u, v, w, first, second, x - a, y - b, z - c)
+                    x, y, z = x + ex + tx, y + ey + ty, z + ez + tz
+                else:
+                    x, y, z = x - tx, y - ty, z - tz
+                    ex, ey, ez = twice_crossed(-u, -v, -w, first, second, x - a, y - b, z - c)
+                    x, y, z = x + ex, y + ey, z + ez
+    return x, y, z, largest
+
+
+def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
+    """How the tip follows the linear axis with this column, along x, y, z; by the steps without errors."""
+    x, y, z, found, d = 0.0, 0.0, 0.0, False, steps.direction
+    for i in range(len(steps.kind)):
+        axis, j = steps.axis[i], 3 * i
+        if steps.kind[i] == SHIFT and axis == column:
+            x, y, z, found = d[j], d[j + 1], d[j + 2], True
+        elif steps.kind[i] == TURN and found:
+            ex, ey, ez = twice_crossed(d[j], d[j + 1], d[j + 2], sine[axis], versine[axis], x, y, z)
+            x, y, z = x + ex, y + ey, z + ez
+    return x, y, z
+
+
+FORMULAS = (turned, factors, screw_factor, twice_crossed, held_signal, next_wave, carried, follows)
+"""What compiled kernels are made of, too."""
