@@ -111,7 +111,7 @@ class Fanuc(Control):
             text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
             raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
         area = settings["fit"] == "area"
-        volume = Volume(request.machine, AXES, request.space, request.tool_length, area)
+        volume = Volume.of(request.machine, AXES, request.space, request.tool_length, area)
         rounding = _magnification(volume.grid([4] * 3).values, style.largest * unit) * unit / 2
         mesh = search(volume, max(request.target - rounding, request.target / 2), [SIDE] * 3, SIDE**3)
         if not mesh.reached:

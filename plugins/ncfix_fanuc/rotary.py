@@ -180,9 +180,9 @@ class FanucRotary(Control):
             raise RefusedError.of("NCF484", f"the grid is over X, Y and Z; the machine has {machine.axis_names}")
         if not np.allclose(machine.tool.direction, (0, 0, 1), atol=1e-9):
             raise RefusedError.of("NCF484", "the tool of this machine is not along Z", hint="use the control fanuc")
-        mesh = search(Volume(machine, AXES, request.space, request.tool_length), request.target, [SIDE] * 3, SIDE**3)
+        mesh = search(Volume.of(machine, AXES, request.space, request.tool_length), request.target, [SIDE] * 3, SIDE**3)
         counts = mesh.grid.counts
-        bare, long = (Volume(machine, AXES, request.space, length).grid(counts) for length in (0.0, LENGTH))
+        bare, long = (Volume.of(machine, AXES, request.space, length).grid(counts) for length in (0.0, LENGTH))
         order = [bare.outputs.index(axis) for axis in AXES]
         lever = (long.values - bare.values)[..., order] / LENGTH
         angles = np.stack([lever[..., 1], -lever[..., 0], np.zeros(counts)], axis=-1)

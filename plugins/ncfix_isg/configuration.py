@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
@@ -21,17 +21,17 @@ FORMAT = "ISG_CSV"
 MOST_FILES = 10
 
 
-def config_text(numbers: Mapping[str, int], folder: str, file: str, filter_steps: int) -> bytes:
-    """The list: axis numbers, switches, and the one file."""
+def config_text(numbers: Mapping[str, int], folder: str, names: Sequence[str], filter_steps: int) -> bytes:
+    """The list: axis numbers, switches, and the files."""
     joint = "" if folder.endswith(("\\", "/")) else "\\"
     entries = {
         **HEAD,
         **{name: str(number) for name, number in numbers.items()},
         **TAIL,
         "filter_steps": str(filter_steps),
-        "file[0]": f"{folder}{joint}{file}",
-        "file_format[0]": FORMAT,
     }
+    for number, name in enumerate(names):
+        entries |= {f"file[{number}]": f"{folder}{joint}{name}", f"file_format[{number}]": FORMAT}
     return "".join(f"{name:<24}{value}\n" for name, value in entries.items()).encode()
 
 

@@ -1,26 +1,36 @@
-"""VOLCOMP of the ISG kernel and Beckhoff TwinCAT CNC (TF5280): a configuration list and a grid in ISG_CSV.
+"""VOLCOMP of the ISG kernel and Beckhoff TwinCAT CNC (TF5280): a configuration list and grids in ISG_CSV.
 
-The grid holds the error of each linear axis over all axes that matter, rotary ones too, so that the kinematic model of
-the control is not needed: with `workpiece_axes 0` and no angles the control takes EXX off the command of X, EYY off
-that of Y and EZZ off that of Z. What the grid says is therefore ncfix's exact correction with the opposite sign.
+Grids hold the error of each linear axis over the axes that matter, rotary ones too, so that the kinematic model of the
+control is not needed: with `workpiece_axes 0` and no angles the control takes EXX, EXY and EXZ off the command of X,
+and so on. What the grids say together is therefore ncfix's exact correction with the opposite sign. Over more than
+three axes one grid takes more nodes than are worth it; then each linear axis has up to three grids, over fewer axes
+each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.exact import reversal_note
+from ncfix.tables.faces import faces, searched
+from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
-from ncfix.tables.mesh import Mesh, search
+from ncfix.tables.mesh import AIM, search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, read_configuration
-from ncfix_isg.csv_file import grid_text, read_grids
+from ncfix_isg.csv_file import grid_text, parameters, read_grids
 
-TABLE = "volcomp0.csv"
+TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
+LINEAR = "XYZ"
+CHOICES = {"fit": ("nodes", "area"), "steps": ("uneven", "even"), "grids": ("auto", "one", "sum")}
+ONE = 3
+"""Up to so many inputs a single grid does."""
 
 
 class Isg(Control):
@@ -39,16 +49,16 @@ class Isg(Control):
         bidirectional=False,
         max_points=1_000_000,
         max_tables=50,
-        combine="sum of the files of a compensation",
+        combine="sum: EXX, EXY and EXZ are all in the direction of X",
     )
     assumptions = (
         Assumption(
             "ISG-1",
-            "With workpiece_axes 0 and no angular parameters the control takes EXX, EYY and EZZ off the commands of X, "
-            "Y and Z as they are.",
-            "TF5280 documentation: values are errors",
+            "With workpiece_axes 0 and no angular parameters the control takes EXX, EXY and EXZ off the command of X "
+            "as they are, all together, and so with Y and Z.",
+            "TF5280 documentation: values are errors; component errors of an axis may depend on other axes, too",
             "so",
-            "Load a grid with EXX 0.010 everywhere: X must move by 0.010 mm towards minus.",
+            "Load two grids, EXX 0.010 and EXY 0.005 everywhere: X must move by 0.015 mm towards minus.",
         ),
         Assumption(
             "ISG-2",
@@ -64,18 +74,28 @@ class Isg(Control):
             "numbers 1, 2, 3, ... in the order X Y Z A B C of the axes that the machine has",
             "The control reports unknown names with error 70468; --set axes=X:1,Y:2,... gives other numbers.",
         ),
+        Assumption(
+            "ISG-4",
+            "The steps of a grid need not be even.",
+            "TF5280 documentation: GRID expects the values on a grid, whose positions the file gives one by one; of "
+            "even steps it says nothing",
+            "uneven",
+            "The control reports error 70471 if it wants even steps: --set steps=even.",
+        ),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "folder": Option("C:\\vc", "where the control finds the grid file"),
         "axes": Option("", "logical axis numbers, e.g. X:1,Y:2,Z:3,B:4,C:5"),
         "filter_steps": Option("20", "over how many cycles the control spreads a change"),
         "fit": Option("nodes", "nodes: exact at the nodes; area: least squares over what is around them"),
-        "points": Option("20000", "most nodes of the grid; vol_comp[0].max_records must allow them"),
+        "grids": Option("auto", "one: a grid over all axes that matter; sum: several over fewer axes each; or auto"),
+        "steps": Option("uneven", "uneven: nodes where the error bends; even: evenly spaced (ISG-4)"),
+        "points": Option("20000", "most nodes in all; vol_comp[0].max_records must allow them"),
     }
     steps = (
-        "Copy the grid file to the folder that file[0] of volcomp.lis names.",
+        "Copy the grid files, volcomp0.csv and on, to the folder that volcomp.lis names.",
         "Enter volcomp.lis in the start-up list as vol_comp[0].file_name; vol_comp[0].max_records must be at least the "
-        "number of nodes.",
+        "number of nodes of all files.",
         "Start the control, home all axes, and switch on: #VOLCOMP ON [ID0].",
         "Read the compensation values at one pose and compare them with ncfix emulate.",
         "Measure one line again: the error must have become smaller, not twice as large.",
@@ -83,22 +103,24 @@ class Isg(Control):
     switch_off = "#VOLCOMP OFF in the program, or take vol_comp[0] out of the start-up list."
 
     def write(self, request: Request) -> Written:
-        """`volcomp.lis` and one grid over the axes that matter."""
+        """`volcomp.lis` and the grids over the axes that matter."""
         settings = self.settings(request.settings)
         most = _whole(settings, "points", 8)
         filter_steps = _whole(settings, "filter_steps", 0)
         numbers = _numbers(request, settings["axes"])
+        for key, allowed in CHOICES.items():
+            if settings[key] not in allowed:
+                raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=" or ".join(allowed))
         inputs = inputs_that_matter(request.machine, request.space, request.tool_length)
         inputs = tuple(sorted(inputs, key=LETTERS.index))
-        if settings["fit"] not in ("nodes", "area"):
-            raise UsageError.of("NCF485", f"fit={settings['fit']}", hint="nodes or area")
-        volume = Volume(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")
-        mesh = search(volume, request.target, [most] * len(inputs), most)
-        files = {
-            CONFIG: config_text(numbers, settings["folder"], TABLE, filter_steps),
-            TABLE: grid_text(mesh.grid),
-        }
-        return Written(files, _notes(mesh, request.target))
+        volume = Volume.of(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")
+        volume.uneven = settings["steps"] == "uneven"
+        made = _made(volume, AIM * request.target, most, settings["grids"])
+        names = [TABLE.format(number) for number in range(len(made.grids))]
+        files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps)}
+        for name, owners, grid in zip(names, made.owners, made.grids, strict=True):
+            files[name] = grid_text(grid, owners)
+        return Written(files, tuple(_notes(made, request)))
 
     def read(self, files: Files) -> Compensation:
         """As the control would take them. Raises `ConfigError` NCF491."""
@@ -116,6 +138,27 @@ class Isg(Control):
         names, config = read_configuration(files)
         grids, remarks = read_grids(names, files)
         return Compensation(tuple(Term((grid,)) for grid in grids)), [config, *remarks]
+
+
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """Grids, with the axis whose error the parameters of each are called, and what they miss together, mm."""
+
+    grids: tuple[Grid, ...]
+    owners: tuple[str, ...]
+    left: float
+
+
+def _made(volume: Volume, target: float, most: int, how: str) -> _Made:
+    """One grid, or several whose sum is the correction."""
+    found = None
+    if how == "sum" or (how == "auto" and len(volume.inputs) > ONE):
+        found = faces(volume, [volume.inputs.index(axis) for axis in LINEAR], target)
+    if found is None:
+        mesh = search(volume, target, [most] * len(volume.inputs), most)
+        return _Made((mesh.grid,), ("",), mesh.left)
+    made = searched(volume, found, target, most)
+    return _Made(made.grids, tuple(volume.inputs[face.owner] for face in made.faces), made.left)
 
 
 def _numbers(request: Request, given: str) -> dict[str, int]:
@@ -141,12 +184,12 @@ def _whole(settings: Mapping[str, str], key: str, low: int) -> int:
     return int(text)
 
 
-def _notes(mesh: Mesh, target: float) -> tuple[str, ...]:
-    counts = " x ".join(f"{name} {count}" for name, count in zip(mesh.grid.inputs, mesh.grid.counts, strict=True))
-    notes = [f"Grid {counts}: {mesh.grid.points} nodes; it misses {1e3 * mesh.left:.2f} um at most between them."]
-    if not mesh.reached:
-        notes.append(
-            f"The target of {1e3 * target:g} um is not reached with the nodes allowed: --set points=N allows more."
-        )
-    notes.append("The orientation of the tool is not corrected.")
-    return tuple(notes)
+def _notes(made: _Made, request: Request) -> Iterator[str]:
+    for grid, owner in zip(made.grids, made.owners, strict=True):
+        counts = " x ".join(f"{name} {count}" for name, count in zip(grid.inputs, grid.counts, strict=True))
+        yield f"Grid {counts}: {grid.points} nodes for {', '.join(parameters(grid, owner))}."
+    yield f"Together they miss {1e3 * made.left:.2f} um at most between the nodes."
+    if made.left > request.target:
+        yield f"The target of {1e3 * request.target:g} um takes more nodes than are allowed: --set points=N."
+    yield from reversal_note(request.machine, request.space, request.tool_length)
+    yield "The orientation of the tool is not corrected."

@@ -23,13 +23,18 @@ STEEP = 0.01
 """mm per mm or degree."""
 
 
-def grid_text(grid: Grid) -> bytes:
+def parameters(grid: Grid, owner: str = "") -> list[str]:
+    """The names of its values: errors in the directions of its outputs, of an axis or each of its own."""
+    return [f"E{name}{owner or name}" for name in grid.outputs]
+
+
+def grid_text(grid: Grid, owner: str = "") -> bytes:
     """The file of a grid of corrections: errors, that is the opposite, in mm; positions in mm and degree."""
     units = [DEGREE if name in ANGLES else 1.0 for name in grid.inputs]
     lines = [nodes / unit for nodes, unit in zip(grid.nodes, units, strict=True)]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
     values = np.round(-grid.values.reshape(-1, len(grid.outputs)), 6) + 0.0
-    head = " ".join([*grid.inputs, *(f"E{name}{name}" for name in grid.outputs)])
+    head = " ".join([*grid.inputs, *parameters(grid, owner)])
     places = np.round(places, 6) + 0.0
     rows = [
         " ".join([*(f"{place:g}" if place == round(place, 3) else f"{place:.6f}" for place in at), *_six(value)])

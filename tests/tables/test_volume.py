@@ -50,14 +50,14 @@ def thirteen() -> str:
 def test_two_nodes_along_each_axis_do_for_the_thirteen_errors() -> None:
     """Thesis, section 4.3: the 13-error model needs a grid of 2 x 2 x 2 (8 nodes), to 0.1 um."""
     machine = loads(thirteen())
-    mesh = search(Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 275.86), 1e-4, [25] * 3, 15625)
+    mesh = search(Volume.of(machine, ("X", "Y", "Z"), ranges_of(machine), 275.86), 1e-4, [25] * 3, 15625)
     assert mesh.reached
     assert mesh.grid.counts == (2, 2, 2)
 
 
 def test_unequal_counts_take_fewer_nodes_than_equal_ones() -> None:
     machine = single_error("EBX", 40e-6)
-    volume = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 100.0)
+    volume = Volume.of(machine, ("X", "Y", "Z"), ranges_of(machine), 100.0)
     target = 2e-4
     free, same = (search(volume, target, [25] * 3, 15625, equal) for equal in (False, True))
     assert free.reached
@@ -69,7 +69,7 @@ def test_unequal_counts_take_fewer_nodes_than_equal_ones() -> None:
 
 def test_limits_end_the_search() -> None:
     machine = single_error("EXX")
-    mesh = search(Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 0.0), 1e-7, [4] * 3, 30)
+    mesh = search(Volume.of(machine, ("X", "Y", "Z"), ranges_of(machine), 0.0), 1e-7, [4] * 3, 30)
     assert not mesh.reached
     assert mesh.grid.points <= 30
     assert max(mesh.grid.counts) <= 4
@@ -77,7 +77,7 @@ def test_limits_end_the_search() -> None:
 
 def test_nodes_hold_the_exact_correction() -> None:
     machine = single_error("ECX", 50e-6, "w X F Y Z t")
-    grid = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), 80.0).grid([3, 2, 4])
+    grid = Volume.of(machine, ("X", "Y", "Z"), ranges_of(machine), 80.0).grid([3, 2, 4])
     place = np.array([[grid.nodes[0][1], grid.nodes[1][1], grid.nodes[2][2]]])
     names = machine.axis_names
     q = place[:, ["XYZ".index(name) for name in names]]
@@ -114,7 +114,7 @@ def test_table_4_2_takes_fewer_nodes_than_the_thesis(figures: Callable[[str], No
     """84 coefficients: the thesis's real data took 19 x 19 x 19 equal steps. What those leave is the target."""
     machine = table_4_2.machine()
     assert len(table_4_2.coefficients()) == 84
-    volume = Volume(machine, ("X", "Y", "Z"), ranges_of(machine), table_4_2.LENGTH)
+    volume = Volume.of(machine, ("X", "Y", "Z"), ranges_of(machine), table_4_2.LENGTH)
     target = volume.left(volume.grid([19] * 3))
     same, free = (search(volume, target, [25] * 3, 15625, equal) for equal in (True, False))
     assert same.reached
@@ -134,6 +134,6 @@ def test_nodes_fitted_to_what_is_around_them_halve_the_error() -> None:
     space = ranges_of(machine)
     left = [
         volume.left(volume.grid([7, 2, 2]))
-        for volume in (Volume(machine, ("X", "Y", "Z"), space, 0.0, area) for area in (False, True))
+        for volume in (Volume.of(machine, ("X", "Y", "Z"), space, 0.0, area) for area in (False, True))
     ]
     assert left[1] < 0.8 * left[0]

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.volume import Volume
 
-CLOSE = 48
-"""Up to here every count is looked at, since nodes may come to lie on the kinks of a table; then some."""
-FAR = 130
-GROWTH = 1.15
 FINE = 1 / 8
 """Share of the target from which an axis alone is good enough."""
+AIM = 0.95
+"""Share of a target that is aimed at: poses that were not looked at may miss a little more than those that were."""
 LAST = 3
 """Of the largest grids, how many are tried."""
 
@@ -60,13 +58,12 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
 
 def _along(volume: Volume, axis: int, target: float, most: int) -> tuple[Counts, Array]:
     """Counts along one input, and what each misses there."""
-    counts, missed, count = [], [], 2
-    while count <= min(most, FAR):
+    counts, missed = [], []
+    for count in volume.counts(axis, most):
         counts.append(count)
         missed.append(volume.bending(axis, count))
         if missed[-1] <= FINE * target:
             break
-        count = count + 1 if count < CLOSE else int(np.ceil(count * GROWTH))
     return np.array(counts, dtype=np.intp), np.array(missed)
 
 
@@ -125,7 +122,8 @@ def _thinned(volume: Volume, mesh: Mesh, target: float) -> Mesh:
     counts = np.array(mesh.grid.counts, dtype=np.intp)
     for axis in np.argsort(counts):
         while counts[axis] > 2:
-            fewer = counts - (np.arange(len(counts)) == axis)
+            fewer = counts.copy()
+            fewer[axis] = volume.fewer(int(axis), int(counts[axis]))
             found = _at(volume, fewer, target)
             if not found.reached:
                 break

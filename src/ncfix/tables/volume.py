@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.machine import Machine, State
+from ncfix.tables.bending import Bending
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.fit import WITHIN, between, fitted
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.poses import random_poses
 
-LINES = 60
+LINES = 32
 """Random lines along an axis on which its bending is judged."""
 CHECKS = 8000
 """Random poses on which a grid is judged, four times as many as in Esmaeili (2021), section 4.2."""
@@ -21,86 +22,120 @@ MATTERS = 1e-6
 """mm: a smaller change of the correction is none."""
 DIGITS = 6
 """Decimals of a node's position, mm or degree."""
-BETWEEN = 4
-"""Points looked at between two nodes of a line."""
-GOLDEN = 0.6180339887498949
-"""Of a cell, by which those points move on from cell to cell, lest they keep step with the pitch of a screw."""
+CLOSE = 48
+"""Up to here every count of even nodes is looked at, since they may come to lie on the kinks of a table; then some."""
+FAR = 130
+GROWTH = 1.15
+
+
+def as_it_is(grid: Grid) -> Grid:
+    """A file that keeps every digit."""
+    return grid
 
 
 @dataclass(slots=True)
 class Volume:
-    """The corrections of the linear axes over some axes; the other axes stay at zero, or as near as they can.
+    """Corrections of some axes over the positions of some, of which grids are made and judged.
 
-    area  values at nodes are those that come nearest to the corrections all around (least squares), not those of the
-          nodes themselves
+    inputs   the axes that are looked up
+    ranges   (n_inputs, 2) where, mm and rad
+    units    mm or rad per unit of their positions in a file
+    outputs  the axes that are corrected
+    exact    their corrections at positions of the inputs: (n, n_inputs) -> (n, n_outputs) mm
+    area     values at nodes are those that come nearest to the corrections all around (least squares), not those of the
+             nodes themselves
+    written  what a file makes of a grid: it is judged after that
+    kinks    of each input, positions at which the corrections may have a corner
+    uneven   nodes need not be evenly spaced
     """
 
-    machine: Machine
     inputs: tuple[str, ...]
-    space: Array
-    tool_length: float
+    ranges: Array
+    units: tuple[float, ...]
+    outputs: tuple[str, ...]
+    exact: Callable[[Array], Array]
     area: bool = False
-    _bending: dict[tuple[int, int], float] = field(default_factory=dict)
-    _checks: list[tuple[Array, Array]] = field(default_factory=list)
+    written: Callable[[Grid], Grid] = as_it_is
+    kinks: tuple[Array, ...] = ()
+    uneven: bool = False
+    _bending: dict[int, Bending] = field(default_factory=dict, init=False)
+    _checks: list[tuple[Array, Array]] = field(default_factory=list, init=False)
 
-    @property
-    def columns(self) -> list[int]:
-        """The columns of the inputs."""
-        return [self.machine.axis_names.index(name) for name in self.inputs]
+    @classmethod
+    def of(
+        cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
+    ) -> Volume:
+        """The three linear axes of a machine over some axes; the others stay at zero, or as near as they can."""
+        columns = [machine.axis_names.index(name) for name in inputs]
+        linear = linear_axes(machine)
+        rest = np.clip(np.zeros(len(space)), space[:, 0], space[:, 1])
 
-    def exact(self, positions: Array) -> Array:
-        """The correction of the three linear axes at positions of the inputs (n, n_inputs), (n, 3) mm."""
-        rest = np.clip(np.zeros(len(self.space)), self.space[:, 0], self.space[:, 1])
-        q = np.tile(rest, (len(positions), 1))
-        q[:, self.columns] = positions
-        return exact_correction(self.machine, q, State(self.tool_length))[:, linear_axes(self.machine)]
+        def exact(positions: Array) -> Array:
+            q = np.tile(rest, (len(positions), 1))
+            q[:, columns] = positions
+            return exact_correction(machine, q, State(tool_length))[:, linear]
+
+        units = tuple(machine.axes[column].unit for column in columns)
+        outputs = tuple(machine.axis_names[column] for column in linear)
+        kinks = tuple(machine.breakpoints(name) for name in inputs)
+        return cls(inputs, space[columns], units, outputs, exact, area, kinks=kinks)
 
     def grid(self, counts: Sequence[int]) -> Grid:
         """The table with that many nodes along each input, at positions that files can say."""
-        nodes = tuple(self._nodes(column, count) for column, count in zip(self.columns, counts, strict=True))
+        nodes = tuple(self._nodes(index, count) for index, count in enumerate(counts))
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
         looked_at = tuple(between(line, within) for line in nodes) if self.area else nodes
         places = np.stack(np.meshgrid(*looked_at, indexing="ij"), axis=-1)
-        values = self.exact(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], 3)
-        names = tuple(self.machine.axis_names[index] for index in linear_axes(self.machine))
-        return Grid(self.inputs, nodes, names, fitted(values, looked_at, nodes) if self.area else values)
+        values = self.exact(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(self.outputs))
+        return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
 
-    def _nodes(self, column: int, count: int) -> Array:
-        unit = self.machine.axes[column].unit
-        low, high = self.space[column].tolist()
-        nodes: Array = np.round(np.linspace(low, high, count) / unit, DIGITS) * unit
+    def _nodes(self, index: int, count: int) -> Array:
+        low, high = (self.ranges[index] / self.units[index]).tolist()
+        line = np.linspace(low, high, count)
+        if self.uneven:
+            line = self._bends(index).uneven()[count][0] / self.units[index]
+        nodes: Array = np.round(line, DIGITS) * self.units[index]
         return nodes
 
     def left(self, grid: Grid) -> float:
         """The largest correction that a grid misses at random poses, mm."""
         if not self._checks:
-            positions = random_poses(self.space[self.columns], CHECKS, seed=3)
+            positions = random_poses(self.ranges, CHECKS, seed=3)
             self._checks.append((positions, self.exact(positions)))
         positions, exact = self._checks[0]
-        return float(np.linalg.norm(grid.at(positions) - exact, axis=1).max())
+        return float(np.linalg.norm(self.written(grid).at(positions) - exact, axis=1).max())
 
-    def bending(self, axis: int, count: int) -> float:
+    def counts(self, index: int, most: int) -> list[int]:
+        """How many nodes may be put along one input."""
+        if self.uneven:
+            return sorted(count for count in self._bends(index).uneven() if count <= most)
+        found = [2]
+        while found[-1] < min(most, FAR):
+            found.append(found[-1] + 1 if found[-1] < CLOSE else int(np.ceil(found[-1] * GROWTH)))
+        return [count for count in found if count <= min(most, FAR)]
+
+    def fewer(self, index: int, count: int) -> int:
+        """The next smaller number of nodes along one input."""
+        return max((each for each in self.counts(index, count - 1)), default=2) if self.uneven else count - 1
+
+    def bending(self, index: int, count: int) -> float:
         """The largest correction that `count` nodes along one input miss on random lines along it, mm."""
-        if (axis, count) not in self._bending:
-            self._bending[axis, count] = self._missed(axis, count)
-        return self._bending[axis, count]
+        bends = self._bends(index)
+        return bends.uneven()[count][1] if self.uneven else bends.missed(count)
 
-    def _missed(self, axis: int, count: int) -> float:
-        spread = random_poses(self.space[self.columns], LINES, seed=5)
-        low, high = self.space[self.columns[axis]]
-        nodes = np.linspace(low, high, count)
-        part = np.mod(np.arange(BETWEEN) / BETWEEN + GOLDEN * np.arange(count - 1)[:, None], 1.0)
-        inside = (nodes[:-1, None] + part * (nodes[1] - nodes[0])).reshape(-1)
-        ends, values = self._along(spread, axis, nodes), self._along(spread, axis, inside)
-        share = part.reshape(-1)[:, None]
-        chord = np.repeat(ends[:, :-1], BETWEEN, axis=1) * (1 - share) + np.repeat(ends[:, 1:], BETWEEN, axis=1) * share
-        return float(np.linalg.norm(values - chord, axis=2).max())
+    def _bends(self, index: int) -> Bending:
+        if index not in self._bending:
+            low, high = self.ranges[index].tolist()
+            kinks = self.kinks[index] if self.kinks else np.zeros(0)
+            spread = random_poses(self.ranges, LINES, seed=5)
+            self._bending[index] = Bending.over(low, high, kinks, lambda line: self._along(spread, index, line))
+        return self._bending[index]
 
     def _along(self, spread: Array, axis: int, line: Array) -> Array:
-        """Corrections at positions `line` of one input, the others as in `spread`: (n_spread, n_line, 3)."""
+        """Corrections at positions `line` of one input, the others as in `spread`: (n_spread, n_line, n_outputs)."""
         positions = np.repeat(spread, len(line), axis=0)
         positions[:, axis] = np.tile(line, len(spread))
-        return self.exact(positions).reshape(len(spread), len(line), 3)
+        return self.exact(positions).reshape(len(spread), len(line), -1)
 
 
 def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tuple[str, ...]:

@@ -1,0 +1,116 @@
+"""How far straight lines between nodes are from a correction along one axis, and where nodes are best put.
+
+The correction is looked at on some random lines along the axis, in steps so fine that what lies between them does not
+matter. From those the miss of any number of evenly spaced nodes is read; or, where a format does not want even steps,
+nodes are put as far apart as the bending allows: on the kinks of a table, and close together where a screw turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ncfix.tables.grid import Array
+
+STEPS = (128, 256, 512, 1024)
+"""Fine steps over the range: as many as it takes, or the most."""
+TRIED = 40
+"""Positions in between at which it is seen whether there are enough."""
+RIGHT = 2e-5
+"""mm: what fine steps may miss there."""
+BETWEEN = 4
+"""Points looked at between two nodes of a line."""
+GOLDEN = 0.6180339887498949
+"""Of a cell, by which those points move on from cell to cell, lest they keep step with the pitch of a screw."""
+FINER = 0.8
+"""From one choice of uneven nodes to the next, what they may miss."""
+LEAST = 2e-5
+"""mm: they need not miss less."""
+MANY = 200
+"""Uneven nodes, at most."""
+
+
+@dataclass(slots=True)
+class Bending:
+    """Corrections along random lines over one axis.
+
+    places  ascending, (n_places,)
+    values  (n_lines, n_places, n_outputs) mm
+    """
+
+    places: Array
+    values: Array
+    _uneven: dict[int, tuple[Array, float]] = field(default_factory=dict)
+
+    @classmethod
+    def over(cls, low: float, high: float, kinks: Array, along: Callable[[Array], Array]) -> Bending:
+        """From a function that gives the corrections at positions (n,): (n_lines, n, n_outputs).
+
+        kinks  positions at which they may have a corner
+        """
+        tried = low + (high - low) * np.mod(GOLDEN * np.arange(1, TRIED + 1), 1.0)
+        meant = along(tried)
+        inner = kinks[(kinks > low) & (kinks < high)]
+        for steps in STEPS:
+            places = np.union1d(np.linspace(low, high, steps + 1), inner)
+            found = cls(places, along(places))
+            if np.abs(found.at(tried) - meant).max() < RIGHT:
+                break
+        return found
+
+    def at(self, positions: Array) -> Array:
+        """The corrections at positions (n,), (n_lines, n, n_outputs)."""
+        cell = np.clip(np.searchsorted(self.places, positions, side="right") - 1, 0, len(self.places) - 2)
+        part = ((positions - self.places[cell]) / np.diff(self.places)[cell])[:, None]
+        found: Array = self.values[:, cell] * (1 - part) + self.values[:, cell + 1] * part
+        return found
+
+    def missed(self, count: int) -> float:
+        """The largest correction that evenly spaced nodes miss, mm."""
+        nodes = np.linspace(self.places[0], self.places[-1], count)
+        part = np.mod(np.arange(BETWEEN) / BETWEEN + GOLDEN * np.arange(count - 1)[:, None], 1.0)
+        inside = (nodes[:-1, None] + part * (nodes[1] - nodes[0])).reshape(-1)
+        ends, values = self.at(nodes), self.at(inside)
+        share = part.reshape(-1)[:, None]
+        chord = np.repeat(ends[:, :-1], BETWEEN, axis=1) * (1 - share) + np.repeat(ends[:, 1:], BETWEEN, axis=1) * share
+        return float(np.linalg.norm(values - chord, axis=2).max())
+
+    def uneven(self) -> dict[int, tuple[Array, float]]:
+        """Number of nodes -> where they are best put, and the largest correction that they miss then, mm."""
+        if not self._uneven:
+            ends = np.array([0, len(self.places) - 1])
+            allowed = self._chord(0, len(self.places) - 1)
+            self._uneven[2] = self.places[ends], allowed
+            while allowed > LEAST and len(ends) < MANY:
+                allowed *= FINER
+                ends = self._as_far_as(allowed)
+                self._uneven[len(ends)] = self.places[ends], allowed
+        return self._uneven
+
+    def _as_far_as(self, allowed: float) -> Array:
+        """Places, each as far from the one before as straight lines miss no more than what is allowed."""
+        last = len(self.places) - 1
+        chosen = [0]
+        while chosen[-1] < last:
+            start, step = chosen[-1], 1
+            while start + 2 * step <= last and self._chord(start, start + 2 * step) <= allowed:
+                step *= 2
+            low, high = start + step, min(start + 2 * step, last)
+            while low < high:
+                middle = (low + high + 1) // 2
+                if self._chord(start, middle) <= allowed:
+                    low = middle
+                else:
+                    high = middle - 1
+            chosen.append(low)
+        return np.array(chosen)
+
+    def _chord(self, start: int, stop: int) -> float:
+        if stop - start < 2:
+            return 0.0
+        inner = slice(start + 1, stop)
+        part = ((self.places[inner] - self.places[start]) / (self.places[stop] - self.places[start]))[:, None]
+        chord = self.values[:, start, None] * (1 - part) + self.values[:, stop, None] * part
+        return float(np.sqrt(((self.values[:, inner] - chord) ** 2).sum(axis=2).max()))

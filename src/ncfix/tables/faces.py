@@ -1,0 +1,215 @@
+"""A correction of many axes as a sum of grids over a few of them each.
+
+A grid over five axes takes the product of five numbers of nodes. But no error needs all five at once: what the axes of
+the table are wrong by moves the tip by an angle times a distance, so that each linear axis is corrected by functions of
+two rotary axes and one linear axis, and by functions of the linear axes. Which sets of axes belong together need not be
+known: the correction is taken apart into what each set of axes changes together (`interactions`), and the sets that
+matter are shared out among a few grids (`faces`). The first grid then holds the correction with the other axes in the
+middle of their range, the second what it lacks there, and so on: where the sum can say the correction at all, it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+import numpy as np
+
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.mesh import search
+from ncfix.tables.poses import random_poses
+from ncfix.tables.volume import CHECKS, Volume
+
+COARSE = 6
+"""Positions of each axis at which the correction is taken apart."""
+SHARE = 0.05
+"""What is not said by any face may be so much of the target, rms."""
+LIKELY = 10
+"""Nodes along an axis, by which faces are compared before they are searched for."""
+ROUNDS = 5
+TIGHTER = 0.95
+"""Of the share that the last round suggests, what the next one takes."""
+LOOSER = 1.1
+"""Times what the number of nodes suggests if there are too many."""
+EVEN = 0.3
+"""Power of its number of nodes by which a face gets more of what may be missed: that saves nodes where many are."""
+MANY = 8
+"""More sets than these are not shared out among faces."""
+
+Set = frozenset[int]
+"""Axes by their number among the inputs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Face:
+    """A set of inputs (their numbers), and the outputs (their numbers) that have a grid over it.
+
+    owner  the input that the face belongs to: an output has one face of each owner at most
+    """
+
+    owner: int
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Grids whose sum is the correction, with what they miss at random poses, mm."""
+
+    faces: tuple[Face, ...]
+    grids: tuple[Grid, ...]
+    left: float
+    reached: bool
+
+    @property
+    def points(self) -> int:
+        """The nodes of all of them."""
+        return sum(grid.points for grid in self.grids)
+
+
+def interactions(values: Array, n_inputs: int) -> dict[Set, Array]:
+    """What each set of axes changes together: its rms over a full grid of values (*counts, n_outputs), (n_outputs,).
+
+    The parts are orthogonal: their squares add up to the mean square of all.
+    """
+    parts: dict[Set, Array] = {}
+    for size in range(n_inputs + 1):
+        for chosen in combinations(range(n_inputs), size):
+            key = frozenset(chosen)
+            others = tuple(axis for axis in range(n_inputs) if axis not in key)
+            mean = values.mean(axis=others, keepdims=True)
+            parts[key] = mean - sum((parts[less] for less in parts if less < key), np.zeros(1))
+    return {key: np.sqrt(np.mean(part**2, axis=tuple(range(n_inputs)))) for key, part in parts.items()}
+
+
+def faces(volume: Volume, owners: Sequence[int], target: float) -> tuple[Face, ...] | None:
+    """The faces that say the correction to within a share of the target (mm rms), or None if there are none.
+
+    Each belongs to an owner, one of the inputs, which is among its own inputs.
+    """
+    lines = [_coarse(low, high, number) for number, (low, high) in enumerate(volume.ranges.tolist())]
+    places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    values = volume.exact(places.reshape(-1, len(lines))).reshape(*places.shape[:-1], -1)
+    sizes = interactions(values, len(lines))
+    found: dict[tuple[int, Set], list[int]] = {}
+    for output in range(values.shape[-1]):
+        chosen = _shared_out(_largest_sets({key: float(size[output]) for key, size in sizes.items()}, target), owners)
+        if chosen is None:
+            return None
+        for owner, axes in chosen.items():
+            found.setdefault((owner, axes), []).append(output)
+    ordered = sorted(found, key=lambda key: (len(key[1]), sorted(key[1]), key[0]))
+    return tuple(Face(owner, tuple(sorted(axes)), tuple(found[owner, axes])) for owner, axes in ordered)
+
+
+def _coarse(low: float, high: float, number: int) -> Array:
+    """Positions over a range, not so even that a screw's period could hide."""
+    shift = 0.3 * (np.mod((np.arange(COARSE) + number) * 0.618034, 1.0) - 0.5)
+    nodes: Array = low + (high - low) * (np.arange(COARSE) + 0.5 + shift) / COARSE
+    return nodes
+
+
+def _largest_sets(sizes: Mapping[Set, float], target: float) -> list[Set]:
+    """The sets that matter, without those within another; the smallest that are below the share together are left."""
+    kept = dict(sizes)
+    total = 0.0
+    for key in sorted(sizes, key=lambda key: sizes[key]):
+        total += sizes[key] ** 2
+        if total > (SHARE * target) ** 2:
+            break
+        del kept[key]
+    return [key for key in sorted(kept, key=sorted) if not any(key < other for other in kept)]
+
+
+def _shared_out(sets: Sequence[Set], owners: Sequence[int]) -> dict[int, Set] | None:
+    """The cheapest way to give every set to an owner, whose face it then is part of: owner -> its face."""
+    if len(sets) > MANY:
+        return None
+    choices = []
+    for given in product(owners, repeat=len(sets)):
+        share: dict[int, Set] = {}
+        for owner, one in zip(given, sets, strict=True):
+            share[owner] = share.get(owner, frozenset({owner})) | one
+        choices.append((sum(LIKELY ** len(axes) for axes in share.values()), sorted(share), share))
+    return min(choices, key=lambda choice: choice[:2])[2]
+
+
+def searched(volume: Volume, found: Sequence[Face], target: float, points: int) -> Sum:
+    """The grids of the faces with few nodes, at most `points` in all, that together miss at most the target (mm)."""
+    parts = [_part(volume, face, found[:number]) for number, face in enumerate(found)]
+    shares = np.full(len(parts), target / np.sqrt(len(parts)))
+    positions = random_poses(volume.ranges, CHECKS, seed=3)
+    exact = volume.exact(positions)
+    best: Sum | None = None
+    for _ in range(ROUNDS):
+        grids = tuple(_searched(part, share, points) for part, share in zip(parts, shares.tolist(), strict=True))
+        left = float(np.linalg.norm(exact - _total(volume, grids, positions), axis=1).max())
+        made = Sum(tuple(found), grids, left, left <= target)
+        if made.points > points:
+            shares *= LOOSER * (made.points / points) ** (2 / 3)
+        elif best is None or left < best.left:
+            best = made
+        if best is made and not made.reached:
+            shares *= max(TIGHTER * target / left, 1 / 4)
+        elif best is not None:
+            break
+        sizes = np.array([grid.points for grid in grids], dtype=np.float64) ** EVEN
+        shares *= sizes / sizes.mean()
+    return best or made
+
+
+def _searched(part: Volume, share: float, points: int) -> Grid:
+    return search(part, share, [points] * len(part.inputs), points).grid
+
+
+def _total(volume: Volume, grids: Sequence[Grid], positions: Array) -> Array:
+    total = np.zeros((len(positions), len(volume.outputs)))
+    for grid in grids:
+        columns = [volume.outputs.index(name) for name in grid.outputs]
+        total[:, columns] += grid.at(positions[:, [volume.inputs.index(name) for name in grid.inputs]])
+    return total
+
+
+def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
+    """What one face holds: the correction less what the faces before it hold, the other axes in their middle."""
+    recipe = _recipe(face, before)
+    middle = volume.ranges.mean(axis=1)
+
+    def exact(positions: Array) -> Array:
+        total = np.zeros((len(positions), len(face.outputs)))
+        for axes, factors in recipe.items():
+            places = np.tile(middle, (len(positions), 1))
+            for column, axis in enumerate(face.inputs):
+                if axis in axes:
+                    places[:, axis] = positions[:, column]
+            total += volume.exact(places)[:, face.outputs] * factors
+        return total
+
+    chosen = list(face.inputs)
+    return replace(
+        volume,
+        inputs=tuple(volume.inputs[axis] for axis in chosen),
+        ranges=volume.ranges[chosen],
+        units=tuple(volume.units[axis] for axis in chosen),
+        outputs=tuple(volume.outputs[number] for number in face.outputs),
+        exact=exact,
+        kinks=tuple(volume.kinks[axis] for axis in chosen) if volume.kinks else (),
+    )
+
+
+def _recipe(face: Face, before: Sequence[Face]) -> dict[Set, Array]:
+    """How a face is put together of corrections that follow some axes only: axes -> factor of each output.
+
+    What a face before it holds already is what the correction is with all axes in the middle that it does not have.
+    """
+    recipe: dict[Set, Array] = {}
+    for number, output in enumerate(face.outputs):
+        terms = {frozenset(face.inputs): 1}
+        for other in (each for each in before if output in each.outputs):
+            taken = [(axes & frozenset(other.inputs), factor) for axes, factor in terms.items()]
+            for axes, factor in taken:
+                terms[axes] = terms.get(axes, 0) - factor
+        for axes, factor in terms.items():
+            recipe.setdefault(axes, np.zeros(len(face.outputs)))[number] = factor
+    return {axes: factors for axes, factors in recipe.items() if factors.any()}
