@@ -19,6 +19,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import largest, owners, places, sums
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.compensate.split import Grid
+from ncfix.program.target import TANGENTIAL
 
 WIDEST = 0.95 * np.pi
 """A piece turns by less than this: ends on opposite sides of a circle would not tell where its centre is."""
@@ -33,14 +34,15 @@ OTHER_CODES = 1000
 def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float) -> Mask:
     """Motions `rows` (k,) that may be made of arcs: radii off by rounding are within half of what the control takes.
 
-    Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight.
+    Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight,
+    unless they are written as others.
     """
     moves = intent.moves
     spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
     radius = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
     allowed = np.maximum(closure.mm, closure.relative * radius) / 2
     enough: Mask = intent.segments.arc[rows] & (radius > SHORTEST) & (4 * rounding <= allowed)
-    enough &= moves.modal[rows] < OTHER_CODES
+    enough &= (moves.modal[rows] < OTHER_CODES) | np.isin(moves.modal[rows], list(TANGENTIAL))
     return enough if APART * rounding < SHORTEST else np.zeros(len(rows), dtype=bool)
 
 

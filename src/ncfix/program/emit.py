@@ -20,7 +20,7 @@ from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
-from ncfix.program.target import Rendered, Target
+from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
 from ncfix.program.writer import Edit, Splices
@@ -292,7 +292,7 @@ class _Emitter:
             turn_by_feed=self.program.dialect.feed_of == "linear",
             arcs=arcs,
             centres=None if arcs is None else frame.program_point(pieces.centre[rows], moves.axes),
-            arc_code=modal,
+            arc_code=TANGENTIAL.get(modal, modal),
             increments=frame.frame.increments,
             rotary=tuple(moves.rotary.tolist()),
             pointing=moves.pointing,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
-from ncfix.program.target import LINE, Rendered, Target
+from ncfix.program.target import LINE, TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Constant, Literal, Program, Word
 from ncfix.program.turns import is_dragged, number, way
 
@@ -40,7 +40,7 @@ class BlockRenderer:
         self.target = target
         self.out = Rendered()
         self.added: list[str] = []
-        self.code = target.code
+        self.code = TANGENTIAL.get(target.code, target.code)
         self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
         self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)

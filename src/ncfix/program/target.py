@@ -14,6 +14,10 @@ FloatArray = NDArray[np.float64]
 LINE = 10
 """The code of straight motions at feed, in tenths."""
 
+TANGENTIAL = {1010: 30, 1011: 20}
+"""Codes of arcs that go on in the direction of the motion before them, to the left and to the right: once that motion
+is corrected they are not the same arcs any more, and are written as those that they were."""
+
 
 @dataclass(frozen=True, slots=True)
 class Target:
@@ -84,7 +88,7 @@ class Target:
     def last_code(self) -> int:
         """The motion code that is in force after the pieces, in tenths."""
         if self.arcs is None:
-            return self.code
+            return TANGENTIAL.get(self.code, self.code)
         return self.arc_code if self.arcs[-1] else LINE
 
 

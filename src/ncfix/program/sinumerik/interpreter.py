@@ -55,6 +55,7 @@ class Interpreter:
         control.locate = self.place
         plans = self.units[0].text.plans
         self.at_once = not any(60 in plan.m for plan in plans)
+        self.tangents = any("ct" in plan.names for plan in plans)
         control.modes.whole_polar = all(
             {"AP", "RP"} <= {each.address for each in plan.settings}
             or not {"AP", "RP"} & {each.address for each in plan.settings}
@@ -79,7 +80,8 @@ class Interpreter:
             source = next(sources, None)
             if source:
                 program = read(source, name, self.units[0].program.dialect)
-                self.files[key] = units_of(program, external=name)[0]
+                self.files[key] = unit = units_of(program, external=name)[0]
+                self.tangents |= any("ct" in plan.names for plan in unit.text.plans)
         return self.files[key]
 
     def run(self) -> Moves:
@@ -133,7 +135,7 @@ class Interpreter:
         control = self.control
         if self.recorder is not None:
             return False
-        busy = control.at_start or control.modes.modal_cycle or self.course.sections
+        busy = control.at_start or control.modes.modal_cycle or self.course.sections or self.tangents
         return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90")
 
     def spend(self, blocks: int) -> None:

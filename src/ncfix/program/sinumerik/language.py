@@ -43,7 +43,7 @@ def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
     layout = layout_of(program, block)
-    if layout is None or not layout.axes or layout.polar or layout.vector:
+    if layout is None or not layout.axes or layout.polar or layout.points:
         return None
     return bulk_layout(program, block, layout)
 

@@ -16,7 +16,7 @@ from ncfix.program.layout import (
     _separator,
 )
 from ncfix.program.sinumerik.circles import VIA
-from ncfix.program.sinumerik.orientation import VECTOR
+from ncfix.program.sinumerik.orientation import ANGLES, VECTOR
 from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS
 from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Skip, Tape, Word
 
@@ -34,12 +34,19 @@ class SinumerikLayout(Layout):
     angle   AR
     polar   AP and RP by address
     vector  A3 B3 C3 by address
+    angles  A2 B2 C2 by address
     """
 
     via: dict[str, Word]
     angle: Word | None
     polar: dict[str, Word]
     vector: dict[str, Word]
+    angles: dict[str, Word]
+
+    @property
+    def points(self) -> bool:
+        """Whether the block says which way the tool points."""
+        return bool(self.vector or self.angles)
 
 
 def layout_of(program: Program, block: int) -> SinumerikLayout | None:
@@ -73,6 +80,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         angle=by_address.get("AR"),
         polar={address: by_address[address] for address in POLAR if address in by_address},
         vector={address: by_address[address] for address in VECTOR if address in by_address},
+        angles={address: by_address[address] for address in ANGLES if address in by_address},
     )
 
 

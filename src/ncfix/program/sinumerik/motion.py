@@ -9,6 +9,7 @@ from ncfix.program.sinumerik.destination import End, Words, destination, machine
 from ncfix.program.sinumerik.framing import take_up
 from ncfix.program.sinumerik.orientation import oriented
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix.program.sinumerik.tangents import tangential
 from ncfix.program.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
 
 MACHINE = "machine coordinates ({})"
@@ -44,7 +45,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     elif code == CIP:
         through_point(control, words, code)
     elif code == CT:
-        refused(control, words, code, "an arc that continues the motion before it (CT)")
+        tangential(control, words)
     elif code in UNFOLLOWED_MOTIONS:
         refused(control, words, code, UNFOLLOWED_MOTIONS[code])
     else:

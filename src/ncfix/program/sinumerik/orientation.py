@@ -1,36 +1,46 @@
 """The direction of the tool as programs give it under TRAORI, and the plane of CYCLE800: made into rotary positions.
 
-A3 B3 C3 are a vector in the coordinates of the program, of any length; a component that is not written is zero. Which
-of two ways the rotary axes take is for the control's machine data to say: here it is the nearest.
+A3 B3 C3 are a vector in the coordinates of the program, of any length; a component that is not written is zero. A2 B2
+C2 are angles by which a vector along Z is turned, in the sense that ORIEULER, ORIRPY or ORIRPY2 says, or machine data
+where none of them does. Which of two ways the rotary axes take is for the machine data, too: here it is the nearest.
 Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation programming (TRAORI).
 """
 
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.pointing import Pointing, Triple, dot
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS
+from ncfix.program.rs274.coordinates import DEGREE, LETTERS, product
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.affine import turned
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.state import Sinumerik
 
 FloatArray = NDArray[np.float64]
 
 VECTOR = ("A3", "B3", "C3")
-_OTHERS = "A2 B2 C2 A4 B4 C4 A5 B5 C5 A6 B6 C6 A7 B7 C7 LEAD TILT THETA PSI PHI NUT"
+ANGLES = ("A2", "B2", "C2")
+_OTHERS = "A4 B4 C4 A5 B5 C5 A6 B6 C6 A7 B7 C7 LEAD TILT THETA PSI PHI NUT"
 OTHERS = frozenset(_OTHERS.split())
 """Other ways to say how the tool stands, which are not followed."""
 
 BAD_VECTOR = "NCF254"
 WAY = "NCF253"
 AT_RUNTIME = "the direction of the tool is known only at run time"
-NO_KINEMATICS = "the direction of the tool (A3 B3 C3) needs the kinematics of a machine with two rotary axes"
+NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
 NOT_ON = "a direction of the tool is given while TRAORI is not on"
 NOT_FOLLOWED = "the tool is oriented in another way than by rotary axes or a vector ({})"
+MIXED = "the direction of the tool is given in more than one way"
+MEANT = '"$MC_ORIENTATION_IS_EULER"'
+WHICH_ANGLES = (
+    "whether A2 B2 C2 are Euler or roll-pitch-yaw angles is for ORIEULER or ORIRPY to say, or machine data: "
+    f"`variables.{MEANT} = 1` (or 0) in the setup file"
+)
 IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS)"
 BY_AXES = "oriaxes"
 
@@ -42,32 +52,34 @@ not concerned, but pieces of a motion that strays by more would point it elsewhe
 def oriented(control: Sinumerik, words: Words) -> None:
     """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
     others = sorted(OTHERS & words.values.keys())
-    if not others and not any(address in words.values for address in VECTOR):
+    ways = [way for way in (VECTOR, ANGLES) if any(address in words.values for address in way)]
+    if not others and not ways:
         return
-    reason = NOT_FOLLOWED.format(others[0]) if others else by_vector(control, words)
+    reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if len(ways) > 1 else by_direction(control, words)
     if reason:
         words.refuse(reason, [index for index in control.machine if control.rotary[index]])
 
 
-def by_vector(control: Sinumerik, words: Words) -> str:
-    """Take A3 B3 C3; why the motion is refused, if it is."""
+def by_direction(control: Sinumerik, words: Words) -> str:
+    """Take A3 B3 C3 or A2 B2 C2; why the motion is refused, if it is."""
     if not control.modes.transformed:
         return NOT_ON
-    if words.runtime(*VECTOR):
+    if words.runtime(*VECTOR, *ANGLES):
         return AT_RUNTIME
     if control.modes.orientation_in_machine:
         return IN_MACHINE
     pointing = control.pointing
     if pointing is None:
         return NO_KINEMATICS
+    wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
+    if wanted is None:
+        return WHICH_ANGLES
     control.settle_all()
     columns = [control.machine[column] for column in pointing.columns]
     if any(index in control.unknown for index in columns):
         return f"where the axis {LETTERS[columns[0]]} stands before the tool is turned is not known"
-    a, b, c = (words.get(address) for address in VECTOR)
-    wanted = direction_of(control, (a, b, c))
     here = control.position[columns[0]], control.position[columns[1]]
-    ways = pointing.angles(wanted, here)
+    ways = pointing.angles(direction_of(control, wanted), here)
     if not ways:
         raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
     note_choice(control, pointing, here, ways)
@@ -79,6 +91,32 @@ def by_vector(control: Sinumerik, words: Words) -> str:
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
     words.whole |= not even and stray(pointing, here, ways[0]) > FAR
     return ""
+
+
+def by_vector(words: Words) -> Triple:
+    """A3 B3 C3."""
+    a, b, c = (words.get(address) for address in VECTOR)
+    return a, b, c
+
+
+def by_angles(control: Sinumerik, words: Words) -> Triple | None:
+    """The direction that A2 B2 C2 say, as a vector; None where nobody says how they are meant."""
+    euler = control.variables.value(MEANT.strip('"').lower())
+    default = "" if euler is None else "orieuler" if euler else "orirpy"
+    meant = control.modes.angles or default
+    if meant not in TURNS:
+        return None
+    turns = (turned({axis: words.get(address)}, axis).rotation for axis, address in TURNS[meant])
+    x, y, z = (row[2] for row in reduce(product, turns))
+    return x, y, z
+
+
+TURNS = {
+    "orieuler": (("Z", "A2"), ("X", "B2"), ("Z", "C2")),
+    "orirpy": (("Z", "C2"), ("Y", "B2"), ("X", "A2")),
+    "orirpy2": (("X", "A2"), ("Y", "B2"), ("Z", "C2")),
+}
+"""About which axis, as the turns before have left it, and by which word."""
 
 
 def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:

@@ -17,7 +17,7 @@ from ncfix.program.sinumerik.destination import turned
 from ncfix.program.sinumerik.layout import SinumerikLayout
 from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
-from ncfix.program.target import Rendered, Target
+from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Call, Literal, Program, Word
 
 FloatArray = NDArray[np.float64]
@@ -49,7 +49,7 @@ class SinumerikRenderer(BlockRenderer):
         position = super()._first_piece(position, end)
         if self.layout.polar and not self.added and not self.layout.axes:
             self._stay_in_words(position)
-        if self.layout.vector:
+        if self.layout.points:
             self._turned_tool(position, end)
         return position
 
@@ -82,14 +82,10 @@ class SinumerikRenderer(BlockRenderer):
         """A word that says how it is meant; `turns`, in degrees, are not written."""
         incremental = self._form(word) == INCREMENTAL
         base = position[column] if incremental else turns
-        value, written = end - base, self._value(word, np.nan)
-        whole = len(self.target.ends) == 1
-        same = np.isfinite(written) and abs(value - written) < self.half[column]
-        unchanged = abs(end - self.target.nominal[column]) < self.half[column] and not incremental
-        if whole and (same or (unchanged and not np.isfinite(written))):
-            position[column] = base + (written if np.isfinite(written) else value)
-            return
-        position[column] = base + self._rewrite(word, value, int(self.target.decimals[column]))
+        value, written = end - base, self._value(word, np.nan if incremental else self.target.nominal[column] - turns)
+        if len(self.target.ends) > 1 or not abs(value - written) < self.half[column]:
+            written = self._rewrite(word, value, int(self.target.decimals[column]))
+        position[column] = base + written
 
     def _by_increment(self, start: float, column: int, end: float, word: Word) -> float:
         """Where a rotary axis stands after IC instead of DC, ACP or ACN, which would lead it the other way round."""
@@ -101,7 +97,7 @@ class SinumerikRenderer(BlockRenderer):
 
     def _has_words(self, column: int) -> bool:
         """With a vector for the direction of the tool, rotary axes have no words of their own."""
-        return not (self.layout.vector and self.target.rotary[column])
+        return not (self.layout.points and self.target.rotary[column])
 
     def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
         if self._has_words(column):
@@ -110,11 +106,16 @@ class SinumerikRenderer(BlockRenderer):
     # -- the direction of the tool ------------------------------------------------------------------------------------
 
     def _turned_tool(self, position: FloatArray, end: FloatArray) -> None:
-        """The vector of the first piece, if it is another; where the rotary axes then stand, as the control will."""
+        """The vector of the first piece if it is another, and where the rotary axes then stand, as the control will.
+
+        It also takes the place of angles.
+        """
         turning = np.array(self.target.rotary)
         if len(self.target.ends) == 1 and np.all(np.abs(end - self.target.nominal)[turning] < self.half[turning]):
             position[turning] = self.target.nominal[turning]
             return
+        for angle in self.layout.angles.values():
+            self._remove(angle)
         for address, value in zip(VECTOR, self._vector(end), strict=True):
             word = self.layout.vector.get(address)
             if word is not None:
@@ -147,7 +148,7 @@ class SinumerikRenderer(BlockRenderer):
 
     def _further_words(self, position: FloatArray, end: FloatArray) -> list[str]:
         """The direction of the tool in a further piece."""
-        if not self.layout.vector:
+        if not self.layout.points:
             return []
         vector = self._vector(end)
         self._settle_turn(position, end)
@@ -182,8 +183,11 @@ class SinumerikRenderer(BlockRenderer):
     # -- codes and arcs -----------------------------------------------------------------------------------------------
 
     def _motion_code(self) -> None:
-        wanted, word = self.target.code, self.layout.motion
-        if word is not None and word.address != "G" and wanted != CIP:
+        wanted, word = TANGENTIAL.get(self.target.code, self.target.code), self.layout.motion
+        if word is None and wanted != self.target.code:
+            at = self.program.position(self.block, self.layout.code_at)
+            self.out.edits.append((at, at, self._cased("G") + f"{wanted // 10}{self.layout.blank}"))
+        elif word is not None and word.address != "G" and wanted != CIP:
             self.out.edits.append((*self.program.span(self.block, word.span), self._cased("G") + f"{wanted // 10}"))
         elif wanted == CIP and word is None and self.target.active_code != CIP:
             at = self.program.position(self.block, self.layout.code_at)
@@ -210,7 +214,8 @@ class SinumerikRenderer(BlockRenderer):
         """Centre words count from the start, but for those that say `AC`."""
         word = self.layout.centre.get(CENTRE_LETTERS[index])
         if word is None or self._form(word) != ABSOLUTE:
-            return super()._centre_word(index, base, (had_centre and self.layout.angle is None) or word is not None)
+            bare = self.layout.angle is not None or self.target.code in TANGENTIAL
+            return super()._centre_word(index, base, (had_centre and not bare) or word is not None)
         value, column = float(self.target.centre[index]), self.target.spatial[index]
         written = self._value(word, float(self.target.original_centre[index]))
         if abs(value - written) >= self.half[column]:

@@ -8,6 +8,7 @@ coordinates of the program, since in a turned frame one unknown coordinate would
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.moves import Kind, Kinematics, Rule, TcpState
 from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import tcp
+from ncfix.program.rs274.arc_motion import in_frame
 from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import AT_START, Control, Unknown
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
@@ -75,6 +77,7 @@ class Modes:
     whole_polar  every block with a polar coordinate has both
     orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
     orientation_in_machine  ORIMKS
+    angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
     """
 
     diameter: str = ""
@@ -86,6 +89,7 @@ class Modes:
     whole_polar: bool = True
     orientation: str = ""
     orientation_in_machine: bool = False
+    angles: str = ""
 
 
 @dataclass(slots=True)
@@ -103,6 +107,15 @@ class Named:
         return next((name for name, known in self.numbers.items() if known == number), str(number))
 
 
+def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
+    """The direction in which an arc or helix that makes `step` ends, in commands; of any length."""
+    nx, ny, nz = arc.normal
+    x, y, z = (end[i] - arc.centre[i] for i in range(3))
+    rise = nx * step[0] + ny * step[1] + nz * step[2]
+    round_ = ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
+    return [arc.sweep * part + rise * across for part, across in zip(round_, arc.normal, strict=True)]
+
+
 class Sinumerik(Control):
     """Everything that the steps of a block read and change.
 
@@ -113,6 +126,7 @@ class Sinumerik(Control):
     whole  the motion must not be split
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
+    heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
     def __init__(
@@ -130,6 +144,7 @@ class Sinumerik(Control):
         self.edge = 0
         self.at_start = True
         self.points = False
+        self.heading: Sequence[float] | None = None
         self.whole = False
         self.solitary: frozenset[int] = frozenset()
         self.variables = Variables.given(setup.variables)
@@ -282,9 +297,25 @@ class Sinumerik(Control):
         refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(end.target)
         if not passing and not refusal:
             self.ask_for_length()
+        self._note_heading(kind, end, arc, follows=not passing and not refusal)
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
         self.whole = False
         self.forget_settled()
+
+    def _note_heading(self, kind: Kind, end: End, arc: Arc | None, *, follows: bool) -> None:
+        """Keep the direction in which a motion ends: CT goes on in it."""
+        if kind == Kind.DWELL:
+            return
+        gone = {index for index in GEOMETRY if index in self.unknown or index in end.unknown}
+        step = [b - a for a, b in zip(self.position, end.target, strict=True)]
+        if gone or not follows:
+            self.heading = None
+        elif arc is not None:
+            self.heading = in_frame(self, departing(arc, end.target, step))[:3]
+        elif any(step[:3]):
+            self.heading = in_frame(self, step)[:3]
+        elif any(step):
+            self.heading = None
 
     def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
         index = super()._style(kind, rule, reason, code)

@@ -13,7 +13,7 @@ from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import End, Words, set_pole
-from ncfix.program.sinumerik.orientation import OTHERS, VECTOR
+from ncfix.program.sinumerik.orientation import ANGLES, OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import Calling, Letting, Plan
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
@@ -55,8 +55,11 @@ SETTINGS: dict[int, Handler] = {
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | {"pos"}
 """What with an axis as index lets it move on its own, `POS[X]=100`."""
 
-MOVING = frozenset({"AP", "RP", *VECTOR}) | OTHERS
+MOVING = frozenset({"AP", "RP", *VECTOR, *ANGLES}) | OTHERS
 """Words that make a block move even where no axis is named."""
+
+ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
+"""What A2 B2 C2 are: the names of one group of G codes."""
 
 CIRCLE = frozenset({"I", "J", "K", "AR", "TURN"})
 """Those that do it while G2 or G3 is in force."""
@@ -113,6 +116,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         control.suspended["coordinates"] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
+    elif name in ANGLE_KINDS:
+        control.modes.angles = name
     elif name.startswith("ori"):
         control.modes.orientation = name
     elif name in HARMLESS:

@@ -2,16 +2,19 @@
 
 X Y Z are then those of the tip in a frame that the workpiece carries, whatever the rotary axes do: the control works
 the swivelled geometry into the frames. `p -> X0 + turn @ (X1 + p)`, the turns one after another about the axes as the
-ones before have left them, in the order of the mode.
+ones before have left them, in the order of the mode. Solid angles turn about Z, then about Y; projected angles are
+those of the plane's traces in the planes of the axes.
 Source: Siemens, "SINUMERIK Operate, milling": CYCLE800, external programming (_FR, _TC, _ST, _MODE, _X0 ... _DIR).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotation
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix.program.sinumerik.destination import End, Words
 from ncfix.program.sinumerik.orientation import WAY
@@ -22,6 +25,11 @@ from ncfix.program.tree import Text
 
 ORDER = {1: "X", 2: "Y", 3: "Z"}
 """The axes in the bits of the mode."""
+
+AXIS_BY_AXIS, SOLID, PROJECTED = 0, 1, 2
+"""The kinds of angles in its bits 6 and 7."""
+
+FLAT = 1e-9
 
 PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "dir": 13}
 """Where the arguments stand: retraction, state, mode, reference point, angles, zero point, direction."""
@@ -71,17 +79,47 @@ class Plane:
     def of(cls, values: list[float]) -> Plane:
         """From the numbers of the call."""
         mode, table = round(values[PLACES["mode"]]), round(values[PLACES["st"]])
-        order = "".join(ORDER.get(mode >> shift & 3, "") for shift in (0, 2, 4))
-        fault = ""
-        if mode >> 6 or sorted(order) != ["X", "Y", "Z"]:
-            fault = f", mode {mode}"
         direction = round(values[PLACES["dir"]])
+        before, angles, after = (values[PLACES[name] : PLACES[name] + 3] for name in ("before", "angles", "after"))
+        turn = turn_of(mode, angles)
+        fault = f", mode {mode}" if turn is None else ""
         if direction not in (-1, 1):
             fault = fault or ", without turning the rotary axes"
-        before, angles, after = (values[PLACES[name] : PLACES[name] + 3] for name in ("before", "angles", "after"))
-        turn = turned(dict(zip(order, angles, strict=False)), order)
-        frame = shifted(dict(enumerate(before))).then(turn).then(shifted(dict(enumerate(after))))
+        frame = shifted(dict(enumerate(before))).then(turn or WORLD).then(shifted(dict(enumerate(after))))
         return cls(frame, table % 10 == 1, direction, round(values[PLACES["fr"]]) != 0, fault)
+
+
+def turn_of(mode: int, angles: Sequence[float]) -> Affine | None:
+    """How the plane is turned; None for modes that are not followed (rotary axes given directly)."""
+    order = "".join(ORDER.get(mode >> shift & 3, "") for shift in (0, 2, 4))
+    kind = mode >> 6
+    if kind == SOLID:
+        return turned(dict(zip("ZY", angles, strict=False)), "ZY")
+    if sorted(order) != ["X", "Y", "Z"] or kind not in (AXIS_BY_AXIS, PROJECTED):
+        return None
+    by_axis = dict(zip(order, angles, strict=False))
+    if kind == AXIS_BY_AXIS:
+        return turned(by_axis, order)
+    return projected(by_axis) if order.endswith("Z") else None
+
+
+def projected(angles: dict[str, float]) -> Affine | None:
+    """The new X lies in the old plane ZX, turned by the angle about Y; the plane cuts YZ at the angle about X; then it
+    turns about the new Z. None where the two lines do not span a plane.
+    """
+    x, trace = np.array(column(turned(angles, "Y"), 0)), np.array(column(turned(angles, "X"), 1))
+    normal = np.cross(x, trace)
+    size = float(np.linalg.norm(normal))
+    if size < FLAT:
+        return None
+    normal /= size
+    frame = np.stack([x, np.cross(normal, x), normal], axis=-1)
+    return Affine(rotation=as_rotation(frame.tolist())).then(turned(angles, "Z"))
+
+
+def column(frame: Affine, axis: int) -> list[float]:
+    """Where an axis of the frame points."""
+    return [row[axis] for row in frame.rotation]
 
 
 def untilted(control: Sinumerik) -> None:

@@ -21,6 +21,9 @@ MOTIONS = {"cip": 1000, "ct": 1010, "poly": 1020, "aspline": 1030, "bspline": 10
 MOTIONS |= dict.fromkeys(("invcw", "invccw"), 1060)
 """Names that belong to the group of G0 to G3; the numbers are ours, for the column `modal`."""
 
+CT_LEFT, CT_RIGHT = MOTIONS["ct"], MOTIONS["ct"] + 1
+"""Of the column `modal`: an arc of CT that turns counter-clockwise, and clockwise."""
+
 UNFOLLOWED_MOTIONS = {
     1020: "polynomials (POLY)",
     1030: "splines (ASPLINE)",
