@@ -150,6 +150,8 @@ class Reading:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
         known = list(map(self.index.get, found.shapes))
+        if None in known and found.group is not None:
+            known = self.learned(first, found, known)
         if None not in known:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
@@ -161,6 +163,31 @@ class Reading:
             self.take(self.learn(first, row, found, exact) if template is None else template)
         counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
         return Columns(counts, spans + self.blocks[first, 0], values)
+
+    def learned(self, first: int, found: Scan, known: list[int | None]) -> list[int | None]:
+        """The templates of shapes that are given once each; of a new one from its first block, if that will do."""
+        _, rows = np.unique(np.asarray(found.group), return_index=True)
+        templates = list(known)
+        for number in sorted((n for n, template in enumerate(known) if template is None), key=rows.__getitem__):
+            templates[number] = self.understood(first, int(rows[number]), found, found.shapes[number])
+            if templates[number] is None:
+                break
+        return templates
+
+    def understood(self, first: int, row: int, found: Scan, shape: bytes | None) -> int | None:
+        """The template of a new shape; None where its block cannot be read, or has to be taken as it is."""
+        assert shape is not None
+        template = shapes_of(self.dialect).recall(shape)
+        if template is None:
+            try:
+                parsed = parse_block(self.dialect, self.source[slice(*self.blocks[first + row])].decode("latin-1"))
+            except BlockError:
+                return None
+            if not agrees(found, row, parsed, self.blocks[first + row, 0] - self.blocks[first, 0]):
+                return None
+            template = parsed.template
+            shapes_of(self.dialect).keep(shape, template)
+        return self.number(shape, template)
 
     def tail(self) -> Columns:
         """The blocks after the end of the tape."""

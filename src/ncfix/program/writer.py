@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import fast
+
 
 @dataclass(frozen=True, slots=True)
 class Edit:
@@ -65,12 +67,14 @@ class Splices:
             for name in ("start", "stop", "length")
         )
         data = b"".join(part.data for part in parts)
-        if not ((np.diff(start) < 0) | ((np.diff(start) == 0) & (np.diff(stop) < 0))).any():
+        if not (np.diff(2 * start + (stop > start)) < 0).any():
             return cls(start, stop, length, data)
-        order = np.lexsort((stop, start))
-        first = np.cumsum(length) - length
-        taken = np.frombuffer(data, dtype=np.uint8)[_stretches(first[order], length[order])]
-        return cls(start[order], stop[order], length[order], taken.tobytes())
+        order = np.argsort(2 * start + (stop > start), kind="stable")
+        ends = np.cumsum(length)
+        breaks = np.flatnonzero(np.diff(order) != 1)  # what lies between two breaks stands together already
+        heads, tails = np.append(0, breaks + 1), np.append(breaks, len(order) - 1)
+        edges = zip((ends - length)[order[heads]].tolist(), ends[order[tails]].tolist(), strict=True)
+        return cls(start[order], stop[order], length[order], b"".join(data[slice(*each)] for each in edges))
 
     def edits(self) -> Iterator[Edit]:
         """One by one."""
@@ -87,6 +91,11 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     start, stop = splices.start, splices.stop
     if start[0] < 0 or stop[-1] > len(source) or (start > stop).any() or (stop[:-1] > start[1:]).any():
         raise ValueError(f"edits overlap, or lie outside the {len(source)} bytes")
+    if fast.engaged():
+        from ncfix.program import writing_kernels
+
+        text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
+        return bytes(writing_kernels.spliced(text, start, stop, splices.length, data))
     kept = ~_cover(len(source), start, stop)
     ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
     out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
@@ -103,11 +112,3 @@ def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> ND
     change[starts[full]] += 1
     change[stops[full]] -= 1
     return np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)
-
-
-def _stretches(first: NDArray[np.int64], length: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The indices first, first + 1, ... of stretches of such lengths, one stretch after the other."""
-    ends = np.cumsum(length)
-    indices: NDArray[np.int64] = np.arange(int(ends[-1]) if len(ends) else 0)
-    indices += np.repeat(first - (ends - length), length)
-    return indices

@@ -25,7 +25,7 @@ class PartInterpreter(Interpreter):
 
     def go_on(self, program: Program) -> None:
         """Take the next part."""
-        self.main = self.unit_of(program, "")
+        self.main = self.main.followed_by(program)
         self.flow.unit, self.flow.block = self.main, 0
         self.first = False
 

@@ -39,7 +39,7 @@ class Unit:
     first: Sequence[int] = field(init=False)
     numbers: Sequence[float] = field(init=False)
     flows: list[int] = field(init=False)
-    _plans: list[Plan | None] = field(init=False)
+    _plans: list[Plan | None] = field(default_factory=list)
     _lane_stops: NDArray[np.int64] | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
@@ -47,9 +47,13 @@ class Unit:
         self.template = view(program.template)
         self.first = view(program.first_number)
         self.numbers = view(program.numbers)
-        self._plans = [None] * len(program.templates)
+        self._plans += [None] * (len(program.templates) - len(self._plans))
         shapes = {index for index, t in enumerate(program.templates) if any(isinstance(i, Flow) for i in t.items)}
         self.flows = [block for block, shape in enumerate(self.template) if shape in shapes] if shapes else []
+
+    def followed_by(self, program: Program) -> Unit:
+        """The next part of the same program: its templates are those of this one, and more."""
+        return Unit(program, self.rules, self.axes, self.name, _plans=self._plans)
 
     def __len__(self) -> int:
         return len(self.template)
