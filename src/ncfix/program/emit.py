@@ -7,7 +7,6 @@ the same each time; where it does not, the block is reported as a conflict, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from ncfix.program.bulk import Bulk
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
+from ncfix.program.levels import LevelBook
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
@@ -23,12 +23,11 @@ from ncfix.program.render import STRAIGHT_AND_ARCS
 from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
-from ncfix.program.writer import Edit, Splices
+from ncfix.program.writer import Edit, Splices, line_end
 
 FloatArray = NDArray[np.float64]
 
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
-PINNED = "a refused block that follows starts from its end"
 FLOW = "the block is more than words"
 MODE_LOST = "a kept block that follows relies on its motion code"
 
@@ -118,12 +117,13 @@ class _Emitter:
         self.moved = moves.moved
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
-        self.eol = _line_end(program.source)
+        self.eol = line_end(program.source).decode()
         self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
         self.replaced_by = -1
         self.cycle_end: FloatArray | None = None
+        self.levels = LevelBook(moves, pieces)
         self.written: dict[int, Rendered] = {}
         self.conflicts: dict[int, str] = {}
         self.end = pieces.end.copy()
@@ -152,10 +152,11 @@ class _Emitter:
                 self._retract(row)
             elif self.moves.kind[row] != Kind.DWELL:
                 self.cycle_end = None
+                self.levels.forget()
             row += 1
         edits, added = self._edits()
         splices = Splices.joined([*self.bulk.parts, Splices.of(edits)])
-        return Emission(splices, self.end, self.centre, self.start, self.conflicts, added)
+        return Emission(splices, self.end, self.centre, self.start, self.conflicts, added + self.bulk.added)
 
     def _stretch(self, row: int) -> int:
         """Write the stretch of plain motions that begins here all at once; the number of motions written."""
@@ -165,12 +166,13 @@ class _Emitter:
         ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
         if ends is None:
             return 0
-        stop = row + len(ends)
-        self.end[self.first_piece[row:stop]] = ends
-        self.start[row], self.start[row + 1 : stop] = self.position, ends[:-1]
+        first = self.first_piece[row]
+        stop = int(np.searchsorted(self.first_piece, first + len(ends)))
+        self.end[first : first + len(ends)] = ends
+        self.start[row], self.start[row + 1 : stop] = self.position, self.end[self.first_piece[row + 1 : stop] - 1]
         self.position = ends[-1].copy()
         self.cycle_end = None
-        return len(ends)
+        return stop - row
 
     # -- the control's book -------------------------------------------------------------------------------------------
 
@@ -182,16 +184,20 @@ class _Emitter:
             self.position = np.where(jump, read[row], self.position)
 
     def _retract(self, row: int) -> None:
-        """After a canned cycle the control stands where it started, unless an attempt has shown that it does not."""
+        """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
         if row + 1 == len(self.moves) or self.reading.start is not None:
             return
-        moves = self.moves
+        moves, risen = self.moves, self.levels.returns(row)
+        if risen.any():
+            self.position = np.where(risen, self.levels.approach, self.position)
         back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
-        self.position = np.where(back, self.start[row], self.position)
-        self.jumps[row + 1] &= ~back
+        self.position = np.where(back & ~risen, self.start[row], self.position)
+        self.jumps[row + 1] &= ~(back | risen)
 
     def _keep(self, row: int) -> None:
         moves = self.moves
+        if moves.kind[row] != Kind.DWELL:
+            self.levels.forget()
         moved, began, ended = self.moved[row], self.reading.start, self.reading.end
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
             moved = moved | (np.abs(ended[row] - began[row]) > 0)
@@ -237,6 +243,8 @@ class _Emitter:
         if np.isinf(target.turn_minutes) and is_dragged(target):
             self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.render(self.program, block, layout, target)
+        if rendered.conflict:
+            self.conflicts.setdefault(block, rendered.conflict)
         slow = target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0
         if slow and crawls(target, float(self.moves.feed[row]), np.array(rendered.ends)):
             self.conflicts.setdefault(block, CRAWLS)
@@ -246,6 +254,7 @@ class _Emitter:
             self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
         for piece, centre in rendered.centres.items():
             self.centre[rows.start + piece] = frame.command_point(centre, self.moves.axes)
+        self.levels.note(int(self.reading.frame[row]), frame, target, rendered)
         still = frame.still(np.array(rendered.ends)[-1] == target.start)
         self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
@@ -262,9 +271,8 @@ class _Emitter:
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
-        is_cycle = moves.kind[row] == Kind.CYCLE
         modal = int(moves.modal[row])
-        straight = modal if modal in (0, 10) or is_cycle else 10
+        straight = modal if modal in (0, 10) or moves.kind[row] == Kind.CYCLE else 10
         fractions = pieces.fraction[rows]
         arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
@@ -298,6 +306,7 @@ class _Emitter:
             pointing=moves.pointing,
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
+            **self.levels.wanted(row, rows.start, int(self.reading.frame[row]), frame, as_programmed),
         )
 
     def _turn_minutes(self, row: int) -> float:
@@ -327,8 +336,7 @@ class _Emitter:
             edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
             if rendered.lines:
                 at = int(self.program.blocks[block, 1])
-                text = "".join(self.eol + line for line in rendered.lines)
-                edits.append(Edit(at, at, text.encode("latin-1")))
+                edits.append(Edit(at, at, "".join(self.eol + line for line in rendered.lines).encode("latin-1")))
                 added += len(rendered.lines)
         return tuple(edits), added
 
@@ -366,35 +374,3 @@ def _jumps(moves: Moves) -> NDArray[np.bool_]:
     jumps[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
     jumps[1:] |= (moves.tcp[1:] != moves.tcp[:-1])[:, None] & ~moves.rotary
     return jumps
-
-
-def _line_end(source: bytes) -> str:
-    """The line end that the file uses first."""
-    at = source.find(b"\n")
-    return "\r\n" if at > 0 and source[at - 1 : at] == b"\r" else "\n"
-
-
-def closure_of_refusals(moves: Moves, kept: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], Sequence[int]]:
-    """Extend `kept` (n,) so that motions that are left as they were also begin where they began.
-
-    A refused arc, increment or cycle means another path when it starts elsewhere: the motion before it is kept too,
-    and so on back to a motion that names all its targets. Returns the extended mask and the rows added.
-    """
-    kept = kept.copy()
-    added: list[int] = []
-    starts_matter = moves.incremental | (moves.kind == Kind.ARC) | (moves.kind == Kind.CYCLE)
-    passed = moves.rule == Rule.PASS
-    complete = np.asarray(moves.programmed.all(axis=1))
-    reached = len(moves)
-    for row in np.flatnonzero(kept & starts_matter & ~passed)[::-1].tolist():
-        pinned = row < reached
-        reached = min(reached, row)
-        while pinned and reached > 0:
-            reached -= 1
-            if passed[reached]:
-                continue
-            if not kept[reached]:
-                kept[reached] = True
-                added.append(reached)
-            pinned = bool(starts_matter[reached] or not complete[reached])
-    return kept, added

@@ -51,6 +51,9 @@ class Target:
     pointing     how rotary positions (rad) point the tool, where the program gives its direction
     rotation     (3, 3) how the frame is turned
     offset       (n_axes,) of the frame, mm and rad
+    across       of a canned cycle with a level R: the column of the axis along which it drills
+    level        what R shall be, NaN where it is not to be written
+    nominal_level, level_before  what it was as programmed, and what is in force before the block (NaN: not known)
     """
 
     letters: tuple[str, ...]
@@ -83,6 +86,10 @@ class Target:
     pointing: Pointing | None = None
     rotation: FloatArray | None = None
     offset: FloatArray | None = None
+    across: int = -1
+    level: float = float("nan")
+    nominal_level: float = float("nan")
+    level_before: float = float("nan")
 
     @property
     def last_code(self) -> int:
@@ -97,6 +104,8 @@ class Rendered:
     """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
 
     centre, centres  of the first piece if it is an arc, and of further ones by their number
+    level            the R that is in force behind the block, if that is known
+    conflict         why the motion cannot be written after all; empty if it is
     """
 
     edits: list[tuple[int, int, str]] = field(default_factory=list)
@@ -104,6 +113,8 @@ class Rendered:
     ends: list[FloatArray] = field(default_factory=list)
     centre: FloatArray | None = None
     centres: dict[int, FloatArray] = field(default_factory=dict)
+    level: float | None = None
+    conflict: str = ""
 
     @property
     def text(self) -> tuple[object, ...]:

@@ -19,7 +19,7 @@ EQUAL = 1e-9
 
 @dataclass(slots=True)
 class Parameters:
-    """The Q parameters.
+    """The Q parameters; QL parameters belong to one program, the others to all.
 
     values   those that the program has set, or the setup gives
     runtime  those of them that were computed from what is known only at run time
@@ -43,6 +43,19 @@ class Parameters:
         """Set a parameter."""
         self.values[name] = value
         (self.runtime.add if runtime else self.runtime.discard)(name)
+
+    def enter(self) -> dict[str, tuple[float, bool]]:
+        """A program is called: it has QL parameters of its own. Returns those of the caller, for `leave`."""
+        own = {name: (value, name in self.runtime) for name, value in self.values.items() if name.startswith("QL")}
+        for name in own:
+            del self.values[name]
+        return own
+
+    def leave(self, own: Mapping[str, tuple[float, bool]]) -> None:
+        """The called program is over."""
+        self.enter()
+        for name, (value, runtime) in own.items():
+            self.assign(name, value, runtime)
 
 
 @dataclass(slots=True)

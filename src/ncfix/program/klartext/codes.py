@@ -1,6 +1,6 @@
 """M codes that matter to where the tool goes. Others, also those of the machine's builder, move nothing.
 
-Source: TNC 640, "Miscellaneous functions". M128 acts from the start of its block, M129 from its end.
+Source: TNC 640, "Miscellaneous functions". M94 and M128 act from the start of their block, M129 from its end.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ SUSPENDING = {
 ENDING = {115: 114, 145: 144}
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = "retract along the tool axis (M140)"
+COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
+FULL = 2 * math.pi
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}
 
 
@@ -35,11 +37,28 @@ def before_motion(control: Control, step: Step) -> None:
     if 130 in step.codes and control.transformations.tilted:
         control.suspended["M130"] = UNTILTED
     if step.codes & {126, 127}:
-        control.shortest = 126 in step.codes
+        end_of_short_ways(control, 127 in step.codes)
     if 136 in step.codes or 137 in step.codes:
         control.modal.feed_mode = 95 if 136 in step.codes else 94
     if 128 in step.codes:
         tip_control(control, on=True)
+    if 94 in step.codes:
+        reduce_turns(control)
+
+
+def end_of_short_ways(control: Control, on: bool) -> None:
+    """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn."""
+    past = [index for index in control.machine if control.rotary[index] and not 0 <= control.position[index] < FULL]
+    if on and control.shortest:
+        control.lose([index for index in past if index not in control.unknown], COUNTED)
+    control.shortest = not on
+
+
+def reduce_turns(control: Control) -> None:
+    """M94: rotary axes are said by an angle below a turn from here on."""
+    for index in control.machine:
+        if control.rotary[index]:
+            control.position[index] %= 2 * math.pi
 
 
 def tip_control(control: Control, *, on: bool) -> None:
@@ -52,9 +71,6 @@ def after_motion(control: Control, code: int, own: Words, flags: frozenset[str])
     """What acts at the end of the block."""
     if code == 129:
         tip_control(control, on=False)
-    elif code == 94:
-        for index in control.machine:
-            if control.rotary[index]:
-                control.position[index] %= 2 * math.pi
+        control.path.by_vector = False
     elif code == 140:
         control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")

@@ -38,6 +38,7 @@ class Path:
     tangent  the direction in which the last path element ended, commands; None where there is none
     corner   the block before was a corner (RND, CHF)
     ahead    the block that follows is one
+    by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
     """
 
     pole: tuple[float, float] | None = None
@@ -45,6 +46,7 @@ class Path:
     tangent: tuple[float, float, float] | None = None
     corner: bool = False
     ahead: bool = False
+    by_vector: bool = False
 
 
 @dataclass(slots=True)
@@ -161,9 +163,15 @@ class Control(base.Control):
         passing: str = "",
         arc: Arc | None = None,
     ) -> None:
-        """As for the RS274 family; elements at a corner that the control makes (RND, CHF) must not be split."""
+        """As for the RS274 family.
+
+        What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
+        (PATHCTRL VECTOR), which in pieces would be turns of axes.
+        """
         before = self.modal.compensated
-        if self.path.corner or self.path.ahead:
+        self.tilted = self.transformations.tilted and not self.m128
+        turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)
+        if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.modal.compensated = before or 41
         super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc)
         self.modal.compensated = before

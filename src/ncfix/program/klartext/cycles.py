@@ -19,10 +19,14 @@ from ncfix.program.rs274.faults import Fault
 
 NO_CYCLE = "NCF272"
 DEPTHS = "NCF274"
-DRILLING = frozenset({200, 201, 202, 203, 204, 205, 206, 207, 208, 209, 240, 241})
+DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
+"""Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
+
 OLD_DRILLING = frozenset({1, 2, 17, 18})
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
 DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
+CALLING = 12
+CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
 """Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
 
@@ -143,6 +147,8 @@ def call(control: Control, step: Step) -> None:
     if cycle.number == 0:
         raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
     control.use()
+    if cycle.number == CALLING:
+        control.refusal = control.refusal or CALLED
     if cycle.number not in DRILLING | OLD_DRILLING:
         own_path(control, step)
         return

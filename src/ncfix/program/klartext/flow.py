@@ -6,9 +6,10 @@ been executed once; LBL 0 returns from a subprogram and means nothing elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ncfix.program.klartext.calculate import Parameters
 from ncfix.program.klartext.units import Unit
 from ncfix.program.rs274.faults import Fault
 
@@ -20,11 +21,12 @@ MOST_CALLS = 64
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Where a call came from, and whether it was to another program."""
+    """Where a call came from, whether it was to another program, and if so the QL parameters of the caller."""
 
     unit: Unit
     block: int
     outside: bool
+    local: Mapping[str, tuple[float, bool]] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -32,12 +34,14 @@ class FlowControl:
     """Where the control is in the program.
 
     unit, block  the block that comes next
+    parameters   the Q parameters
     calls        the calls that are open
     repeats      how often a repeat has still to be made
     """
 
     unit: Unit
     find: Callable[[str], Unit | None]
+    parameters: Parameters
     block: int = 0
     calls: list[Call] = field(default_factory=list)
     repeats: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -76,7 +80,7 @@ class FlowControl:
         """Note where to come back to."""
         if len(self.calls) >= MOST_CALLS:
             raise Fault(TOO_DEEP, f"more than {MOST_CALLS} calls are open")
-        self.calls.append(Call(self.unit, self.block, outside))
+        self.calls.append(Call(self.unit, self.block, outside, self.parameters.enter() if outside else {}))
 
     def end_of_subprogram(self) -> None:
         """LBL 0."""
@@ -95,4 +99,6 @@ class FlowControl:
     def back(self) -> None:
         """Return from the last call."""
         call = self.calls.pop()
+        if call.outside:
+            self.parameters.leave(call.local)
         self.unit, self.block = call.unit, call.block

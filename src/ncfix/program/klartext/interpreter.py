@@ -20,6 +20,7 @@ from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words, axis_letters, set_pole
 from ncfix.program.klartext.tools import call_tool, define_tool
 from ncfix.program.klartext.units import Unit
+from ncfix.program.klartext.unread import unread_line
 from ncfix.program.language import Resolve
 from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
@@ -30,10 +31,8 @@ from ncfix.program.tree import Opaque, Program, Span
 ENDLESS = "NCF233"
 NO_END = "NCF234"
 SKIPPED_BLOCKS = "NCF235"
-UNREADABLE = "NCF236"
 WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
-NOT_KLARTEXT = "this line is not Klartext; the control stops at it"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
 """Addresses in motion blocks that lead nowhere."""
@@ -82,7 +81,7 @@ class Interpreter:
         """Follow the program to its end; raises SourceError where the control would stop."""
         try:
             main = Unit(self.program)
-            self.flow = FlowControl(main, self.find, main.begin)
+            self.flow = FlowControl(main, self.find, self.control.scope.parameters, main.begin)
             self.control.unit = main.mm
             self.control.recompose()
             self.walk(self.flow)
@@ -152,8 +151,7 @@ class Interpreter:
         kind, span = plan.statement
         text = flow.unit.program.slice(flow.block - 1, span)
         if kind == UNREAD:
-            self.control.warn(UNREADABLE, NOT_KLARTEXT, "correct the line, or name the dialect with --dialect")
-            self.control.refuse_here(NOT_KLARTEXT)
+            unread_line(self.control, flow.unit.program.text_of(flow.block - 1))
         elif kind == "program":
             return text.upper().startswith("END") and flow.end_of_program()
         else:

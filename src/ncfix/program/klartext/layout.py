@@ -9,7 +9,7 @@ from functools import lru_cache
 
 from ncfix.program.klartext.plans import FUNCTIONS, OPENING
 from ncfix.program.layout import AXIS_LETTERS
-from ncfix.program.tree import Anchor, Command, Constant, Literal, Program, Skip, Span, Word
+from ncfix.program.tree import Anchor, Command, Comment, Constant, Item, Literal, Opaque, Program, Skip, Span, Word
 
 POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
 LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
@@ -101,18 +101,27 @@ def layout_of(program: Program, block: int) -> Layout | None:
         blank=separator(program, block, last),
         comma=uses_comma(program.source),
         rapid=any(command.name == "fmax" for command in commands),
-        corner=is_corner(program, block - 1) or is_corner(program, block + 1),
+        corner=is_corner(program, block, -1) or is_corner(program, block, 1),
     )
 
 
-def is_corner(program: Program, block: int) -> bool:
-    """Whether a block is RND or CHF."""
-    if not 0 <= block < len(program):
-        return False
-    names = (
-        item.name if isinstance(item, Command) else getattr(item, "address", "") for item in program.items_of(block)
-    )
-    return any(name.lower() in ("rnd", "chf") for name in names)
+def is_corner(program: Program, block: int, way: int) -> bool:
+    """Whether the next block that is more than a remark is RND or CHF; `way`: 1 after this one, -1 before it."""
+    block += way
+    while 0 <= block < len(program):
+        items = [item for item in program.items_of(block) if not is_remark(item)]
+        if items:
+            names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
+            return any(name.lower() in ("rnd", "chf") for name in names)
+        block += way
+    return False
+
+
+def is_remark(item: Item) -> bool:
+    """A comment, a structuring remark, the block number, block skip."""
+    structure = isinstance(item, Opaque) and item.kind == "structure"
+    number = isinstance(item, Word) and item.address == "N"
+    return structure or number or isinstance(item, (Comment, Skip))
 
 
 def numbers_of(items: tuple[object, ...]) -> list[object]:

@@ -26,6 +26,7 @@ from ncfix.program.rs274.coordinates import Vector, dot
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
+NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
 TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
@@ -141,6 +142,8 @@ def at_machine(control: Control, step: Step) -> None:
         tcp.switch(control, control.offsets.tool, False)
         control.refresh()
         target, unknown = in_machine(control, step.words)
+    if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
+        unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
     control.move(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code))
     if was:
         control.switch_tip()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ncfix.program.number_style import NumberStyle
 
@@ -21,8 +21,9 @@ class Style:
         return text.replace(".", ",") if self.comma else text
 
     def like(self, was: str, value: float, decimals: int) -> str:
-        """A number in place of another one, in its manner."""
-        text = NumberStyle.of(was.replace(",", ".")).write(value, decimals)
+        """A number in place of another one, in its manner; what had a sign keeps one."""
+        style = NumberStyle.of(was.replace(",", "."))
+        text = replace(style, plus=was.strip()[:1] in "+-").write(value, decimals)
         comma = "," in was or (self.comma and "." not in was)
         return text.replace(".", ",") if comma else text
 

@@ -1,5 +1,5 @@
-"""The pole that is in force at a block, as the text shows it: what has to come back after an arc that CR, CT or another
-function without a pole described, and that is written about a pole of its own.
+"""The pole that is in force at a block, as the text shows it, and whether blocks after it rely on that: what has to come
+back after an arc that is written about a pole of its own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,26 @@ LINE = re.compile(
     rf"|(?:CC(?![A-Z])|LBL|[^;\r\n]*(?:CALL|M99|M98|M89)))".encode("latin-1")
 )
 """A pole in plain numbers, or what may set another one or be reached from elsewhere."""
+
+
+NUMBERED = r"(?im)^[ \t]*/?[ \t]*\d*[ \t]*"
+SETS = re.compile(rb"(?i)CC[ \t]*(?:[;~\r\n]|\Z|I?[XYZ][^;\r\nXYZ]*I?[XYZ])|END[ \t]+PGM")
+EVENT = re.compile(
+    (
+        NUMBERED + r"(?P<what>CC?(?![A-Z])|LP|CP|CTP|(?:APPR|DEP)[ \t]+P|CALL|FN|IF|LBL[ \t]*0(?!\d)|END[ \t]+PGM)"
+    ).encode()
+)
+"""What sets a pole, relies on one, or may lead elsewhere; other labels are passed through."""
+
+
+def is_relied_on(source: bytes, after: int) -> bool:
+    """Whether what follows a byte of the program may rely on the pole that is in force there."""
+    for found in EVENT.finditer(source, after):
+        line = source[found.start("what") : found.start("what") + 80]
+        if re.match(rb"(?i)FN[ \t]*(?!9|1[0-2])\d", line):
+            continue
+        return SETS.match(line) is None
+    return False
 
 
 def pole_in_force(source: bytes, at: int) -> str | None:

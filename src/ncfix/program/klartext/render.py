@@ -13,7 +13,7 @@ from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, ar
 from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
 from ncfix.program.klartext.layout import Layout, poles_move
 from ncfix.program.klartext.number_text import value_of
-from ncfix.program.klartext.poles import pole_in_force
+from ncfix.program.klartext.poles import is_relied_on, pole_in_force
 from ncfix.program.klartext.words_text import WordWriter
 from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program
@@ -27,6 +27,7 @@ BY_PATH = frozenset({"c", "ct", "ctp", "cp", "lp"})
 SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
+WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
 CLOCKWISE = 20
 EXACT = 1e-9
 
@@ -68,8 +69,12 @@ class Renderer(WordWriter):
                 position = self._further_line(position, target.ends[piece])
             self.out.ends.append(position)
         self._move_late_codes()
-        old_pole = self._old_pole() if self.own_pole else ""
-        if old_pole:
+        if not self.own_pole or not is_relied_on(self.program.source, int(self.program.blocks[self.block, 1])):
+            return
+        old_pole = self._old_pole()
+        if old_pole is None:
+            self.out.conflict = WHICH_POLE
+        elif old_pole:
             self.out.lines.append(self._prefix() + old_pole)
 
     # -- what need not change -----------------------------------------------------------------------------------------
@@ -245,13 +250,12 @@ class Renderer(WordWriter):
     def _pole(self, found: ArcText) -> str:
         return "CC" + "".join(self.layout.blank + text for text in found.pole)
 
-    def _old_pole(self) -> str:
-        """The pole that was in force, which later blocks may rely on; empty if there was none."""
+    def _old_pole(self) -> str | None:
+        """The pole that was in force, which later blocks may rely on; empty if there was none, None if nobody knows."""
         target = self.target
         if self.layout.name not in ("c", "cp"):
             words = pole_in_force(self.program.source, int(self.program.blocks[self.block, 0]))
-            if words is not None:
-                return f"CC{self.layout.blank}{words}" if words else ""
+            return f"CC{self.layout.blank}{words}" if words else words
         digits = max(POLE_DIGITS, int(target.decimals[target.spatial[target.plane[0]]]))
         pairs = sorted((index, float(target.original_centre[index])) for index in target.plane[:2])
         return "CC" + "".join(

@@ -23,6 +23,15 @@ PROGRAM_NAME = re.compile(r"CALL\s+PGM\s*(?P<name>.*)", re.IGNORECASE | re.DOTAL
 FREE = re.compile(r"F(LT|L|CT|C|POL|SELECT)\b", re.IGNORECASE)
 TCPM = re.compile(r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 STOPPING = re.compile(r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", re.IGNORECASE)
+HARMLESS_FUNCTIONS = re.compile(
+    r"FUNCTION\s+(RESET\s+)?(FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL|MODE\s+SET|DRESS\s+END|FLUTES|FILE|TCPM)",
+    re.IGNORECASE,
+)
+"""FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections) may not."""
+
+WRITING = re.compile(r"FN\s*(17|25)\b", re.IGNORECASE)
+"""They write into the control's own data: datums, presets, tools."""
+
 TRANSFORMATION = re.compile(r"TRANS\s+(MIRROR|ROTATION|SCALE)", re.IGNORECASE)
 CHOSEN = re.compile(r"(SEL\s+(PGM|CYCLE|TABLE)|CALL\s+SELECTED|POLARKIN)", re.IGNORECASE)
 
@@ -42,6 +51,9 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
     elif TRANSFORMATION.match(text) or CHOSEN.match(text):
         name = " ".join(text.split()[:2]).upper()
         control.refusal = control.refusal or f"{name} is not followed"
+    elif WRITING.match(text) or (re.match("FUNCTION", text, re.IGNORECASE) and not HARMLESS_FUNCTIONS.match(text)):
+        name = " ".join(text.partition(":")[0].split()[:3]).upper()
+        control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
     elif READING.match(text):
         read_values(control, text)
 
@@ -58,6 +70,7 @@ def read_values(control: Control, text: str) -> None:
 def tcpm(control: Control, found: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.suspended.pop("tcpm", None)
+    control.path.by_vector = False
     if found["reset"]:
         tip_control(control, on=False)
         return
@@ -66,6 +79,7 @@ def tcpm(control: Control, found: re.Match[str]) -> None:
         control.suspended["tcpm"] = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
     if "REFPNT" in words and "TIP-TIP" not in words:
         control.suspended["tcpm"] = "FUNCTION TCPM with a reference point other than the tip"
+    control.path.by_vector = "PATHCTRL VECTOR" in " ".join(words.split())
     tip_control(control, on=True)
 
 

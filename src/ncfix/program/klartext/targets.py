@@ -16,6 +16,7 @@ from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Vector, X, Y,
 from ncfix.program.rs274.faults import Fault
 
 BAD_POLE = "NCF271"
+COUNTED_FROM = "where the axis {} stands after incremental words with M91 depends on what the control counts from"
 RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
 PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
 """Planes by their axes; the angle is counted from the first axis (X, Z, Y) towards the second."""
@@ -127,11 +128,13 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
 
 
 def in_machine(control: Control, words: Words) -> tuple[Vector, Unknown]:
-    """The command of words in machine coordinates (M91)."""
+    """The command of words in machine coordinates (M91); increments count from the last such position, if any."""
     target, unknown = control.position[:], dict(control.unknown)
     for address, value in words.values.items():
-        index = INDEX.get(address)
-        if index is not None:
+        index = INDEX.get(address.removeprefix("I"))
+        if index is not None and address[0] == "I":
+            unknown[index] = COUNTED_FROM
+        elif index is not None:
             target[index] = value * (DEGREE if control.rotary[index] else control.unit)
             unknown.pop(index, None)
             if address in words.runtime:

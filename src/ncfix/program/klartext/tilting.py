@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from ncfix.program.klartext.control import TILTED, Control
 from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
@@ -18,6 +20,9 @@ from ncfix.program.rs274.coordinates import DEGREE, IDENTITY, INDEX, Rotation, p
 from ncfix.program.rs274.faults import Fault
 
 BAD_PLANE = "NCF273"
+NONE = 1e-9
+"""rad; an axis that is said to stand at zero."""
+
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
 TURNED = "the control positions the rotary axes (PLANE)"
 WAY = "NCF279"
@@ -127,10 +132,23 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
     if sign:
         master = control.machine[pointing.columns[1]]
         ways = [way for way in ways if abs(way[master]) < 1e-9 or (way[master] < 0) == (sign == "-")]
+    if flags & {"turn", "move"} and pointing.at_pole(np.array(normal)):
+        return way_at_pole(control, ways[0], flags)
     if len(ways) > 1:
         angles = " ".join(f"{'XYZABC'[index]}{angle / DEGREE:.3f}" for index, angle in ways[0].items())
         control.warn(WAY, f"the rotary axes are taken to turn to {angles}, the nearest of several ways", WAY_HINT)
     return ways[0] if ways else None
+
+
+def way_at_pole(control: Control, way: dict[int, float], flags: frozenset[str]) -> dict[int, float] | None:
+    """The way to a plane to which the tool is square wherever the axis next to the workpiece stands.
+
+    That axis is free: by COORD ROT, which counts where nothing is said, some controls turn it to zero, others leave it;
+    by TABLE ROT it takes over the rotation of the plane. Only where it stands at zero already, all is one.
+    """
+    assert control.pointing is not None
+    free = control.machine[control.pointing.columns[0]]
+    return way if "table rot" not in flags and abs(way[free]) < NONE else None
 
 
 def turn_axes(control: Control, way: dict[int, float] | None) -> None:

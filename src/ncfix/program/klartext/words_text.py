@@ -60,25 +60,37 @@ class WordWriter:
     def _left_alone(self, column: int) -> bool:
         """An axis that must not get a word.
 
-        A rotary axis in a program with tilted planes: the control would not keep the tip where it is. The tool axis
-        beside a corner that the control makes, which lies in the working plane, and in a departure.
+        A rotary axis in a program with tilted planes: the control would not keep the tip where it is; and on paths that
+        are made in a plane, or lead to or away from one. The tool axis beside a corner that the control makes, which
+        lies in the working plane, and in a departure.
         """
         layout, target = self.layout, self.target
         if target.rotary and target.rotary[column]:
             turned = any(letter in layout.axes for letter in "ABC")
-            return not turned and tilts(self.program.source)
+            bare = layout.corner or layout.name not in ("", "l", "ln", "lp")
+            return not turned and (bare or tilts(self.program.source))
         return (layout.corner or layout.name.startswith("dep")) and column == target.spatial[2]
 
     def _present(self, position: FloatArray, column: int, end: float, word: Word) -> None:
         base = float(position[column]) if word.address[0] == "I" else 0.0
-        original = float(self.target.nominal[column]) - base
-        if isinstance(word.value, Literal):
-            original = float(self.program.values_of(self.block)[word.value.slot])
+        original = self._said(column, word)
         value = end - base
         whole = len(self.target.ends) == 1
-        if np.isfinite(value) and (not whole or abs(value - original) >= self.half[column]):
+        if np.isfinite(value) and not (whole and abs(value - original) < self.half[column]):
             original = self._rewrite(word, value, int(self.target.decimals[column]))
         position[column] = base + original
+
+    def _said(self, column: int, word: Word) -> float:
+        """What a word says as programmed; NaN where that is not known."""
+        target = self.target
+        if isinstance(word.value, Literal):
+            return float(self.program.values_of(self.block)[word.value.slot])
+        if word.address[0] != "I":
+            return float(target.nominal[column])
+        if target.incremental:
+            return float(target.original[column])
+        began = target.origin[target.spatial.index(column)] if column in target.spatial else np.nan
+        return float(target.nominal[column] - began)
 
     def _absent(self, position: FloatArray, column: int, end: float, always: bool) -> None:
         if not np.isfinite(end) or (not always and abs(end - position[column]) < self.half[column]):
