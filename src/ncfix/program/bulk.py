@@ -17,11 +17,11 @@ from ncfix import fast
 from ncfix.program.bulk_layouts import Layouts
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
-from ncfix.program.moves import Frame, Kind, Moves, Rule
+from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
-from ncfix.program.writer import Splices
+from ncfix.program.writer import Splices, line_end
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -39,6 +39,7 @@ class Bulk:
 
     stop     (n + 1,) for each motion, the first one from there on that does not qualify
     layouts  the layout of each shape that qualifies
+    added    lines that were put in
     """
 
     program: Program
@@ -49,6 +50,7 @@ class Bulk:
     stop: IntArray
     reach: int = FIRST
     parts: list[Splices] = field(default_factory=list)
+    added: int = 0
 
     @classmethod
     def of(
@@ -80,7 +82,7 @@ class Bulk:
         position  (n_axes,) the command at which the control stands
         decimals  (n_axes,) digits that the least increment needs
 
-        Returns the commands (k, n_axes) at the ends of the motions written.
+        Returns the commands (k, n_axes) at the ends of the pieces written, which are those of whole motions.
         """
         if fast.engaged():
             return self._compiled(row, position, frame, decimals)
@@ -103,21 +105,23 @@ class Bulk:
         stop = int(self.stop[row])
         if stop == row:
             return None
-        program, blocks, layouts = self.program, self.moves.block[row:stop], self.layouts
-        ends = self.pieces.end[self.first_piece[row] : self.first_piece[stop]]
-        commands, start, end, length, data = writing_kernels.write(
+        program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
+        commands, start, end, length, data, lines = writing_kernels.write(
             np.frombuffer(program.source, dtype=np.uint8),
-            (program.blocks, blocks, program.first_number, program.template),
+            (program.blocks, self.moves.block[row:stop], program.first_number, program.template),
             (program.numbers, program.number_spans),
             (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
-            ends,
+            self.pieces.end[pieces[0] : pieces[-1]],
+            pieces - pieces[0],
             position,
             (frame.frame.offset, frame.scale),
             (decimals, _halves(decimals)),
+            np.frombuffer(line_end(program.source), dtype=np.uint8),
         )
         if not len(commands):
             return None
         self.parts.append(Splices(start, end, length, data.tobytes()))
+        self.added += lines
         return np.asarray(commands)
 
 
@@ -139,12 +143,24 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
     turns = (moves.kind == Kind.FEED) & (moves.end == moves.start)[:, ~moves.rotary].all(axis=1)
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
     fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
-    fit &= (np.diff(first_piece) == 1) & ~pieces.kept[first] & ~pieces.arc[first]
+    fit &= ~pieces.kept[first] & _writable_pieces(program, moves, pieces, first_piece, layouts)
     fit &= np.isfinite(pieces.end[first]).all(axis=1)
     fit &= layouts.known[program.template[moves.block]]
     fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
     fit[1:] &= moves.block[1:] > moves.block[:-1]
     return fit
+
+
+def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
+    """(n,) motions in one straight piece; in several, if they are compiled and nothing but words goes with them."""
+    single: Mask = (np.diff(first_piece) == 1) & ~pieces.arc[first_piece[:-1]]
+    several = np.flatnonzero(~single)
+    if fast.engaged() and len(several):
+        straight = np.add.reduceat(pieces.arc, first_piece[:-1], dtype=np.int64)[several] == 0
+        timed = (moves.feed_mode[several] == FeedMode.INVERSE_TIME) & (moves.modal[several] != 0)
+        finite = np.logical_and.reduceat(np.isfinite(pieces.end).all(axis=1), first_piece[:-1])[several]
+        single[several] = straight & ~timed & finite & layouts.further[program.template[moves.block[several]]]
+    return single
 
 
 @dataclass(slots=True)

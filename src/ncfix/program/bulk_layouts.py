@@ -20,6 +20,7 @@ class Layouts:
     """The layouts of a program's shapes, one row for each template; columns by axis.
 
     known      (s,) blocks of the shape may be written in bulk
+    further    (s,) further pieces of their motions, too
     slots      (s, n_axes) which of the block's numbers an axis has, -1 for none
     by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
     by_letter  (n_axes,) the axes in the order in which programs write them
@@ -28,6 +29,7 @@ class Layouts:
     """
 
     known: NDArray[np.bool_]
+    further: NDArray[np.bool_]
     slots: IntArray
     by_place: IntArray
     by_letter: IntArray
@@ -40,6 +42,7 @@ class Layouts:
         n, axes = len(program.templates), moves.axes
         by_letter = np.array(sorted(range(len(axes)), key=lambda column: AXIS_LETTERS.index(axes[column])), np.int64)
         table = cls(
+            np.zeros(n, np.bool_),
             np.zeros(n, np.bool_),
             np.full((n, len(axes)), -1),
             np.full((n, len(axes)), -1),
@@ -58,7 +61,7 @@ class Layouts:
     def enter(self, shape: int, layout: BulkLayout, axes: tuple[str, ...]) -> None:
         """Fill in the row of a shape."""
         present = sorted((layout.slots[letter], column) for column, letter in enumerate(axes) if letter in layout.slots)
-        self.known[shape] = True
+        self.known[shape], self.further[shape] = True, layout.further
         for place, (slot, column) in enumerate(present):
             self.slots[shape, column], self.by_place[shape, place] = slot, column
         self.anchors[shape] = layout.words_at

@@ -49,12 +49,14 @@ class BulkLayout:
     words_at  where missing axis words go
     blank     what stands before them: a blank or nothing
     lower     addresses are in lower case
+    further   further pieces of such a motion may follow as lines of nothing but axis words
     """
 
     slots: Mapping[str, int]
     words_at: Anchor
     blank: str
     lower: bool
+    further: bool = False
 
 
 @dataclass(frozen=True, slots=True)

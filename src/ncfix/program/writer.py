@@ -36,6 +36,12 @@ def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
     return b"".join(pieces)
 
 
+def line_end(source: bytes) -> bytes:
+    """The line end that a text uses first."""
+    at = source.find(b"\n")
+    return b"\r\n" if at > 0 and source[at - 1 : at] == b"\r" else b"\n"
+
+
 @dataclass(frozen=True, slots=True)
 class Splices:
     """Many edits as columns.

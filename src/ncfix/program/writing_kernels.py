@@ -30,6 +30,14 @@ ROOM = 32
 
 
 @njit(cache=True, nogil=True)
+def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
+    """Copy some bytes to `at`; where the next one goes."""
+    for place in range(start, stop):
+        out[at + place - start] = data[place]
+    return at + stop - start
+
+
+@njit(cache=True, nogil=True)
 def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, bool]:
     """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that."""
     first = start + (text[start] == PLUS or text[start] == MINUS)
@@ -117,78 +125,115 @@ def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> t
 
 
 @njit(cache=True, nogil=True)
+def put_line(
+    data: Bytes,
+    at: int,
+    end_of_line: Bytes,
+    layout: tuple[Ints, Bytes],
+    wanted: Floats,
+    now: Floats,
+    digits: tuple[Ints, Floats],
+) -> int:
+    """Write a further piece of a motion on a line of its own, and move `now` there; -1 where that is not clear.
+
+    layout       by_letter, and heads of the shape
+    wanted, now  (axes,) numbers at the end of the piece, and at its start
+    """
+    (by_letter, heads), (decimals, half) = layout, digits
+    at = copied(data, at, end_of_line, 0, len(end_of_line))
+    begun = False
+    for axis in by_letter:
+        if not abs(wanted[axis] - now[axis]) >= half[axis]:
+            continue
+        at, now[axis] = put_new(data, at, heads[axis][0 if begun else 1 :], wanted[axis], decimals[axis])
+        if at < 0:
+            break
+        begun = True
+    return at
+
+
+@njit(cache=True, nogil=True)
 def write(
     text: Bytes,
     blocks: tuple[Ints, Rows, Ints, Rows],
     numbers: tuple[Floats, Ints],
     layouts: tuple[Ints, Ints, Ints, Ints, Bytes],
     ends: Floats,
+    pieces: Ints,
     position: Floats,
     frame: tuple[Floats, Floats],
     digits: tuple[Ints, Floats],
-) -> tuple[Floats, Ints, Ints, Ints, Bytes]:
+    end_of_line: Bytes,
+) -> tuple[Floats, Ints, Ints, Ints, Bytes, int]:
     """Write motions up to the first one that is not clear.
 
     blocks    of the program: their spans, which of them are written (k,), the first number and the shape of each
     numbers   of the program: values and spans
     layouts   slots, by_place, by_letter, anchors, heads of `Layouts`
-    ends      (k, axes) commands to be written; `position` (axes,) where the control stands before
+    ends      (m, axes) commands at the ends of their pieces
+    pieces    (k + 1,) the first piece of each motion, and m
+    position  (axes,) where the control stands before
     frame     offset and scale (axes,): a command is `offset + scale * number`
     digits    decimals that the least increment needs, and half output steps (axes,)
 
-    Returns the commands at the ends of the motions written, and what changes in the source, as in `Splices`.
+    Returns the commands at the ends of the pieces written, what changes in the source, as in `Splices`, and how many
+    lines were added.
     """
     (edges, rows, first, shapes), (values, spans), (offset, scale), (decimals, half) = blocks, numbers, frame, digits
     slots, by_place, by_letter, anchors, heads = layouts
-    count, axes = ends.shape
-    most = count * axes
+    axes = len(position)
+    most = len(rows) * (axes + 1)
     start, stop, length = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
-    data = np.empty(most * (ROOM + decimals.max()), np.uint8)
-    commands, here = np.empty((count, axes)), position.copy()
-    edits, size, done, clear = 0, 0, 0, True
-    while done < count:
-        block, before, was = rows[done], edits, size
-        shape, number = shapes[block], first[block]
+    data = np.empty(len(ends) * (axes * (ROOM + decimals.max()) + len(end_of_line)), np.uint8)
+    commands, here, now = np.empty((len(ends), axes)), position.copy(), np.empty(axes)
+    told = np.zeros(axes, np.bool_)
+    edits, size, done, lines, clear = 0, 0, 0, 0, True
+    for row in range(len(rows)):
+        block, before, was, piece = rows[row], edits, size, pieces[row]
+        shape, number, whole = shapes[block], first[block], pieces[row + 1] == piece + 1
+        now[:], told[:] = (here - offset) / scale, False
+        wanted = (ends[piece] - offset) / scale
         for axis in by_place[shape]:
             if axis < 0 or not clear:
                 break
             word = number + slots[shape, axis]
-            value, wanted = values[word], (ends[done, axis] - offset[axis]) / scale[axis]
-            if abs(wanted - value) >= half[axis]:
+            now[axis], told[axis] = values[word], True
+            if abs(wanted[axis] - now[axis]) >= half[axis] or not whole:
                 begin, end = spans[word, 0], spans[word, 1]
-                at, value = put_in_style(data, size, text, begin, end, wanted, decimals[axis])
+                at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis])
                 clear = at >= 0
                 start[edits], stop[edits], length[edits] = begin, end, at - size
                 edits, size = edits + 1, at
-            here[axis] = value * scale[axis] + offset[axis]
         for axis in by_letter:
-            if slots[shape, axis] >= 0 or not clear:
+            if told[axis] or abs(wanted[axis] - now[axis]) < half[axis] or not clear:
                 continue
-            wanted = (ends[done, axis] - offset[axis]) / scale[axis]
-            if abs(wanted - (here[axis] - offset[axis]) / scale[axis]) < half[axis]:
-                continue
-            at, value = put_new(data, size, heads[shape, axis], wanted, decimals[axis])
-            clear = at >= 0
-            slot = anchors[shape, 0]
+            at, now[axis] = put_new(data, size, heads[shape, axis], wanted[axis], decimals[axis])
+            told[axis], clear, slot = True, at >= 0, anchors[shape, 0]
             edge = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
             start[edits], length[edits] = edge + anchors[shape, 1], at - size
             stop[edits] = start[edits]
             edits, size = edits + 1, at
-            here[axis] = value * scale[axis] + offset[axis]
+        commands[piece] = np.where(told, now * scale + offset, here)
+        lines_from = size
+        for piece in range(pieces[row] + 1, pieces[row + 1]):
+            if not clear:
+                break
+            before_it = now.copy()
+            wanted = (ends[piece] - offset) / scale
+            at = put_line(data, size, end_of_line, (by_letter, heads[shape]), wanted, now, (decimals, half))
+            told |= now != before_it
+            clear, size = at >= 0, at
+            commands[piece] = np.where(told, now * scale + offset, here)
         if not clear:
             edits, size = before, was
             break
-        commands[done] = here
-        done += 1
-    return commands[:done], start[:edits].copy(), stop[:edits].copy(), length[:edits].copy(), data[:size].copy()
-
-
-@njit(cache=True, nogil=True)
-def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
-    """Copy some bytes to `at`; where the next one goes."""
-    for place in range(start, stop):
-        out[at + place - start] = data[place]
-    return at + stop - start
+        if not whole:
+            start[edits], stop[edits], length[edits] = edges[block, 1], edges[block, 1], size - lines_from
+            edits, lines = edits + 1, lines + pieces[row + 1] - pieces[row] - 1
+        done = pieces[row + 1]
+        here[:] = commands[done - 1]
+    changes = start[:edits].copy(), stop[:edits].copy(), length[:edits].copy(), data[:size].copy()
+    return commands[:done], *changes, lines
 
 
 @njit(cache=True, nogil=True)

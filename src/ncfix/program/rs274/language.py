@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
@@ -52,7 +53,10 @@ def words_of(program: Program, block: int) -> tuple[Word, ...]:
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
     layout = writable(program, block) if any(w.address in AXIS_LETTERS for w in words_of(program, block)) else None
-    return None if layout is None else bulk_layout(program, block, layout)
+    found = None if layout is None else bulk_layout(program, block, layout)
+    if layout is None or found is None:
+        return None
+    return replace(found, further=not (layout.after or layout.prefix))
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
