@@ -26,7 +26,7 @@ HEIDENHAIN = Dialect(
         "presets (CYCL DEF 247), datum shift (7, TRANS DATUM), mirror (8), rotation (10), scale (11), tool lengths",
         "PLANE SPATIAL, PROJECTED, EULER, VECTOR, POINTS, RELATIV, AXIAL, RESET with STAY and TURN, and cycle 19",
         "M128, M129, FUNCTION TCPM; LN with TX TY TZ; M126 and M127",
-        "drilling cycles 1, 2, 17, 18, 200-203, 205-209, 240, 241 with M99, M89, CYCL CALL POS: position, not depth",
+        "drilling cycles 1, 2, 17, 18, 200-203, 205-209, 240, 241 with M99, M89, CYCL CALL POS",
         "Q parameters, formulas, FN 0 ... FN 13, LBL, CALL LBL with REP, jumps; CALL PGM is followed",
     ),
     passes=(

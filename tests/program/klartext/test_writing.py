@@ -73,9 +73,19 @@ def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
 
 
 def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ncfix.program.klartext.render.pole_in_force", lambda source, at: None)
+    monkeypatch.setattr("ncfix.program.klartext.render.pole_in_force", lambda source, at: "X+50 Y+50")
     with pytest.raises(SelfCheckError, match="would lead to"):
         fixed(AFTER_CR)
+
+
+def test_an_arc_is_refused_where_nobody_knows_which_pole_comes_back() -> None:
+    report = fixed(AFTER_CR.replace("CC X+110,0 Y+10\n", "CC X+110,0 Y+10\nLBL 2\n")).report
+    assert "which one was in force" in report.refused[0].reason
+
+
+def test_a_pole_that_nobody_relies_on_does_not_come_back() -> None:
+    found = lines("L X+120 Y+0 Z+0 FMAX\nCC X+110 Y+10\nCR X+130 Y+10 R+10 DR+ F500\nCC X+1 Y+1\nLP PR+30 PA+10")
+    assert [line for line in found if line.startswith("CC X+110")] == ["CC X+110 Y+10"]
 
 
 def test_a_departure_goes_on_along_the_corrected_line() -> None:

@@ -1,8 +1,7 @@
 """CYCL DEF and what executes cycles: CYCL CALL, M99, M89.
 
-Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom; the depths stand in the
-cycle's parameters and are left as they are, the position over the hole is corrected for its bottom. Cycles that make a
-path of their own are refused.
+Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom, which is corrected; cycles
+that make a path of their own are refused.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
 IN_PLACE = "a cycle is executed where the axes stand; the block has no position to correct"
-LEFT = "the depths of cycles are left as they are; only the position of a hole is corrected"
+LEFT = "the depths of old cycles are left as they are; only the position of a hole is corrected"
 
 
 # -- definition -------------------------------------------------------------------------------------------------------
@@ -173,8 +172,9 @@ def drill(control: Control, step: Step, where: Where, axes: int, heights: tuple[
     target, unknown = command_of(control, where, axes | 1 << Z)
     passing = "" if axes & ~(1 << Z) else IN_PLACE
     programmed = axes & ~(1 << Z)
-    control.warn(DEPTHS, LEFT, "the error along the tool axis stays, at most that of the first hole to the last")
     code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
+    if code == FROM_START:
+        control.warn(DEPTHS, LEFT, "the error along the tool axis stays, at most that of the first hole to the last")
     control.move(Kind.CYCLE, programmed, target, unknown, code, refusal="" if passing else refusal, passing=passing)
     over.inner[Z] = clear
     if not refusal:

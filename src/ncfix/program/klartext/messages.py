@@ -22,9 +22,9 @@ KLARTEXT_CODES: dict[str, Code] = {
     ),
     "NCF274": Code(
         "Depths of cycles stay",
-        "The depths of a hole stand in its cycle, which many holes share. They are left as they are; the position of "
-        "each hole is corrected for its bottom, the error along the tool axis stays.",
-        "Write the holes out where their depth matters.",
+        "The depths of the old cycles 1, 2 and 17 count from where the tool stands when they are called. They are left "
+        "as they are; the position of each hole is corrected for its bottom, the error along the tool axis stays.",
+        "Use a cycle of the 200s, whose surface (Q203) can be moved, where the depth matters.",
     ),
     "NCF275": Code(
         "No beginning",

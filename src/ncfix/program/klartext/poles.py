@@ -1,4 +1,4 @@
-"""The pole that is in force at a block, as the text shows it, and whether blocks after it rely on that: what has to come
+"""The pole that is in force at a block, as the text shows it, and whether blocks after it rely on it: what has to come
 back after an arc that is written about a pole of its own.
 """
 

@@ -28,6 +28,7 @@ SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
 WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
+SURFACE = "Q203"
 CLOCKWISE = 20
 EXACT = 1e-9
 
@@ -134,7 +135,7 @@ class Renderer(WordWriter):
     # -- cycles -------------------------------------------------------------------------------------------------------
 
     def _over_the_hole(self) -> None:
-        """The position over a hole; its depth is left as it is."""
+        """The position over a hole, and its depth."""
         target = self.target
         across = target.spatial[2]
         position = target.start.copy()
@@ -142,7 +143,7 @@ class Renderer(WordWriter):
         for column, letter in self.columns:
             word = self.layout.axes.get(letter)
             if column == across:
-                position[column] = self._bottom(across)
+                position[column] = self._bottom(across) + self._sunk(across)
             elif word is not None:
                 self._present(position, column, target.ends[0][column], word)
             elif not self._left_alone(column):
@@ -150,6 +151,23 @@ class Renderer(WordWriter):
         if polar:
             self._straightened()
         self.out.ends.append(position)
+
+    def _sunk(self, across: int) -> float:
+        """Move the surface from which the cycle counts its depth, for this hole only; by how much.
+
+        A change of Q203 itself counts for the calls that follow (TNC 640, "Cycle programming": define the parameter of
+        the cycle directly). It is taken back after the block, so other holes and formulas find the value they knew.
+        """
+        target = self.target
+        off = float(target.ends[0][across] - target.nominal[across])
+        if target.code != BY_DEPTH or abs(off) < self.half[across] or SURFACE in self.program.text_of(self.block):
+            return 0.0
+        text = self._number(off, across)
+        start = int(self.program.blocks[self.block, 0])
+        before = f"{self._prefix()}FN 1: {SURFACE} = +{SURFACE} + {text}{self._line_end()}"
+        self.out.edits.append((start, start, before))
+        self._line([f"FN 2: {SURFACE} = +{SURFACE} - {text}"])
+        return value_of(text)
 
     def _bottom(self, across: int) -> float:
         """Where the hole ends: as its depth says, or as far below the start as it was meant to be.

@@ -1,0 +1,99 @@
+"""What must not be guessed in Klartext: each of these was once taken for something it may not be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ncfix.diagnostics import SourceError
+from ncfix.program.klartext.poles import is_relied_on
+from ncfix.program.moves import Rule
+from program.klartext.test_following import reasons
+from program.klartext.test_writing import lines
+from program.klartext.tnc import ends, follow
+
+
+def test_turns_are_taken_off_before_the_motion() -> None:
+    moves = follow("L C+538 F100\nL C+180 M94", "XYZC").moves
+    assert np.degrees(moves.end[-1, 3] - moves.start[-1, 3]) == pytest.approx(2)
+
+
+def test_after_short_ways_past_a_turn_an_axis_may_count_from_elsewhere() -> None:
+    body = "L C+350 F100\nM126\nL C+{}\nM127\nL C+20\nL C+30"
+    assert reasons(body.format(10), "XYZC") == []
+    assert "depends on a parameter" in reasons(body.format(370), "XYZC")[0]
+    assert len(reasons(body.format(370), "XYZC")) == 1
+
+
+def test_increments_in_machine_coordinates_lead_somewhere_else() -> None:
+    moves = follow("L Z+50 FMAX M91\nL IZ+20 FMAX M91\nL X+5 F100\nL Z+3 FMAX").moves
+    assert moves.rule.tolist() == [Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT]
+
+
+@pytest.mark.parametrize("number", [204, 220, 221, 251])
+def test_cycles_that_do_more_than_a_hole_at_a_position(number: int) -> None:
+    body = f"CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL Z+50 FMAX\nCYCL DEF {number} C Q249=5\nL X+5 M99\nL Y+5"
+    assert reasons(body)
+
+
+def test_a_called_program_has_ql_parameters_of_its_own() -> None:
+    sub = "BEGIN PGM SUB MM\nQL1 = 99\nQ2 = 7\nEND PGM SUB MM"
+    assert ends("QL1 = 5\nCALL PGM SUB\nL X+QL1 Y+Q2 F100", files={"SUB.H": sub}) == [[5, 7, 0]]
+    assert reasons("CALL PGM SUB\nL X+QL1 F100", files={"SUB.H": sub})
+
+
+@pytest.mark.parametrize("line", ["TRANS DATUM TABLE TABLINE5", "PLANE SPATIAL SPA+30 SOMEHOW", "TOOL CALL 5 Z LATER"])
+def test_lines_that_are_not_understood_and_may_change_coordinates(line: str) -> None:
+    assert "changes coordinates" in reasons(f"L X+1 F100\n{line}\nL X+5 Y+5 Z+5 FMAX\nL X+6")[-1]
+
+
+@pytest.mark.parametrize("line", ["FUNCTION MODE TURN", "FN 17: SYSWRITE ID 10 NR1 = +5", "FN 25: PRESET = X/+10/0"])
+def test_statements_that_may_change_coordinates(line: str) -> None:
+    assert "may change coordinates" in reasons(f"L X+1 F100\n{line}\nL X+5 Y+5 Z+5 FMAX\nL X+6")[-1]
+
+
+def test_lines_that_are_not_understood_and_may_jump() -> None:
+    with pytest.raises(SourceError, match="decided by a line"):
+        follow('L X+1 F100\nFN 9: IF Q5 IS UNDEFINED GOTO LBL "END"\nL X+5\nLBL "END"')
+
+
+def test_lines_that_are_not_understood_and_set_a_parameter() -> None:
+    assert reasons("Q5 = 1\nQ5 = TONUMB ( SRC_QS5 )\nL X+Q5 F100\nL X+1 FMAX") != []
+
+
+def test_a_remark_between_a_line_and_its_corner_changes_nothing() -> None:
+    found = lines("L X+0 Y+0 Z+0 FMAX\nL X+100 F500\n; now round\n* - section\nRND R5\n\nL Y+150\nL X+0")
+    assert "Z" not in found[1]
+    assert "Z" not in found[6]
+
+
+def test_a_turn_in_a_plane_is_not_split() -> None:
+    body = "FUNCTION TCPM F TCP AXIS POS PATHCTRL {}\nL X+1 C+30 F100\nL X+5\nFUNCTION RESET TCPM"
+    assert follow(body.format("VECTOR"), "XYZC").moves.compensated.tolist() == [True, False]
+    assert follow(body.format("AXIS"), "XYZC").moves.compensated.tolist() == [False, False]
+
+
+def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
+    found = lines("L X+100 Y+100 Z+0 FMAX\nQ3 = 2.5\nL IX-Q3 IY+Q3 F100\nL X+0")
+    words = found[2].split()
+    assert all(abs(abs(float(word[2:])) - 2.5) < 0.001 for word in words[1:3] if "Q" not in word)
+
+
+@pytest.mark.parametrize(
+    ("text", "relied_on"),
+    [
+        ("CC X+1 Y+2\nC X+1 Y+3 DR+", False),
+        ("5 C X+1 Y+1 DR+", True),
+        ("CR X+5 R3 DR+\nEND PGM A MM", False),
+        ("CC X+1\nLP PR+5 PA+3", True),
+        ("CC\nLP PR+5 PA+3", False),
+        ("CC IX+1 IY+2\n", False),
+        ("FN 0: Q1 = 1\nFN 9: IF +1 EQU +1 GOTO LBL 5", True),
+        ("LBL 1\nCC X+1 Y+1", False),
+        ("LBL 0\n", True),
+        ("CALL LBL 3\n", True),
+        ("12 CYCL DEF 7.0\n CC X+Q1 Y+Q2", False),
+    ],
+)
+def test_what_relies_on_a_pole(text: str, relied_on: bool) -> None:
+    assert is_relied_on(("CR X+1 R5 DR+\n" + text).encode(), 12) == relied_on
