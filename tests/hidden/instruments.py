@@ -16,9 +16,9 @@ Tips = Callable[[Situation], tuple[Array, Array]]
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Of one coordinate, micrometre: standard deviation of all of it, degrees of freedom of its tails (inf: normal), the
-    share of rows that are wrong by 5 to 15 times that, the part that wanders with time (first order) and how long it
-    remembers, s; and the share of outliers that are wrong in one coordinate only.
+    """Of one coordinate, micrometre: standard deviation of all of it, degrees of freedom of its tails (inf: normal),
+    the share of rows that are wrong by 5 to 15 times that, the part that wanders with time (first order) and how long
+    it remembers, s; and the share of outliers that are wrong in one coordinate only.
     """
 
     sigma_um: float = 3.0

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
-from . import designs, workshop
+from . import designs
 from .draft import Draft
 from .families import Family
 from .motion import Array

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import designs, files, instruments, workshop
+from . import designs, files, instruments
 from .motion import Array
 from .scenario import Scenario
 from .situation import Situation

@@ -75,7 +75,7 @@ def _creep() -> Entry:
 
 
 def _pulse() -> Entry:
-    """Coolant comes and goes: a swing of ten minutes to an hour with uneven strokes, tied to no sensor and no position."""
+    """Coolant comes and goes: a swing of ten minutes to an hour with uneven strokes, tied to no sensor or position."""
 
     def draw(rng: Generator) -> Field:
         period, phase = rng.uniform(500, 3000), rng.uniform(0, 2 * np.pi)

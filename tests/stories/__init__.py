@@ -1,0 +1,1 @@
+"""The worked stories of examples/stories, run as their READMEs tell them."""

@@ -1,0 +1,102 @@
+"""A worked story: a folder with a README whose console blocks are what a user types and sees.
+
+Blocks start with three backticks and `console`; in them a line that starts with `$ ` is a command, the lines up to the
+next one are what it prints on a terminal (standard error included), and a line `...` stands for lines left out.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+FENCE = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
+LEFT_OUT = "..."
+NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z0-9_])")
+UNSTEADY = re.compile(r"p = \S+(?=[),;])|log odds \d+|, \d+ less")
+"""Figures that the last digits of a computer's arithmetic decide."""
+HEADLINE = re.compile(r"verdict: [a-z-]+(?=:)|(?!gap|where|unknown|to tell)[A-Za-z0-9 ]+: .*")
+"""Of a diagnosis: its verdict, and the line with a name. The rest of it, runners-up and patterns, is for the reader."""
+RELATIVE, ABSOLUTE = 0.1, 0.15
+"""How far figures may be from the printed ones: sums in another order, another release of a library."""
+FINDINGS = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A command line and the lines shown after it."""
+
+    command: str
+    shown: tuple[str, ...]
+
+
+def steps(readme: str) -> Iterator[Step]:
+    """The steps of a story, in order."""
+    for block in FENCE.finditer(readme):
+        yield from _steps(block[0])
+
+
+def _steps(block: str) -> Iterator[Step]:
+    for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+        command, *shown = part.rstrip().split("\n")
+        yield Step(command, tuple(shown))
+
+
+def run(command: str, folder: Path) -> list[str]:
+    """The lines that a command prints in a folder; it may end with findings (exit code 1), not with an error."""
+    program, *arguments = shlex.split(command)
+    if program != "ncfix":
+        raise ValueError(f"{command}: a story runs ncfix only")
+    done = subprocess.run(
+        [str(Path(sys.executable).with_name("ncfix")), *arguments], cwd=folder, text=True, check=False, timeout=300,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env={**os.environ, "NO_COLOR": "1", "COLUMNS": "120"},
+    )  # fmt: skip
+    if done.returncode > FINDINGS:
+        raise RuntimeError(f"{command}: exit code {done.returncode}\n{done.stdout}")
+    return done.stdout.rstrip("\n").split("\n") if done.stdout else []
+
+
+def alike(shown: tuple[str, ...], printed: list[str]) -> bool:
+    """Whether what is printed is what is shown: the same words, and about the same figures."""
+    if not shown:
+        return not printed
+    first, *rest = shown
+    if first == LEFT_OUT:
+        return any(alike(tuple(rest), printed[start:]) for start in range(len(printed) + 1))
+    return bool(printed) and _same(first, printed[0]) and alike(tuple(rest), printed[1:])
+
+
+def headlines(lines: Iterable[str]) -> list[str]:
+    """What a diagnosis says, in one line each."""
+    return [found[0] for found in map(HEADLINE.match, lines) if found]
+
+
+def _same(shown: str, printed: str) -> bool:
+    texts = [UNSTEADY.sub("", text.rstrip()) for text in (shown, printed)]
+    words = [NUMBER.sub("#", text).split() for text in texts]
+    figures = [[float(number) for number in NUMBER.findall(text)] for text in texts]
+    near = (math.isclose(a, b, rel_tol=RELATIVE, abs_tol=ABSOLUTE) for a, b in zip(*figures, strict=False))
+    return words[0] == words[1] and all(near)
+
+
+def written_anew(readme: str, folder: Path) -> str:
+    """The README with what its commands print now, run in that folder.
+
+    What leaves lines out stays if it still holds.
+    """
+
+    def block(found: re.Match[str]) -> str:
+        return "".join(f"$ {step.command}\n{_shown(step, run(step.command, folder))}" for step in _steps(found[0]))
+
+    return FENCE.sub(block, readme)
+
+
+def _shown(step: Step, printed: list[str]) -> str:
+    lines = step.shown if LEFT_OUT in step.shown and alike(step.shown, printed) else printed
+    return "".join(f"{line.rstrip()}\n" for line in lines)

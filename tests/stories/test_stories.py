@@ -1,0 +1,93 @@
+"""Stories end as they say, and show what their commands print."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from stories.story import Step, alike, headlines, run, steps, written_anew
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory, root: Path):
+    """`told("worn_table")`: the folder in which a story was run from its first command to its last, and what each
+    printed.
+    """
+    done: dict[str, tuple[Path, list[tuple[Step, list[str]]]]] = {}
+
+    def tell(name: str) -> tuple[Path, list[tuple[Step, list[str]]]]:
+        if name not in done:
+            folder = tmp_path_factory.mktemp("story") / name
+            shutil.copytree(root / "examples" / "stories" / name, folder)
+            script = list(steps((folder / "README.md").read_text()))
+            done[name] = folder, [(step, run(step.command, folder)) for step in script]
+        return done[name]
+
+    return tell
+
+
+STORIES = ("worn_table", "size_conflict")
+
+
+def test_all_stories_are_told(root: Path) -> None:
+    assert {path.parent.name for path in (root / "examples" / "stories").glob("*/README.md")} == set(STORIES)
+
+
+@pytest.mark.parametrize("name", STORIES)
+def test_what_is_shown_is_what_is_printed(told, name: str) -> None:
+    """Else: `python -m tests.stories` writes the READMEs anew. Of a diagnosis verdict and names are compared."""
+    for step, printed in told(name)[1]:
+        if step.command.startswith("ncfix diagnose"):
+            assert headlines(printed) == headlines(step.shown)
+        else:
+            assert alike(step.shown, printed), f"{step.command}\n" + "\n".join(printed)
+
+
+def rms_after(folder: Path, program: str) -> float:
+    """rms of what the true machine makes of a program, um."""
+    said = run(f"ncfix verify part.nc {program} -m true.toml --setup part.setup.toml --json", folder)
+    return float(json.loads("\n".join(said))["error_after_um"]["rms"])
+
+
+def test_the_worn_table_is_named_and_the_part_gets_better(told) -> None:
+    folder, _ = told("worn_table")
+    added = tomllib.loads((folder / "found.toml").read_text())
+    assert added["provenance"]["added"] == "wobble C"
+    spring, autumn = rms_after(folder, "spring.nc"), rms_after(folder, "autumn.nc")
+    assert autumn < 0.25 * spring  # 1.5 um of noise at 180 poses leave some tenths of the tilt's curve unknown
+    assert spring < rms_after(folder, "part.nc")
+
+
+def test_steps_are_read() -> None:
+    text = "a\n\n```console\n$ ncfix one -o x\nline\n\n$ ncfix two\n```\n\n```\n$ no\n```\n"
+    assert list(steps(text)) == [Step("ncfix one -o x", ("line",)), Step("ncfix two", ())]
+
+
+def test_headlines_of_a_diagnosis() -> None:
+    text = ["verdict: found: words", "gap: 1 um", "", "wobble C: wobble of C", "  12 um rms: odds", "where:", "  dx: a"]
+    assert headlines(text) == ["verdict: found", "wobble C: wobble of C"]
+
+
+def test_words_must_agree_and_figures_nearly() -> None:
+    assert alike(("gap 11.35 um (given)",), ["gap 11.40 um (given)"])
+    assert not alike(("gap 11.35 um (given)",), ["gap 14.00 um (given)"])
+    assert not alike(("wobble C",), ["wobble B"])
+    assert alike(("a", "...", "z 1"), ["a", "b", "c", "z 1.1"])
+    assert not alike(("a", "..."), ["b"])
+
+
+def test_a_story_runs_ncfix_only(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="ncfix only"):
+        run("rm -r .", tmp_path)
+
+
+def test_a_readme_is_written_anew(tmp_path: Path) -> None:
+    text = "before\n\n```console\n$ ncfix explain NCF001\nold\n```\n\nafter\n"
+    new = written_anew(text, tmp_path)
+    assert new.startswith("before\n\n```console\n$ ncfix explain NCF001\nNCF001")
+    assert new.endswith("```\n\nafter\n")
+    assert "old" not in new
