@@ -8,15 +8,17 @@ name says that it is assumed. What would double the error if guessed wrongly mus
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.grid import Array
-from ncfix.tables.mesh import search
+from ncfix.tables.exact import reversal_note
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.mesh import AIM, Mesh, search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.volume import Volume
 from ncfix_fanuc.records import NAME, TABLE, TEXT, Style, Volc, csv_text, json_text, read_volc, template_text
@@ -89,7 +91,9 @@ class Fanuc(Control):
         "order": Option("XYZ", "the axes from the one whose number runs fastest"),
         "first_number": Option("1", "number of the first point"),
         "template": Option("", f"a line of the text file, ASSUMED, e.g. {TEMPLATE}"),
-        "fit": Option("nodes", "nodes: exact at the points; area: least squares over what is around them"),
+        "fit": Option(
+            "auto", "nodes: exact at the points; area: least squares around them; auto: area if nodes miss more"
+        ),
     }
     steps = (
         "Settle the assumptions below on the machine, sign first.",
@@ -110,12 +114,7 @@ class Fanuc(Control):
         if not set(AXES) <= set(request.machine.axis_names):
             text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
             raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
-        area = settings["fit"] == "area"
-        volume = Volume.of(request.machine, AXES, request.space, request.tool_length, area)
-        rounding = _magnification(volume.grid([4] * 3).values, style.largest * unit) * unit / 2
-        mesh = search(volume, max(request.target - rounding, request.target / 2), [SIDE] * 3, SIDE**3)
-        if not mesh.reached:
-            mesh = search(volume, request.target, [SIDE] * 3, SIDE**3)
+        mesh = _searched(request, settings["fit"], lambda grid: _rounded(grid, style.largest, unit))
         order = [mesh.grid.outputs.index(axis) for axis in AXES]
         values = mesh.grid.values[..., order]
         magnification = _magnification(values, style.largest * unit)
@@ -129,13 +128,19 @@ class Fanuc(Control):
         made = Volc(settings["sign"], low, step, unit, magnification, whole, style)
         counts = " x ".join(map(str, mesh.grid.counts))
         notes = [
-            f"Grid {counts}: {mesh.grid.points} points; it misses {1e3 * mesh.left:.2f} um at most between them.",
+            f"Grid {counts}: {mesh.grid.points} points; it misses {1e3 * mesh.left:.2f} um at most, rounding included.",
             f"Magnification {magnification}: a value is rounded by up to {500 * magnification * unit:.2f} um.",
         ]
         if magnification * unit / 2 > request.target:
-            notes.append("The rounding is larger than the target: a smaller detection unit would help.")
-        if not mesh.reached:
+            cure = (
+                f"values have {style.largest} steps only"
+                if magnification > 1
+                else "a smaller detection unit would help"
+            )
+            notes.append(f"The rounding is larger than the target: {cure}.")
+        if mesh.left > request.target:
             notes.append(f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis.")
+        notes += reversal_note(request.machine, request.space, request.tool_length)
         if request.machine.rotary.any():
             notes.append("The grid is that of rotary axes at zero; at other angles more is left.")
         files = {NAME: json_text(made), TABLE: csv_text(made)}
@@ -166,6 +171,24 @@ def _magnification(values: Array, largest: float) -> int:
     return max(1, math.ceil(float(np.abs(values).max()) / largest - 1e-9))
 
 
+def _searched(request: Request, fit: str, written: Callable[[Grid], Grid]) -> Mesh:
+    """The grid, exact at its points if that is good enough, and fitted to what is around them if not."""
+    found = []
+    for area in {"auto": (False, True), "nodes": (False,), "area": (True,)}[fit]:
+        volume = Volume.of(request.machine, AXES, request.space, request.tool_length, area)
+        volume.written = written
+        found.append(search(volume, AIM * request.target, [SIDE] * 3, SIDE**3))
+        if found[-1].reached:
+            break
+    return min(found, key=lambda mesh: mesh.left)
+
+
+def _rounded(grid: Grid, largest: int, unit: float) -> Grid:
+    """What whole numbers make of it."""
+    quantum = _magnification(grid.values, largest * unit) * unit
+    return replace(grid, values=np.rint(grid.values / quantum) * quantum)
+
+
 def _style(settings: Mapping[str, str]) -> Style:
     first, largest = (settings[key] for key in ("first_number", "largest"))
     if sorted(settings["order"]) != list(AXES):
@@ -173,8 +196,8 @@ def _style(settings: Mapping[str, str]) -> Style:
     if not (first.isascii() and first.isdigit() and largest.isascii() and largest.isdigit() and int(largest) > 0):
         text = f"first_number={first}, largest={largest}"
         raise UsageError.of("NCF485", text, hint="whole numbers")
-    if settings["fit"] not in ("nodes", "area"):
-        raise UsageError.of("NCF485", f"fit={settings['fit']}", hint="nodes or area")
+    if settings["fit"] not in ("auto", "nodes", "area"):
+        raise UsageError.of("NCF485", f"fit={settings['fit']}", hint="auto, nodes or area")
     template = settings["template"]
     try:
         template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)

@@ -190,6 +190,6 @@ def _notes(made: _Made, request: Request) -> Iterator[str]:
         yield f"Grid {counts}: {grid.points} nodes for {', '.join(parameters(grid, owner))}."
     yield f"Together they miss {1e3 * made.left:.2f} um at most between the nodes."
     if made.left > request.target:
-        yield f"The target of {1e3 * request.target:g} um takes more nodes than are allowed: --set points=N."
+        yield f"The target of {1e3 * request.target:g} um is not reached with these nodes: --set points=N allows more."
     yield from reversal_note(request.machine, request.space, request.tool_length)
     yield "The orientation of the tool is not corrected."

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError
-from ncfix.machine import Effect, Tool
+from ncfix.machine import Effect, Tool, loads
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.poses import ranges_of
@@ -47,6 +47,79 @@ def test_a_tool_that_is_not_along_z_is_refused() -> None:
     machine = single_error("EXX").replace(tool=Tool((1.0, 0.0, 0.0)))
     with pytest.raises(RefusedError, match="not along Z"):
         CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
+
+
+TABLE = """
+ncfix = 1
+name = "table"
+topology = "w C A F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0], range = [-200, 300] }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [-150, 250] }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [-300, 0] }
+axis.A = { type = "rotary", direction = [-1, 0, 0], point = [0, 0, -350], range = [-60, 90] }
+axis.C = { type = "rotary", direction = [0, 0, -1], point = [0, 0, -350], range = [0, 120] }
+effect = [{ name = "EBC", coefficients = [50e-6] }, { name = "EXA", coefficients = [0.02] }]
+"""
+
+
+@pytest.mark.parametrize("length", [0.0, 250.0])
+@pytest.mark.parametrize("sign", ["correction", "error"])
+def test_a_lattice_over_the_rotary_axes_takes_off_what_a_table_is_wrong_by(length: float, sign: str) -> None:
+    """EBC, a tilt that turns with C on a table that tilts, moves the tip by 50 urad times up to half a metre."""
+    machine = loads(TABLE)
+    space = ranges_of(machine)
+    options = CONTROL.settings({"sign": sign})
+    files = CONTROL.write(Request(machine, space, 100.0, 0.001, options)).files
+    assert set(files) == {"rotary.json", "rotary-axes.json"}
+    assert not CONTROL.lint(files)
+    left = residual(machine, CONTROL.read(files), space, length, 2000)
+    assert left.before.max() > 0.03
+    assert left.after.max() < 0.0015  # the target, and 0.9 urad of rounding at half a metre
+
+
+def test_golden_record_of_a_table() -> None:
+    """The table stands 0.02 mm too far in X at any angle: at rest the first lattice has it, and the second nothing."""
+    machine = loads(TABLE).replace(effects=(Effect("EXA", (0.02,)),))
+    made = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS)).files
+    assert set(made) == {"rotary.json"}
+    assert json.loads(made["rotary.json"])["records"][0] == {"no": 1, "lin": [100, 0, 0], "rot": [0, 0, 0]}
+    turned = loads(TABLE).replace(effects=(Effect("EZC", (0.01,)),))
+    second = json.loads(
+        CONTROL.write(Request(turned, ranges_of(turned), 0.0, 0.0005, SETTINGS)).files["rotary-axes.json"]
+    )
+    assert (second["axes"], second["first_deg"], second["centre_mm"]) == (["A"], [-60.0], [0.0, 0.0, -350.0])
+    at_90 = second["records"][-1]
+    assert at_90["rot"] == [0, 0, 0]
+    assert [abs(value) * second["magnification"] for value in at_90["lin"]] == pytest.approx([0, 100, 100], abs=2)
+
+
+def test_without_the_second_lattice_it_is_said_that_more_is_left() -> None:
+    machine = loads(TABLE)
+    made = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, {**SETTINGS, "rotary": "no"}))
+    assert set(made.files) == {"rotary.json"}
+    assert any("at other angles more is left" in note for note in made.notes)
+
+
+BROKEN_TABLES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "another sign": (lambda found: found.update(sign="error"), "another one than that of rotary.json"),
+    "no centre": (lambda found: found.update(centre_mm=[0, 0]), "three lengths"),
+    "a linear axis": (lambda found: found.update(axes=["A", "X"]), "the axes are A X"),
+    "no interval": (lambda found: found.update(interval_deg=[0, 0]), "an interval above zero"),
+    "a record gone": (lambda found: found["records"].pop(), "expected of"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN_TABLES)
+def test_broken_second_lattices(case: str) -> None:
+    change, expected = BROKEN_TABLES[case]
+    machine = loads(TABLE)
+    files = dict(CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.01, SETTINGS)).files)
+    found = json.loads(files["rotary-axes.json"])
+    change(found)
+    files["rotary-axes.json"] = json.dumps(found).encode()
+    assert any(expected in message.text for message in CONTROL.lint(files)), CONTROL.lint(files)
+    with pytest.raises(ConfigError):
+        CONTROL.read(files)
 
 
 def damaged(change: Callable[[dict[str, Any]], object]) -> dict[str, bytes]:

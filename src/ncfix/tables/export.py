@@ -136,4 +136,10 @@ def _check_size(machine: Machine, left: Residual, target: float) -> None:
             text = f"the correction of {name} is larger than this machine allows: {shown}"
             raise RefusedError.of("NCF489", text, hint="max_correction in the machine file, if that is right")
     if np.mean(left.after**2) > np.mean(left.before**2) + (target / 10) ** 2:
-        raise RefusedError.of("NCF490", "these tables would leave more error than there is without them")
+        sizes = [f"{1e3 * float(np.sqrt(np.mean(each**2))):.3g}" for each in (left.after, left.before)]
+        text = (
+            f"these tables would leave more error than there is without them: {sizes[0]} um rms instead of {sizes[1]}"
+        )
+        raise RefusedError.of(
+            "NCF490", text, hint="the format does not reach these errors: correct programs, ncfix fix"
+        )

@@ -91,7 +91,7 @@ class Volume:
 
     def _nodes(self, index: int, count: int) -> Array:
         low, high = (self.ranges[index] / self.units[index]).tolist()
-        line = np.linspace(low, high, count)
+        line: Array = np.linspace(low, high, count)
         if self.uneven:
             line = self._bends(index).uneven()[count][0] / self.units[index]
         nodes: Array = np.round(line, DIGITS) * self.units[index]

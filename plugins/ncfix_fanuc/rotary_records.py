@@ -1,0 +1,173 @@
+"""Lattices of `IODBROTVOLC` records as files: three lengths and three angles at every point, whole numbers."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lines import Remarks
+
+SIDE = 25
+MOST_ROTARY = 400
+LARGEST = 127
+DEGREE = np.pi / 180
+ANGLES = ("A", "B", "C")
+LINEAR = ("X", "Y", "Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What whole numbers stand for.
+
+    sign            "correction" or "error"
+    units           detection units, mm and rad
+    magnifications  of lengths and of angles
+    """
+
+    sign: str
+    units: tuple[float, float]
+    magnifications: tuple[int, int]
+
+    @property
+    def factors(self) -> tuple[float, float]:
+        """Correction in mm and in rad of a value of 1."""
+        sense = 1.0 if self.sign == "correction" else -1.0
+        length, angle = (sense * unit * many for unit, many in zip(self.units, self.magnifications, strict=True))
+        return length, angle
+
+    @property
+    def rounding(self) -> tuple[float, float]:
+        """The most that a length and an angle are off by, mm and rad."""
+        length, angle = (abs(factor) / 2 for factor in self.factors)
+        return length, angle
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Records over some axes.
+
+    inputs   the axes, that whose number runs fastest first
+    low      first position of each, mm or degree
+    step     interval
+    lin      (*counts, 3) lengths along X, Y and Z
+    rot      (*counts, 3) angles about X, Y and Z
+    centre   mm: where angles turn about, if they turn a table
+    """
+
+    inputs: tuple[str, ...]
+    low: tuple[float, ...]
+    step: tuple[float, ...]
+    scale: Scale
+    lin: NDArray[np.int64]
+    rot: NDArray[np.int64]
+    centre: tuple[float, ...] = ()
+
+    @classmethod
+    def of(
+        cls, grids: tuple[Grid, Grid], sign: str, units: tuple[float, float], centre: Array | None = None
+    ) -> Lattice:
+        """Corrections in whole numbers, with the smallest magnifications that hold them."""
+        factors, whole = [], []
+        for grid, unit in zip(grids, units, strict=True):
+            factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST * unit) - 1e-9)))
+            sense = 1 if sign == "correction" else -1
+            whole.append(np.rint(sense * grid.values / (factors[-1] * unit)).astype(np.int64))
+        inputs = grids[0].inputs
+        lines = [line / _unit(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
+        low = tuple(round(float(line[0]), 6) for line in lines)
+        step = tuple(round(float(line[-1] - line[0]) / (len(line) - 1), 6) for line in lines)
+        scale = Scale(sign, units, (factors[0], factors[1]))
+        return cls(inputs, low, step, scale, whole[0], whole[1], () if centre is None else tuple(centre.tolist()))
+
+    def grids(self) -> tuple[Grid, Grid]:
+        """Lengths and angles as corrections, mm and rad."""
+        nodes = tuple(
+            (low + step * np.arange(count)) * _unit(name)
+            for name, low, step, count in zip(self.inputs, self.low, self.step, self.lin.shape, strict=False)
+        )
+        length, angle = self.scale.factors
+        lin, rot = (np.asarray(part, dtype=np.float64) for part in (self.lin, self.rot))
+        return Grid(self.inputs, nodes, LINEAR, lin * length), Grid(self.inputs, nodes, ANGLES, rot * angle)
+
+    def text(self) -> bytes:
+        """JSON: what the parameters must be, and a record for each point."""
+        linear = self.inputs == LINEAR
+        head = {
+            "sign": self.scale.sign,
+            **({} if linear else {"axes": self.inputs}),
+            "first_mm" if linear else "first_deg": self.low,
+            "interval_mm" if linear else "interval_deg": self.step,
+            "counts": self.lin.shape[:-1],
+            "detection_unit_um": round(self.scale.units[0] * 1000, 6),
+            "detection_unit_deg": round(self.scale.units[1] / DEGREE, 9),
+            "magnification": self.scale.magnifications[0],
+            "angle_magnification": self.scale.magnifications[1],
+            **({} if linear else {"centre_mm": self.centre}),
+        }
+        lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
+        order = [*reversed(range(len(self.inputs))), len(self.inputs)]
+        rows = zip(*(part.transpose(order).reshape(-1, 3).tolist() for part in (self.lin, self.rot)), strict=True)
+        records = ",\n".join(f'  {{"no": {n}, "lin": {lin}, "rot": {rot}}}' for n, (lin, rot) in enumerate(rows, 1))
+        return f'{{\n{"".join(lines)} "records": [\n{records}\n ]\n}}\n'.encode()
+
+
+def _unit(name: str) -> float:
+    return 1.0 if name in LINEAR else DEGREE
+
+
+def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | None, Remarks]:
+    """A file of records with remarks on it; no lattice if it cannot be used."""
+    remarks = Remarks.of(name, content)
+    try:
+        return _checked(json.loads(content), remarks, linear), remarks
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
+    return None, remarks
+
+
+def _checked(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> Lattice | None:
+    counts = tuple(int(count) for count in found["counts"])
+    inputs = LINEAR if linear else tuple(str(axis) for axis in found["axes"])
+    words = ("three", SIDE) if linear else ("one or two", MOST_ROTARY)
+    if found["sign"] not in ("correction", "error"):
+        remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
+    if not linear and not (len(inputs) in (1, 2) and set(inputs) <= set(ANGLES)):
+        remarks.refuse(0, f"the axes are {' '.join(inputs)}", "one or two of A, B and C")
+    if len(counts) != len(inputs) or not all(2 <= count <= words[1] for count in counts):
+        remarks.refuse(0, f"counts {counts}: 2 to {words[1]} points along each of {words[0]} axes")
+    _check_records(found["records"], counts, remarks)
+    if remarks.wrong:
+        return None
+    order = [*reversed(range(len(counts))), len(counts)]
+    parts = []
+    for key in ("lin", "rot"):
+        rows = np.array([record[key] for record in found["records"]], dtype=np.int64)
+        parts.append(rows.reshape(*counts[::-1], 3).transpose(order))
+    end = "mm" if linear else "deg"
+    low, step = (tuple(float(value) for value in found[f"{key}_{end}"]) for key in ("first", "interval"))
+    units = (float(found["detection_unit_um"]) / 1000, float(found["detection_unit_deg"]) * DEGREE)
+    scale = Scale(found["sign"], units, (int(found["magnification"]), int(found["angle_magnification"])))
+    centre = () if linear else tuple(float(value) for value in found["centre_mm"])
+    if not linear and len(centre) != 3:
+        remarks.refuse(0, "centre_mm should be three lengths")
+    if not len(low) == len(step) == len(inputs) or not all(value > 0 for value in step):
+        remarks.refuse(0, "a first position and an interval above zero are needed for each axis")
+    return None if remarks.wrong else Lattice(inputs, low, step, scale, parts[0], parts[1], centre)
+
+
+def _check_records(records: list[Mapping[str, Any]], counts: tuple[int, ...], remarks: Remarks) -> None:
+    if [record["no"] for record in records] != list(range(1, len(records) + 1)):
+        remarks.refuse(0, "the records are not numbered 1, 2, 3, ...")
+    if len(records) != int(np.prod(counts)):
+        remarks.refuse(0, f"{len(records)} records, {int(np.prod(counts))} expected of {counts}")
+    if any(len(record[key]) != 3 for record in records for key in ("lin", "rot")):
+        remarks.refuse(0, "a record without three lengths and three angles")
+    if any(abs(int(value)) > LARGEST for record in records for key in ("lin", "rot") for value in record[key]):
+        remarks.refuse(0, f"a value beyond -{LARGEST} to {LARGEST}")
