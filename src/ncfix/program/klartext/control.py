@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.klartext.calculate import Parameters, Scope
+from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.moves import Kind, Kinematics
 from ncfix.program.pointing import Pointing
@@ -56,11 +57,13 @@ class CycleInForce:
     number  0: none was defined
     steps   of the old cycles, what 1.1, 1.2, ... say: address or word -> value
     modal   M89: every positioning block executes it
+    places  of the last PATTERN DEF; None: there was none, or it is not followed
     """
 
     number: int = 0
     steps: dict[str, float] = field(default_factory=dict)
     modal: bool = False
+    places: tuple[Place, ...] | None = None
 
 
 class Control(base.Control):

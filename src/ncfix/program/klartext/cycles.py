@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
 from ncfix.program.klartext.tilting import cycle_19
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, Z
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, X, Y, Z
 from ncfix.program.rs274.faults import Fault
 
 NO_CYCLE = "NCF272"
@@ -40,6 +41,8 @@ NO_PRESET = "the number of the preset is known only at run time"
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
+PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
+IN_PLANE = 1 << X | 1 << Y
 IN_PLACE = "a cycle is executed where the axes stand; the block has no position to correct"
 LEFT = "the depths of old cycles are left as they are; only the position of a hole is corrected"
 
@@ -55,6 +58,9 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
         define_at_once(control, cycle, part, words, text)
         return
     if cycle in HARMLESS:
+        return
+    if cycle in (ON_CIRCLE, ON_LINES):
+        pattern(control, pattern_of_cycle(cycle, control.scope.parameters), f"cycle {cycle}")
         return
     if part in ("", "0"):
         control.cycle.number, control.cycle.steps = cycle, {}
@@ -159,10 +165,27 @@ def call(control: Control, step: Step) -> None:
     bottom, clear, refusal = levels(control, height)
     if step.name == "cycl call pos" and cycle.number in DRILLING:
         bottom, clear = bottom + height, clear + height
-    drill(control, step, where, axes, (bottom, clear, refusal))
+    drill(control, where, axes, (bottom, clear, refusal))
 
 
-def drill(control: Control, step: Step, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
+def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> None:
+    """The cycle in force at places that the control works out."""
+    control.use()
+    if control.cycle.number == 0:
+        raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
+    if places is None or control.cycle.number not in DRILLING:
+        reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
+        control.refuse_here(reason)
+        return
+    control.settle(tuple(control.unknown))
+    for place in places:
+        where = led(control, Words({"X": place.x, "Y": place.y}, frozenset()))
+        bottom, clear, refusal = levels(control, where.inner[Z])
+        height = control.scale[Z] * place.height
+        drill(control, where, IN_PLANE, (bottom + height, clear + height, refusal or PATTERN.format(name)))
+
+
+def drill(control: Control, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
     """One hole."""
     bottom, clear, refusal = heights
     over = Where(where.inner[:], dict(where.unknown))
@@ -177,8 +200,9 @@ def drill(control: Control, step: Step, where: Where, axes: int, heights: tuple[
         control.warn(DEPTHS, LEFT, "the error along the tool axis stays, at most that of the first hole to the last")
     control.move(Kind.CYCLE, programmed, target, unknown, code, refusal="" if passing else refusal, passing=passing)
     over.inner[Z] = clear
-    if not refusal:
-        over.unknown.pop(Z, None)
+    over.unknown.pop(Z, None)
+    if refusal == DEPTH_AT_RUN_TIME:
+        over.unknown[Z] = AFTER_CYCLE.replace("{number}", str(control.cycle.number))
     control.position, control.unknown = command_of(control, over, axes | 1 << Z)
     control.path.tangent = None
 

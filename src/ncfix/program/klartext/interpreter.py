@@ -9,7 +9,7 @@ from typing import Protocol
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.klartext import cycles, lines, tilting
-from ncfix.program.klartext.calculate import Evaluate, Scope
+from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
@@ -43,7 +43,7 @@ CORNERS = frozenset({"rnd", "chf"})
 class Recorder(Protocol):
     """Takes note of blocks that are executed; see `unroll`."""
 
-    def note(self, unit: Unit, block: int, scope: Scope, row: int) -> None:
+    def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
         """A block is about to be executed; `row` is the block of the main program that led to it."""
 
 
@@ -108,7 +108,7 @@ class Interpreter:
             if plan.skip and self.is_skipped():
                 continue
             if self.recorder is not None:
-                self.recorder.note(unit, block, control.scope, control.row_block)
+                self.recorder.note(unit, block, control, control.row_block)
             if self.execute(plan, flow):
                 return
         control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
@@ -278,7 +278,7 @@ class Interpreter:
             return
         calls = step.name.startswith("cycl call")
         if calls and step.name.endswith("pat"):
-            control.refuse_here("a pattern of holes (CYCL CALL PAT)")
+            cycles.pattern(control, control.cycle.places, "CYCL CALL PAT")
         elif plan.moves and step.codes & {91, 92}:
             lines.at_machine(control, step)
         elif calls or (cycles.executes(control, step) and (plan.moves or 99 in step.codes)):

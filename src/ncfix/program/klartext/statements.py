@@ -7,6 +7,7 @@ import re
 from ncfix.program.klartext.codes import tip_control
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
+from ncfix.program.klartext.patterns import pattern_of
 from ncfix.program.rs274.faults import Fault
 
 PROBING = "probing"
@@ -54,6 +55,8 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
     elif WRITING.match(text) or (re.match("FUNCTION", text, re.IGNORECASE) and not HARMLESS_FUNCTIONS.match(text)):
         name = " ".join(text.partition(":")[0].split()[:3]).upper()
         control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
+    elif re.match(r"PATTERN\s+DEF|SEL\s+PATTERN", text, re.IGNORECASE):
+        control.cycle.places = pattern_of(text, control.scope.parameters)
     elif READING.match(text):
         read_values(control, text)
 

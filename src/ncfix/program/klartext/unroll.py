@@ -7,12 +7,16 @@ stays as it is; a jump that depends on it cannot be written out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ncfix.program.flatten import TOO_LONG, FlatLine
 from ncfix.program.klartext.calculate import Scope, compiled
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.cycles import DRILLING
 from ncfix.program.klartext.interpreter import Interpreter
 from ncfix.program.klartext.number_text import Style
+from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
+from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.units import Unit
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.faults import Fault
@@ -26,6 +30,10 @@ OTHERS = 6
 
 UNSIGNED = "FS"
 """Addresses whose numbers have no sign."""
+
+PATTERN_CYCLES = (f"cycl def {ON_CIRCLE}", f"cycl def {ON_LINES}")
+SHARED = ("Q200", "Q203", "Q204")
+"""What a pattern says anew of the cycle whose holes it makes: clearance, surface, second clearance."""
 
 NOT_WRITTEN = ("CALL PGM", "FN 14")
 
@@ -47,17 +55,51 @@ class Recorder:
     style: Style
     lines: list[FlatLine] = field(default_factory=list)
 
-    def note(self, unit: Unit, block: int, scope: Scope, row: int) -> None:
+    def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
         """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
         plan = unit.plans[block]
         if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
             return
-        text = self.flat_text(unit.program, block, scope)
+        holes = self.holes(plan, control)
+        text = "\n".join(holes) if holes else self.flat_text(unit.program, block, control.scope)
         line = unit.program.line(block) if not unit.name else self.line_of_call(row)
         for offset, part in enumerate(text.splitlines()):
-            self.lines.append(FlatLine(part.rstrip(), line + (offset if not unit.name else 0)))
+            self.lines.append(FlatLine(part.rstrip(), line + (offset if not unit.name and not holes else 0)))
         if len(self.lines) > self.limit:
             raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines")
+
+    def holes(self, plan: Plan, control: Control) -> list[str]:
+        """The holes of a pattern one by one; empty for other blocks, and where they are not known."""
+        if plan.name == "cycl call pat" and control.cycle.places is not None:
+            rate = "FMAX" if "fmax" in plan.flags else ""
+            codes = " ".join(f"M{code}" for code, _ in plan.codes)
+            texts = [
+                f"CYCL CALL POS {self.place(place)} Z{self.written(place.height, 'Z')} {rate}"
+                for place in control.cycle.places
+            ]
+            return [f"{texts[0]} {codes}".rstrip(), *texts[1:]]
+        if plan.name not in PATTERN_CYCLES or control.cycle.number not in DRILLING:
+            return []
+        parameters = replace(control.scope.parameters, values=dict(control.scope.parameters.values))
+        scope = replace(control.scope, parameters=parameters)
+        for name, value in plan.assignments:
+            parameters.assign(name, value(scope))
+        places = pattern_of_cycle(int(plan.name.removeprefix("cycl def ")), parameters) or ()
+        shared = [name for name, _ in plan.assignments if name in SHARED]
+        set_anew = [f"FN 0: {name} = {self.short(parameters.get(name))}" for name in shared]
+        return [*set_anew, *(f"L {self.place(place)} R0 FMAX M99" for place in places)] if places else []
+
+    def place(self, place: Place) -> str:
+        """Where a hole is, as words."""
+        return f"X{self.written(place.x, 'X')} Y{self.written(place.y, 'Y')}"
+
+    def written(self, value: float, address: str) -> str:
+        """A number of a word."""
+        return self.style.number(value, self.digits(address))
+
+    def short(self, value: float) -> str:
+        """A number without zeros at its end."""
+        return self.style.number(value, OTHERS).rstrip("0").rstrip(".,")
 
     def line_of_call(self, row: int) -> int:
         """The line of the main program from which another one was called."""
@@ -102,8 +144,8 @@ class Recorder:
         found = compiled(value)(scope)
         if scope.parameters.touched:
             return []
-        text = self.style.number(found, digits)
-        return [(*program.span(block, span), text if digits != OTHERS else text.rstrip("0").rstrip(".,"))]
+        text = self.short(found) if digits == OTHERS else self.style.number(found, digits)
+        return [(*program.span(block, span), text)]
 
 
 def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int, comma: bool) -> Sequence[FlatLine]:
