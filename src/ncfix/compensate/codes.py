@@ -136,6 +136,13 @@ CODES = {
         "`--assume-zero` was given, and the length of this tool is used and not known.",
         "`--tool 12=120.0` gives it.",
     ),
+    "NCF438": Code(
+        "the program seems to have been corrected already",
+        "It carries no stamp, but its numbers are crooked, and many of them become round when the errors of this "
+        "machine are put into them: as if they had been corrected for it. Correcting them again would put the errors "
+        "back in.",
+        "Fix the original program. `--force` corrects this one all the same.",
+    ),
     "NCF445": Code(
         "program written out flat",
         "With --flatten every block is written as often as it is executed, for some need another correction each time. "

@@ -14,6 +14,7 @@ import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.options import FixOptions
@@ -58,8 +59,8 @@ def fix_program(
     resolve  gives the text of a subprogram file by its name
 
     Raises SourceError for what cannot be followed or is not known, RefusedError NCF430 for a program that carries a
-    stamp. Motions that had to be left uncorrected are in `report.refused`; whether that is acceptable is for the
-    caller to decide.
+    stamp, NCF438 for one that seems to have been corrected without one. Motions that had to be left uncorrected are in
+    `report.refused`; whether that is acceptable is for the caller to decide.
     """
     strategy = get_strategy(options.strategy)
     refuse_stamped(program, options)
@@ -78,10 +79,12 @@ def fix_program(
         return settled, _written(program, settled, machine, options, followed)
 
     proof = proven(program, attempt, follow)
+    suspicion = suspected(proof.settled, machine.least_increment[0], program.path, options.force)
     errors = _errors(on_machine, proof.settled) if options.verify else None
     if errors is not None:
         _check_sane(program, proof.settled, errors)
     report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
+    report = replace(report, warnings=(*suspicion, *report.warnings))
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.crew import Crew, Later, crew
 from ncfix.compensate.direction import Signs, matters
+from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import refuse_stamped, stamp_of
 from ncfix.compensate.following import Resolve, kinematics_of, placed, rotary_names, with_tool_lengths
@@ -116,6 +117,7 @@ class Stream:
     units: set[float] = field(default_factory=set)
     tools: dict[str, str] = field(default_factory=dict)
     lacking: dict[str, Message] = field(default_factory=dict)
+    suspicion: tuple[Message, ...] = ()
 
     def __post_init__(self) -> None:
         self.direction = np.zeros(len(self.machine.axes), dtype=np.int8)
@@ -148,7 +150,7 @@ class Stream:
         if self.lacking:
             raise UsageError.collected(self.lacking.values())
         self._pass_on()
-        report = self.tally.report(self.path, follower.messages, strategy.leaves, self.options)
+        report = self.tally.report(self.path, (*self.suspicion, *follower.messages), strategy.leaves, self.options)
         assumed = (*follower.assumed, *self.tools)
         return Streamed(report, Stamp(self.at, self.stamped, self._stamp(assumed) if self.tally.changed else b""))
 
@@ -265,6 +267,8 @@ class Stream:
         settled = settle(program, moves, machine, self.options, before=self.before, first=first)
         if self.before is not None and settled.kept[0] != self.before.kept:
             raise NotInPartsError("a refusal reaches back into an earlier part")
+        if self.before is None:
+            self.suspicion = suspected(settled, machine.least_increment[0], self.path, self.options.force)
         text = self._text(program, settled, follower)
         self._prove(text, settled, own, unit.last, *proof)
         self.tally.add(program, settled, own)
