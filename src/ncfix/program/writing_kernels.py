@@ -20,13 +20,16 @@ Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Rows = NDArray[np.int32]
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 POWERS = 10.0 ** np.arange(19)
 TENS = 10 ** np.arange(19)
 LONGEST = MOST_DECIMALS + 8
 """Bytes of the longest number that is rewritten here."""
-ROOM = 32
-"""Bytes that a number takes at most, besides its decimals."""
+MOST_STEPS = 18
+"""Decimals of the finest output step that is written here."""
+ROOM = LONGEST + MOST_STEPS + 4
+"""Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
 
 
 @njit(cache=True, nogil=True)
@@ -56,6 +59,8 @@ def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, 
 @njit(cache=True, nogil=True)
 def steps_of(value: float, decimals: int) -> int:
     """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
+    if decimals > MOST_STEPS:
+        return -1
     steps = abs(value) * POWERS[decimals]
     if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE):
         return -1
@@ -129,27 +134,45 @@ def put_line(
     data: Bytes,
     at: int,
     end_of_line: Bytes,
-    layout: tuple[Ints, Bytes],
+    by_letter: Ints,
+    heads: Bytes,
     wanted: Floats,
     now: Floats,
+    told: Mask,
     digits: tuple[Ints, Floats],
 ) -> int:
-    """Write a further piece of a motion on a line of its own, and move `now` there; -1 where that is not clear.
+    """Write a further piece of a motion on a line of its own, and take the axes there; -1 where that is not clear.
 
-    layout       by_letter, and heads of the shape
-    wanted, now  (axes,) numbers at the end of the piece, and at its start
+    heads        (axes, 2) of the shape
+    wanted, now  (axes,) numbers at the end of the piece, and at its start; `told` which axes were told to move
     """
-    (by_letter, heads), (decimals, half) = layout, digits
+    decimals, half = digits
     at = copied(data, at, end_of_line, 0, len(end_of_line))
-    begun = False
+    begun = 1
     for axis in by_letter:
         if not abs(wanted[axis] - now[axis]) >= half[axis]:
             continue
-        at, now[axis] = put_new(data, at, heads[axis][0 if begun else 1 :], wanted[axis], decimals[axis])
+        at, now[axis] = put_new(data, at, heads[axis, begun:], wanted[axis], decimals[axis])
         if at < 0:
             break
-        begun = True
+        told[axis], begun = True, 0
     return at
+
+
+@njit(cache=True, nogil=True)
+def to_numbers(commands: Floats, frame: tuple[Floats, Floats], out: Floats) -> None:
+    """What a program writes for commands, (axes,)."""
+    offset, scale = frame
+    for axis in range(len(out)):
+        out[axis] = (commands[axis] - offset[axis]) / scale[axis]
+
+
+@njit(cache=True, nogil=True)
+def to_commands(now: Floats, told: Mask, here: Floats, frame: tuple[Floats, Floats], out: Floats) -> None:
+    """Commands (axes,) of the numbers `now` of axes that were told to move; the others stay `here`."""
+    offset, scale = frame
+    for axis in range(len(out)):
+        out[axis] = now[axis] * scale[axis] + offset[axis] if told[axis] else here[axis]
 
 
 @njit(cache=True, nogil=True)
@@ -179,26 +202,28 @@ def write(
     Returns the commands at the ends of the pieces written, what changes in the source, as in `Splices`, and how many
     lines were added.
     """
-    (edges, rows, first, shapes), (values, spans), (offset, scale), (decimals, half) = blocks, numbers, frame, digits
+    (edges, rows, first, shapes), (values, spans), (decimals, half) = blocks, numbers, digits
     slots, by_place, by_letter, anchors, heads = layouts
     axes = len(position)
     most = len(rows) * (axes + 1)
     start, stop, length = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
-    data = np.empty(len(ends) * (axes * (ROOM + decimals.max()) + len(end_of_line)), np.uint8)
+    data = np.empty(len(ends) * (axes * ROOM + len(end_of_line)), np.uint8)
     commands, here, now = np.empty((len(ends), axes)), position.copy(), np.empty(axes)
-    told = np.zeros(axes, np.bool_)
+    wanted, told = np.empty(axes), np.empty(axes, np.bool_)
     edits, size, done, lines, clear = 0, 0, 0, 0, True
     for row in range(len(rows)):
-        block, before, was, piece = rows[row], edits, size, pieces[row]
-        shape, number, whole = shapes[block], first[block], pieces[row + 1] == piece + 1
-        now[:], told[:] = (here - offset) / scale, False
-        wanted = (ends[piece] - offset) / scale
+        block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
+        shape, number = shapes[block], first[block]
+        to_numbers(here, frame, now)
+        to_numbers(ends[first_piece], frame, wanted)
+        for axis in range(axes):
+            told[axis] = False
         for axis in by_place[shape]:
             if axis < 0 or not clear:
                 break
             word = number + slots[shape, axis]
             now[axis], told[axis] = values[word], True
-            if abs(wanted[axis] - now[axis]) >= half[axis] or not whole:
+            if abs(wanted[axis] - now[axis]) >= half[axis] or first_piece < last_piece:
                 begin, end = spans[word, 0], spans[word, 1]
                 at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis])
                 clear = at >= 0
@@ -213,25 +238,24 @@ def write(
             start[edits], length[edits] = edge + anchors[shape, 1], at - size
             stop[edits] = start[edits]
             edits, size = edits + 1, at
-        commands[piece] = np.where(told, now * scale + offset, here)
+        to_commands(now, told, here, frame, commands[first_piece])
         lines_from = size
-        for piece in range(pieces[row] + 1, pieces[row + 1]):
+        for piece in range(first_piece + 1, last_piece + 1):
             if not clear:
                 break
-            before_it = now.copy()
-            wanted = (ends[piece] - offset) / scale
-            at = put_line(data, size, end_of_line, (by_letter, heads[shape]), wanted, now, (decimals, half))
-            told |= now != before_it
-            clear, size = at >= 0, at
-            commands[piece] = np.where(told, now * scale + offset, here)
+            to_numbers(ends[piece], frame, wanted)
+            size = put_line(data, size, end_of_line, by_letter, heads[shape], wanted, now, told, digits)
+            clear = size >= 0
+            to_commands(now, told, here, frame, commands[piece])
         if not clear:
             edits, size = before, was
             break
-        if not whole:
+        if first_piece < last_piece:
             start[edits], stop[edits], length[edits] = edges[block, 1], edges[block, 1], size - lines_from
-            edits, lines = edits + 1, lines + pieces[row + 1] - pieces[row] - 1
-        done = pieces[row + 1]
-        here[:] = commands[done - 1]
+            edits, lines = edits + 1, lines + last_piece - first_piece
+        done = last_piece + 1
+        for axis in range(axes):
+            here[axis] = commands[last_piece, axis]
     changes = start[:edits].copy(), stop[:edits].copy(), length[:edits].copy(), data[:size].copy()
     return commands[:done], *changes, lines
 
