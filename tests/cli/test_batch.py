@@ -8,19 +8,18 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ncfix.batch.journal import NAME
 from ncfix.diagnostics import ExitCode
 
-from .conftest import Ncfix, Shop
-
 COUNT = 6
 
 
 @pytest.fixture
-def parts(shop: Shop) -> Path:
+def parts(shop: Any) -> Path:
     """A folder `parts` of programs, one of them a folder further down."""
     folder = shop.folder / "parts"
     for number in range(COUNT):
@@ -34,7 +33,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_folder_keeps_its_shape(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_a_folder_keeps_its_shape(ncfix: Any, shop: Any, parts: Path) -> None:
     out = shop.folder / "out"
     result = ncfix("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero", "--json")
     assert result.code == ExitCode.DONE
@@ -44,7 +43,7 @@ def test_a_folder_keeps_its_shape(ncfix: Ncfix, shop: Shop, parts: Path) -> None
     ]
 
 
-def test_outputs_and_messages_do_not_depend_on_the_jobs(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_outputs_and_messages_do_not_depend_on_the_jobs(ncfix: Any, shop: Any, parts: Path) -> None:
     said = {}
     (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
     for jobs in (1, 2):
@@ -55,14 +54,14 @@ def test_outputs_and_messages_do_not_depend_on_the_jobs(ncfix: Ncfix, shop: Shop
     assert said[1] == said[2]
 
 
-def test_a_batch_that_is_over_leaves_no_journal(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_a_batch_that_is_over_leaves_no_journal(ncfix: Any, shop: Any, parts: Path) -> None:
     out = shop.folder / "out"
     (parts / "bad.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
     ncfix("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero")
     assert len(contents(out)) == COUNT
 
 
-def test_what_is_there_already_stays_if_it_is_right(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_what_is_there_already_stays_if_it_is_right(ncfix: Any, shop: Any, parts: Path) -> None:
     out = shop.folder / "out"
     command = ("fix", parts, "-m", shop.machine, "-o", out, "--assume-zero")
     ncfix(*command)
@@ -72,7 +71,7 @@ def test_what_is_there_already_stays_if_it_is_right(ncfix: Ncfix, shop: Shop, pa
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*.ngc")} == before
 
 
-def test_what_is_there_and_different_is_not_replaced(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_what_is_there_and_different_is_not_replaced(ncfix: Any, shop: Any, parts: Path) -> None:
     out = shop.folder / "out"
     out.mkdir()
     (out / "part0.ngc").write_bytes(b"something else\n")
@@ -83,13 +82,13 @@ def test_what_is_there_and_different_is_not_replaced(ncfix: Ncfix, shop: Shop, p
     assert len(contents(out)) == COUNT
 
 
-def test_resuming_needs_a_folder(ncfix: Ncfix, shop: Shop) -> None:
+def test_resuming_needs_a_folder(ncfix: Any, shop: Any) -> None:
     result = ncfix("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "new.ngc", "--resume")
     assert result.code == ExitCode.USAGE
     assert "NCF016" in result.err
 
 
-def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Any, shop: Any, parts: Path) -> None:
     whole, out = shop.folder / "whole", shop.folder / "out"
     ncfix("fix", parts, "-m", shop.machine, "-o", whole, "--assume-zero")
     command = ["fix", str(parts), "-m", str(shop.machine), "-o", str(out), "--assume-zero", "--json"]
@@ -107,7 +106,7 @@ def test_a_killed_batch_goes_on_to_the_same_bytes(ncfix: Ncfix, shop: Shop, part
     assert contents(out) == contents(whole)
 
 
-def test_the_journal_says_what_need_not_be_done_again(ncfix: Ncfix, shop: Shop, parts: Path) -> None:
+def test_the_journal_says_what_need_not_be_done_again(ncfix: Any, shop: Any, parts: Path) -> None:
     from ncfix.batch.journal import Journal
 
     out = shop.folder / "out"

@@ -57,3 +57,14 @@ def test_over_many_files_the_worst_counts(shop: Any, ncfix: Any) -> None:
     result = ncfix("check", shop.program, missing, "--json")
     assert result.code == ExitCode.UNREADABLE
     assert [("errors" in entry) for entry in result.json()["files"]] == [False, True]
+
+
+def test_a_folder_stands_for_the_programs_below_it(ncfix: Any, shop: Any) -> None:
+    deep = shop.folder / "programs" / "deep"
+    deep.mkdir(parents=True)
+    (deep / "a.ngc").write_bytes(shop.program.read_bytes())
+    (deep.parent / "b.ngc").write_bytes(b"G1 X1 Y..2\nM2\n")
+    (deep.parent / "notes.txt").write_bytes(b"G1 X1 Y..2\nM2\n")
+    result = ncfix("check", deep.parent, "--json")
+    assert result.code == ExitCode.UNREADABLE
+    assert [each["path"] for each in result.json()["files"]] == [str(deep.parent / "b.ngc"), str(deep / "a.ngc")]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ncfix.diagnostics import ExitCode
 
-from .conftest import Ncfix, Shop
 
-
-def test_every_shipped_machine_has_a_page(ncfix: Ncfix, examples: Path, tmp_path: Path) -> None:
+def test_every_shipped_machine_has_a_page(ncfix: Any, examples: Path, tmp_path: Path) -> None:
     machines = sorted((examples / "machines").glob("*.toml"))
     assert ncfix("report", *machines, "-o", tmp_path / "machines.html").code == ExitCode.DONE
     page = (tmp_path / "machines.html").read_text()
@@ -21,12 +20,12 @@ def test_every_shipped_machine_has_a_page(ncfix: Ncfix, examples: Path, tmp_path
     assert "nan" not in page
 
 
-def test_a_perfect_machine_has_one_too(ncfix: Ncfix, shop: Shop) -> None:
+def test_a_perfect_machine_has_one_too(ncfix: Any, shop: Any) -> None:
     assert ncfix("report", shop.perfect, "-o", shop.folder / "page.md").code == ExitCode.DONE
     assert "None: a perfect machine." in (shop.folder / "page.md").read_text()
 
 
-def results(ncfix: Ncfix, shop: Shop) -> dict[str, bytes]:
+def results(ncfix: Any, shop: Any) -> dict[str, bytes]:
     """What verbs print with --json."""
     on, fixed, tables = ("-m", shop.machine), shop.folder / "fixed.ngc", shop.folder / "tables"
     fix = ncfix("fix", shop.program, *on, "--assume-zero", "-o", fixed, "--json").out
@@ -38,7 +37,7 @@ def results(ncfix: Ncfix, shop: Shop) -> dict[str, bytes]:
     }
 
 
-def test_results_of_verbs_become_tables(ncfix: Ncfix, shop: Shop) -> None:
+def test_results_of_verbs_become_tables(ncfix: Any, shop: Any) -> None:
     found = results(ncfix, shop)
     paths = []
     for number, text in enumerate(found.values()):
@@ -54,7 +53,7 @@ def test_results_of_verbs_become_tables(ncfix: Ncfix, shop: Shop) -> None:
 
 
 @pytest.mark.parametrize("text", ['{"a": 1}', "{nothing", '{"schema": 7}'])
-def test_what_is_no_result_is_refused(ncfix: Ncfix, shop: Shop, text: str) -> None:
+def test_what_is_no_result_is_refused(ncfix: Any, shop: Any, text: str) -> None:
     path = shop.folder / "result.json"
     path.write_text(text)
     result = ncfix("report", path, "-o", shop.folder / "page.html")
@@ -63,7 +62,7 @@ def test_what_is_no_result_is_refused(ncfix: Ncfix, shop: Shop, text: str) -> No
     assert not (shop.folder / "page.html").exists()
 
 
-def test_a_page_is_not_written_over_what_it_shows(ncfix: Ncfix, shop: Shop) -> None:
+def test_a_page_is_not_written_over_what_it_shows(ncfix: Any, shop: Any) -> None:
     result = ncfix("report", shop.machine, "-o", shop.machine, "--force")
     assert result.code == ExitCode.USAGE
     assert "NCF005" in result.err or "NCF018" in result.err

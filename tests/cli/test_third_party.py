@@ -6,13 +6,12 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ncfix import hookspecs, plugins
 from ncfix.diagnostics import ExitCode
-
-from .conftest import THREE_AXIS, Ncfix, Shop
 
 PLUGIN = """
 from concurrent.futures import ThreadPoolExecutor
@@ -71,9 +70,9 @@ def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     sys.modules.pop("third_party_of_a_test", None)
 
 
-def test_a_reader_knows_an_instruments_file(ncfix: Ncfix, shop: Shop) -> None:
+def test_a_reader_knows_an_instruments_file(ncfix: Any, shop: Any) -> None:
     machine, data = shop.folder / "bare.toml", shop.folder / "x.las"
-    machine.write_text(THREE_AXIS.format(effects=""))
+    machine.write_text(shop.perfect.read_text())
     data.write_text("LASER\n" + "".join(f"{x} {1e-4 * x:.6f}\n" for x in range(0, 501, 50)))
     out = shop.folder / "calibrated.toml"
     result = ncfix("calibrate", data, "-m", machine, "--effects", "EXX", "-o", out)
@@ -81,12 +80,12 @@ def test_a_reader_knows_an_instruments_file(ncfix: Ncfix, shop: Shop) -> None:
     assert "EXX" in out.read_text()
 
 
-def test_a_report_has_the_form_that_its_suffix_says(ncfix: Ncfix, shop: Shop) -> None:
+def test_a_report_has_the_form_that_its_suffix_says(ncfix: Any, shop: Any) -> None:
     assert ncfix("report", shop.machine, "-o", shop.folder / "page.txt").code == ExitCode.DONE
     assert (shop.folder / "page.txt").read_text().startswith("three axes\n")
 
 
-def test_a_batch_runs_where_it_is_told_to(ncfix: Ncfix, shop: Shop) -> None:
+def test_a_batch_runs_where_it_is_told_to(ncfix: Any, shop: Any) -> None:
     other = shop.folder / "other.ngc"
     other.write_bytes(shop.program.read_bytes())
     command = ("fix", shop.program, other, "-m", shop.machine, "--assume-zero", "--jobs", 2)

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ncfix.batch.gathering import gathered
 from ncfix.cli import console
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, optional_machine_option
@@ -24,13 +25,13 @@ from ncfix.diagnostics import ExitCode, Message, NcfixError
 def check(
     programs: tuple[str, ...], machine_path: str | None, dialect: str | None, given: SetupOptions, as_json: bool
 ) -> int:
-    """Read each PROGRAM and follow it as the control would; say what is found. Writes nothing.
+    """Read each PROGRAM, of a folder all below it, and follow it as the control would. Writes nothing.
 
     With a machine file also: does it stay within the travel, and what would its correction refuse? Exit code 1 with
     findings.
     """
     following = Following.of(machine_path, dialect, given)
-    outcomes = [_outcome(following, program) for program in programs]
+    outcomes = [_outcome(following, program.path) for program in gathered(programs)]
     if as_json:
         console.put_json(files=[outcome.entry for outcome in outcomes])
     return max(outcome.code for outcome in outcomes)
