@@ -296,15 +296,15 @@ class _Judge:
     def variation(self, rows: NDArray[np.int64]) -> Floats:
         """How much the correction differs over the holes of one cycle and the way to the first of them.
 
-        The height to which a cycle returns is that from which it was called. R, which is clearance and not cut, stays
-        as it is written: along the holes the whole correction may be missing there.
+        The height to which a cycle returns is that from which it was called, and R may not sink below where the
+        control stands: there the correction of an earlier hole holds.
         """
         spread = np.zeros(len(rows))
         for group in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
             places = np.concatenate([self.original.start[rows[group[:1]]], self.original.end[rows[group]]])
             length = _lengths(self.original, self.terms)[rows[group[0]]]
             some = (self.machine.corrected(places, length) - places)[:, self.machine.linear]
-            spread[group] = max(np.ptp(some, axis=0).max(), np.abs(some[:, 2]).max())
+            spread[group] = np.ptp(some, axis=0).max()
         return spread
 
     def offset_change(self, rows: NDArray[np.int64]) -> Floats:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from ncfix import fast
 from ncfix.program import bulk, number_text
 from ncfix.program.bulk import Stretch
-from ncfix.program.emit import Emission, closure_of_refusals, emit
+from ncfix.program.emit import Emission, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.number_style import NumberStyle
@@ -186,31 +186,3 @@ def test_many_edits_as_single_ones(source: bytes, data: st.DataObject) -> None:
 def test_edits_that_overlap_are_refused() -> None:
     with pytest.raises(ValueError, match="overlap"):
         spliced(b"abcdef", Splices.of([Edit(0, 3, b""), Edit(2, 4, b"")]))
-
-
-@EXAMPLES
-@given(st.integers(0, 10_000))
-def test_refusals_reach_back_as_far_as_they_must(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lines = [
-        rng.choice(["G1 X1 Y2 Z3 B0 C0", "G1 X2", "G91 G1 X1\nG90", "G2 X4 Y4 I1 J0", "G53 G0 X0", "G1 Y1"])
-        for _ in range(12)
-    ]
-    try:
-        _, moves = followed(("G90 G21 G94 F100 G0 X0 Y0\n" + "\n".join(lines) + "\nM2\n").encode())
-    except Exception:
-        return
-    kept = (moves.rule != Rule.CORRECT) | (rng.random(len(moves)) < 0.3)
-    found, added = closure_of_refusals(moves, kept)
-    expected, rows = kept.copy(), []
-    pinned = False
-    starts = moves.incremental | (moves.kind == Kind.ARC) | (moves.kind == Kind.CYCLE)
-    for row in range(len(moves) - 1, -1, -1):
-        passed = moves.rule[row] == Rule.PASS
-        if pinned and not passed and not expected[row]:
-            expected[row] = True
-            rows.append(row)
-        if not passed:
-            pinned = bool(expected[row] and (starts[row] or (pinned and not moves.programmed[row].all())))
-    assert found.tolist() == expected.tolist()
-    assert list(added) == rows

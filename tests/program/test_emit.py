@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ncfix.program.emit import SEVERAL_STATES, closure_of_refusals, emit
+from ncfix.program.emit import SEVERAL_STATES, emit
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
 from ncfix.program.reader import read
@@ -145,12 +145,3 @@ def test_a_loop_whose_corrections_agree_is_written():
     emission = emit(program, moves, whole(moves, (0.01, 0, 0)), STEP)
     assert not emission.conflicts
     assert apply(program.source, emission.edits).decode().splitlines()[2:4] == ["G1 X1.01", "X0.01"]
-
-
-def test_a_kept_arc_pins_what_comes_before_it():
-    _, moves = traced("G1 X0 Y0 Z0 F9\nG1 X5\nX1 Y1\nG2 X2 Y0 I1 J0\nM2\n")
-    kept = np.array([False, False, False, True])
-    closed, added = closure_of_refusals(moves, kept)
-    # Z is not named by the motion before the arc, nor by the one before that: back to the one that names all axes
-    assert closed.tolist() == [True, True, True, True]
-    assert sorted(added) == [0, 1, 2]

@@ -18,10 +18,11 @@ CLEARLY = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why a block is refused: a code that `ncfix explain` knows, and a sentence."""
+    """Why a block is refused: a code that `ncfix explain` knows, a sentence, and the block that is the cause (or -1)."""
 
     code: str
     text: str
+    cause: int = -1
 
 
 @dataclass(frozen=True, slots=True)

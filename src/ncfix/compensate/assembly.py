@@ -71,6 +71,13 @@ def assembled(
     return Plan(pieces, real.start, deviation, oriented, findings)
 
 
+def with_approaches(plan: Plan, approaches: Array | None) -> Plan:
+    """The plan with the levels (n, n_axes) from which canned cycles feed."""
+    if approaches is None:
+        return plan
+    return replace(plan, pieces=replace(plan.pieces, approach=approaches[plan.pieces.move]))
+
+
 def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     """Shares of time: those of the fraction; a piece that only takes up a jump has the share of its way."""
     before = np.zeros(len(pieces))

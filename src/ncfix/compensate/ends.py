@@ -118,7 +118,9 @@ def path_of(intent: Intent, q: Array, tips: Array, begins: Mask, pinned: Mask, d
     return Path(travel_mm, travel_rad, begins, pinned, decided[:, rotary])
 
 
-def with_closed_circles(intent: Intent, wanted: Array, kept: Mask, within: float) -> Array:
+def with_closed_circles(
+    intent: Intent, wanted: Array, kept: Mask, within: float, approaches: Array | None = None
+) -> Array:
     """Full circles made to end, within their plane, exactly where they really start.
 
     Only where that moves their end by no more than `within` mm. Of circles one after another all end where the first
@@ -134,7 +136,7 @@ def with_closed_circles(intent: Intent, wanted: Array, kept: Mask, within: float
     joined = (moves.start[rows[1:]] == moves.end[rows[:-1]]).all(axis=1)
     chained[1:] = (np.diff(rows) == 1) & same & joined
     first = rows[np.maximum.accumulate(np.where(chained, 0, np.arange(len(rows))))]
-    where = standing(intent.machine, moves, wanted, kept, intent.before)
+    where = standing(intent.machine, moves, wanted, kept, intent.before, approaches)
     shift = (where.start - moves.start)[first[:, None], columns]
     own = (wanted - moves.end)[rows[:, None], columns]
     off = arcs.across(shift - own, moves.normal[rows])

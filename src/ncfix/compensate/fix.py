@@ -181,8 +181,12 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
     """What was refused, by line."""
     blocks = sorted(account.refused)
     lines = program.lines(np.array(blocks, dtype=np.int64)).tolist()
-    reasons = (account.refused[block] for block in blocks)
-    return [Refusal(line, reason.code, reason.text) for line, reason in zip(lines, reasons, strict=True)]
+    reasons = [account.refused[block] for block in blocks]
+    causes = program.lines(np.array([max(reason.cause, 0) for reason in reasons], dtype=np.int64)).tolist()
+    return [
+        Refusal(line, reason.code, reason.text if reason.cause < 0 else f"{reason.text} (line {cause})")
+        for line, reason, cause in zip(lines, reasons, causes, strict=True)
+    ]
 
 
 def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix.compensate.approaches import corrected_approaches
 from ncfix.compensate.arcs import fitted
-from ncfix.compensate.assembly import Plan, assembled, untouched
+from ncfix.compensate.assembly import Plan, assembled, untouched, with_approaches
 from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.ends import corrected, with_closed_circles
 from ncfix.compensate.findings import Array, Finding, Index, Mask
@@ -85,7 +86,8 @@ def plan(
 def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:
     ends = corrected(intent, strategy, np.flatnonzero(~kept))
     kept = kept | ends.failed
-    real, broken = _real(intent, ends.wanted, kept, demands)
+    approaches = corrected_approaches(intent, ends.wanted, kept) if strategy.follows_path else None
+    real, broken = _real(intent, ends.wanted, kept, demands, approaches)
     bound = intent.moves.compensated if strategy.follows_path else np.ones(len(kept), dtype=bool)
     if (broken & bound).any():
         again = _plan(intent, strategy, demands, kept | (broken & bound))
@@ -96,14 +98,17 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     parts = _parts(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
-    return assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
+    planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
+    return with_approaches(planned, approaches)
 
 
-def _real(intent: Intent, wanted: Array, kept: Mask, demands: Demands) -> tuple[Segments, Mask]:
+def _real(
+    intent: Intent, wanted: Array, kept: Mask, demands: Demands, approaches: Array | None
+) -> tuple[Segments, Mask]:
     """What the control would be told without splitting, and the arcs (n,) that cannot stay arcs."""
     moves, programmed = intent.moves, intent.segments
-    wanted = with_closed_circles(intent, wanted, kept, demands.budget.path / 2)
-    where = standing(intent.machine, moves, wanted, kept, intent.before)
+    wanted = with_closed_circles(intent, wanted, kept, demands.budget.path / 2, approaches)
+    where = standing(intent.machine, moves, wanted, kept, intent.before, approaches)
     real = replace(programmed, start=where.start, end=where.end)
     broken = np.zeros(len(moves), dtype=bool)
     rows = np.flatnonzero(programmed.arc & ~kept)

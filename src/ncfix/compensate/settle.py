@@ -23,9 +23,10 @@ from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
 from ncfix.program.dialect import Dialect
-from ncfix.program.emit import PINNED, Emission, Reading, closure_of_refusals, emit
+from ncfix.program.emit import Emission, Reading, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.pinning import PINNED, closure_of_refusals
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
@@ -125,7 +126,8 @@ def agree(
         state = State(direction=before.direction)
     while True:
         kept, pinned = closure_of_refusals(moves, kept)
-        _explain(reasons, moves.block[pinned].tolist(), CODE_OF_TEXT, PINNED)
+        for row, arc in pinned.items():
+            reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, PINNED, int(moves.block[arc])))
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
         planned = _planned(dialect, moves, machine, options, kept, state, before)
         planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))

@@ -25,35 +25,50 @@ class Standing:
     end: Array
 
 
-def standing(machine: Machine, moves: Moves, wanted: Array, kept: Mask, before: Array | None = None) -> Standing:
+def standing(
+    machine: Machine,
+    moves: Moves,
+    wanted: Array,
+    kept: Mask,
+    before: Array | None = None,
+    approaches: Array | None = None,
+) -> Standing:
     """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes).
 
-    before  (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
+    before      (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
+    approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
     """
     shift = np.where(kept[:, None], 0.0, _known(wanted - moves.end))
     decides = ~kept[:, None] | (moves.moved & ~moves.incremental[:, None])
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
+    jumps, risen = _risen(moves, approaches)
+    back[:-1] &= ~risen[1:]
+    restarts |= risen
     at_start, at_end = np.zeros_like(shift), np.zeros_like(shift)
     carried = np.zeros(shift.shape[1:]) if before is None else before
     for run in _runs(moves):
         if run.start:
             carried = _translated(machine, moves, run.start, carried)
             restarts[run.start] = False
-        at_start[run], at_end[run], carried = _filled(shift[run], decides[run], back[run], restarts[run], carried)
+        part = shift[run], decides[run], back[run], jumps[run], restarts[run]
+        at_start[run], at_end[run], carried = _filled(*part, carried)
     return Standing(moves.start + at_start, moves.end + at_end)
 
 
-def _filled(shift: Array, decides: Mask, back: Mask, restarts: Mask, before: Array) -> tuple[Array, Array, Array]:
+def _filled(
+    shift: Array, decides: Mask, back: Mask, jumps: Array, restarts: Mask, before: Array
+) -> tuple[Array, Array, Array]:
     """Displacements at the starts and ends of a run of motions, and what is carried on behind it.
 
-    Starts and ends are put in one sequence; each takes the last value that was decided before it.
+    Starts and ends are put in one sequence; each takes the last value that was decided before it. Where a motion
+    restarts, the displacement is that of `jumps`.
     """
     n, n_axes = shift.shape
     values = np.zeros((2 * n + 1, n_axes))
     decided = np.zeros((2 * n + 1, n_axes), dtype=bool)
     values[0], decided[0] = before, True
-    decided[1::2] = restarts
+    values[1::2], decided[1::2] = jumps, restarts
     values[2::2], decided[2::2] = shift, decides & ~back
     last = np.maximum.accumulate(np.where(decided, np.arange(2 * n + 1)[:, None], 0), axis=0)
     filled = np.take_along_axis(values, last, axis=0)
@@ -67,6 +82,16 @@ def _gone_back(moves: Moves) -> Mask:
     back[:-1] = (moves.start[1:] == moves.start[:-1]) & (moves.end[:-1] != moves.start[:-1])
     back &= (moves.kind == Kind.CYCLE)[:, None]
     return back
+
+
+def _risen(moves: Moves, approaches: Array | None) -> tuple[Array, Mask]:
+    """Where motions start at the level from which the cycle before them fed, and how far that is off, (n, n_axes)."""
+    off, risen = np.zeros(moves.start.shape), np.zeros(moves.start.shape, dtype=bool)
+    if moves.approach is not None and approaches is not None:
+        at_level = (moves.start[1:] == moves.approach[:-1]) & (moves.start[1:] != moves.end[:-1])
+        risen[1:] = at_level & np.isfinite(approaches[:-1])
+        off[1:][risen[1:]] = (approaches - moves.approach)[:-1][risen[1:]]
+    return off, risen
 
 
 def _restarts(moves: Moves, back: Mask) -> Mask:

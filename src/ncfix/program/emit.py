@@ -306,7 +306,7 @@ class _Emitter:
             pointing=moves.pointing,
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
-            **self.levels.wanted(row, rows.start, int(self.reading.frame[row]), frame, as_programmed),
+            **self.levels.wanted(row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position),
         )
 
     def _turn_minutes(self, row: int) -> float:
@@ -367,10 +367,11 @@ def _last_pieces(pieces: Pieces) -> NDArray[np.intp]:
 def _jumps(moves: Moves) -> NDArray[np.bool_]:
     """(n, n_axes) where a motion does not start where the one before ended.
 
-    Where tool-centre-point control goes on or off, linear axes stand elsewhere as soon as the rotary axes are not quite
-    at zero any more, though the program may have left them there.
+    Where tool-centre-point control goes on or off, or has another length, linear axes stand elsewhere as soon as the
+    rotary axes are not quite at zero any more, though the program may have left them there.
     """
     jumps = np.zeros(moves.start.shape, dtype=bool)
     jumps[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    jumps[1:] |= (moves.tcp[1:] != moves.tcp[:-1])[:, None] & ~moves.rotary
+    longer = moves.tcp[1:] & (moves.tool_length[1:] != moves.tool_length[:-1])
+    jumps[1:] |= (longer | (moves.tcp[1:] != moves.tcp[:-1]))[:, None] & ~moves.rotary
     return jumps

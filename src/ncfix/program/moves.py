@@ -26,7 +26,8 @@ class Kind(IntEnum):
     FEED = 1
     ARC = 2
     CYCLE = 3
-    """A canned cycle's motion to one hole: `end` is the position over the hole at the depth it reaches."""
+    """A canned cycle's motion to one hole: `end` is the position over the hole at the depth it reaches, `approach` that
+    at the level from which it feeds."""
     DWELL = 4
     """No motion, kept for time."""
 
@@ -117,6 +118,8 @@ class Moves:
     held         (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane without
                  tool-centre-point control); None: nowhere
     pointing     how rotary axes point the tool, where programs give its direction as a vector
+    approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to which
+                 it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
     """
 
     axes: tuple[str, ...]
@@ -145,6 +148,7 @@ class Moves:
     reasons: tuple[str, ...]
     held: NDArray[np.bool_] | None = None
     pointing: Pointing | None = None
+    approach: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.block)

@@ -167,7 +167,7 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
         return parts[0]
     before = np.cumsum([0, *blocks[:-1]])
     columns: dict[str, Any] = {
-        each.name: np.concatenate([getattr(part, each.name) for part in parts])
+        each.name: _joined_columns([getattr(part, each.name) for part in parts], parts)
         for each in fields(Moves)
         if each.name not in TABLES
     }
@@ -176,10 +176,17 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
     return Moves(**columns, **{name: getattr(parts[-1], name) for name in TABLES})
 
 
+def _joined_columns(columns: list[Any], parts: list[Moves]) -> Any:
+    """One column of parts that follow each other; parts that lack it have nothing there, and None if all do."""
+    if all(column is None for column in columns):
+        return None
+    empty = (np.full(part.end.shape, np.nan) for part in parts)
+    return np.concatenate([blank if column is None else column for column, blank in zip(columns, empty, strict=True)])
+
+
 def rows_of(moves: Moves, start: int, stop: int, block: int) -> Moves:
     """Some of the motions; blocks are counted from `block`."""
-    columns: dict[str, Any] = {
-        each.name: getattr(moves, each.name)[start:stop] for each in fields(Moves) if each.name not in TABLES
-    }
+    found = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
+    columns: dict[str, Any] = {name: None if column is None else column[start:stop] for name, column in found}
     columns["block"] = columns["block"] - np.int32(block)
     return Moves(**columns, **{name: getattr(moves, name) for name in TABLES})

@@ -22,6 +22,7 @@ class Pieces:
     kept      (m,) the motion is left as it was
     share     (m,) the piece's share of its motion's time, for inverse-time feed; None: that of the fraction. They
               differ for pieces that only take up a jump (play, a step): these have next to no fraction, but a way
+    approach  (m, n_axes) of canned cycles: the command at the level R, as `Moves.approach`; None: nowhere
     """
 
     move: NDArray[np.int64]
@@ -31,6 +32,7 @@ class Pieces:
     centre: NDArray[np.float64]
     kept: NDArray[np.bool_]
     share: NDArray[np.float64] | None = None
+    approach: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.move)

@@ -21,6 +21,9 @@ FloatArray = NDArray[np.float64]
 FEED_DECIMALS = 3
 INVERSE_TIME, PER_MINUTE = "93", "94"
 LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
+GRAIN = 1e-6
+"""A number that is so much of an output step above a whole number of them is that number."""
+
 STRAIGHT_AND_ARCS = (0, 10, 20, 30)
 """Motion codes, in tenths, that may be stated anew: G0 to G3."""
 
@@ -77,6 +80,7 @@ class BlockRenderer:
             else:
                 self._present_axis(position, column, end[column], word)
         self._arc_words(base, position)
+        self._level()
         if self.dragged:
             self._time_of_turn(base, position)
         elif self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
@@ -135,6 +139,27 @@ class BlockRenderer:
         elif wanted != self.target.active_code:
             at = self.program.position(self.block, self.layout.code_at)
             self.out.edits.append((at, at, self._cased("G") + f"{wanted // 10}" + self.layout.blank))
+
+    # -- canned cycles ------------------------------------------------------------------------------------------------
+
+    def _level(self) -> None:
+        """The level R of a canned cycle: its word, or one more where another level is in force."""
+        target, word = self.target, self.layout.radius
+        if not np.isfinite(target.level):
+            return
+        decimals, half = int(target.decimals[target.across]), self.half[target.across]
+        level, least = target.level, target.least_level
+        if level < least:
+            level = float(np.ceil(least / (2 * half) - GRAIN) * 2 * half)
+        self.out.level = target.level_before if word is None else self._value(word, target.nominal_level)
+        if abs(level - self.out.level) < half and not self.out.level < least - 2 * GRAIN * half:
+            return
+        if word is not None:
+            self.out.level = self._rewrite(word, level, decimals)
+        else:
+            text = f"{level:.{decimals}f}"
+            self._add("R", text)
+            self.out.level = float(text)
 
     # -- arcs ---------------------------------------------------------------------------------------------------------
 

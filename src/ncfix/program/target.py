@@ -54,6 +54,7 @@ class Target:
     across       of a canned cycle with a level R: the column of the axis along which it drills
     level        what R shall be, NaN where it is not to be written
     nominal_level, level_before  what it was as programmed, and what is in force before the block (NaN: not known)
+    least_level  R must not be lower; NaN: it may
     """
 
     letters: tuple[str, ...]
@@ -90,6 +91,7 @@ class Target:
     level: float = float("nan")
     nominal_level: float = float("nan")
     level_before: float = float("nan")
+    least_level: float = float("nan")
 
     @property
     def last_code(self) -> int:

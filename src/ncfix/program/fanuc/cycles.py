@@ -37,7 +37,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
         control.lose([index for index in words_of(block) if index != across], AFTER_NONE)
     for _ in range(count):
         place_hole(control, block, program)
-        drill(control, block, code, program, modal.cycle.depth, clear)
+        drill(control, block, code, program, modal.cycle.depth, modal.cycle.r, clear)
 
 
 def take_levels(control: Control, block: Block, initial: float) -> None:

@@ -107,6 +107,7 @@ class Builder:
         self._reasons: dict[str, int] = {"": 0}
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
+        self._approaches: dict[int, Vector] = {}
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
@@ -154,6 +155,10 @@ class Builder:
         """The circle of the motion that is added next."""
         self._arcs[self.count] = arc
 
+    def approach(self, command: Vector) -> None:
+        """The command at the level R of the canned cycle that is added next."""
+        self._approaches[self.count] = command
+
     def extend(self, stretch: Stretch) -> None:
         """Many motions."""
         self._flush()
@@ -191,13 +196,14 @@ class Builder:
             frames=self._frame_table(),
             reasons=tuple(self._reasons),
             pointing=None,
+            approach=self._approach_column(len(block)),
             **self._style_columns(style),
         )
 
     def clear(self) -> None:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
-        self._buffer, self._stretches, self._arcs = Buffer(), [], {}
+        self._buffer, self._stretches, self._arcs, self._approaches = Buffer(), [], {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
@@ -212,6 +218,13 @@ class Builder:
             Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
             for offset, rotation, unit, diameter, increments in self._frames
         )
+
+    def _approach_column(self, count: int) -> FloatArray | None:
+        if not self._approaches:
+            return None
+        column = np.full((count, len(self.columns)), np.nan)
+        column[list(self._approaches)] = np.array(list(self._approaches.values()))[:, self.columns]
+        return column
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         centre, normal, sweep = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)

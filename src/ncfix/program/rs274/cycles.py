@@ -35,7 +35,7 @@ def cycle(control: Control, block: Block, code: int) -> None:
     clear = r if modal.retract_to_r else max(initial, r)
     for _ in range(repeats(control, block)):
         place_hole(control, block, program)
-        drill(control, block, code, program, depth, clear)
+        drill(control, block, code, program, depth, r, clear)
 
 
 def check_cycle(control: Control, block: Block, code: int) -> None:
@@ -104,12 +104,15 @@ def place_hole(control: Control, block: Block, program: Vector) -> None:
             program[index] = step + control.scale[index] * block.values[letter]
 
 
-def drill(control: Control, block: Block, code: int, program: Vector, depth: float, clear: float) -> None:
-    """One hole: a motion to its bottom, after which the control stands at `clear` above it."""
+def drill(control: Control, block: Block, code: int, program: Vector, depth: float, r: float, clear: float) -> None:
+    """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
     height = control.unknown.get(across)
+    if not control.modal.incremental and not unknown and not control.modal.diameter:
+        program[across] = r
+        control.builder.approach(command(control, block, program))
     program[across] = depth
     control.move(Kind.CYCLE, block.axes, command(control, block, program), unknown, code, refusal=refusal)
     program[across] = clear

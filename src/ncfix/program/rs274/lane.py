@@ -6,18 +6,17 @@ results are the same to the last bit; a test holds the two together. What it can
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import fast
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.builder import Stretch
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.coordinates import N_LETTERS
 from ncfix.program.rs274.feeds import INVERSE_TIME, PER_REVOLUTION
-from ncfix.program.rs274.plans import Lane
 from ncfix.program.rs274.unit import Unit
 
 FloatArray = NDArray[np.float64]
@@ -30,14 +29,29 @@ LONGEST = 1 << 16
 """Blocks that are taken at once."""
 
 
-@dataclass(slots=True)
-class Words:
-    """The words of a stretch as columns, NaN (motion: -1) where there is none: axes (n, 9), feed, motion, axis mask."""
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A stretch as the control takes it, one row per block.
 
-    axes: FloatArray
+    path    (n + 1, 9) the command before the first block, and at the end of each
+    feed    (n,) F words, NaN where there is none
+    motion  (n,) motion codes in force, in tenths; `coded` where the block has one
+    mask    (n,) axis words, as bits
+    """
+
+    path: FloatArray
     feed: FloatArray
-    motion: IntArray
+    motion: FloatArray
+    coded: NDArray[np.bool_]
     mask: IntArray
+
+    def head(self, count: int) -> Stage:
+        """The first blocks of it."""
+        if count == len(self.feed):
+            return self
+        return Stage(
+            self.path[: count + 1], self.feed[:count], self.motion[:count], self.coded[:count], self.mask[:count]
+        )
 
 
 def run_lane(control: Control, unit: Unit, block: int, main: bool) -> int:
@@ -45,14 +59,12 @@ def run_lane(control: Control, unit: Unit, block: int, main: bool) -> int:
     stop = min(unit.lane_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_open(control, unit, block):
         return 0
-    words = words_of(unit, block, stop)
-    motion = filled(words.motion.astype(np.float64), words.motion >= 0, control.modal.motion)
-    feed = filled(words.feed, ~np.isnan(words.feed), np.nan)
-    count = count_allowed(control, words, motion, feed)
+    stage = stage_of(control, unit, block, stop)
+    feed = filled(stage.feed, ~np.isnan(stage.feed), np.nan)
+    count = count_allowed(control, stage, feed)
     if count < SHORTEST:
         return 0
-    words = Words(words.axes[:count], words.feed[:count], words.motion[:count], words.mask[:count])
-    take(control, words, motion[:count], feed[:count], block, main)
+    take(control, stage.head(count), feed[:count], block, main)
     return count
 
 
@@ -65,91 +77,130 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
     return begun and known and (modal.incremental or control.offset_checked)
 
 
-def words_of(unit: Unit, start: int, stop: int) -> Words:
-    """The words of a stretch."""
-    count = stop - start
-    program = unit.program
-    words = Words(np.full((count, N_LETTERS), np.nan), np.full(count, np.nan), np.full(count, -1), np.zeros(count, int))
-    first = program.first_number[start:stop]
-    for lane, rows in shapes_of(unit, start, stop):
-        for letter, slot in lane.axes:
-            words.axes[rows, letter] = program.numbers[first[rows] + slot]
-        if lane.feed >= 0:
-            words.feed[rows] = program.numbers[first[rows] + lane.feed]
-        words.motion[rows] = lane.motion
-        words.mask[rows] = sum(1 << letter for letter, _ in lane.axes)
-    return words
+def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
+    """What the blocks of a stretch say, and where they lead."""
+    program, tables = unit.program, tables_of(unit)
+    shapes, first = program.template[start:stop], program.first_number[start:stop]
+    motion, coded = tables.motion[shapes], tables.motion[shapes] >= 0
+    follow = followed_compiled if fast.engaged() else followed
+    path, feed = follow(control, program.numbers, first, shapes, tables)
+    before = float(control.modal.motion)
+    return Stage(path, feed, filled(motion.astype(np.float64), coded, before), coded, tables.mask[shapes])
 
 
-def shapes_of(unit: Unit, start: int, stop: int) -> Iterator[tuple[Lane, IntArray]]:
-    """The shapes of a stretch with the rows that have them."""
-    shapes = unit.program.template[start:stop]
-    order = np.argsort(shapes, kind="stable")
-    edges = np.flatnonzero(np.diff(shapes[order])) + 1
-    for rows in np.split(order, edges):
-        lane = unit.plan_of_shape(int(shapes[rows[0]])).lane
-        assert lane is not None
-        yield lane, rows
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """The lanes of all shapes as columns: slots of axis words (s, 9) and F (s,), motion codes, axis masks (s,)."""
+
+    axes: IntArray
+    feed: IntArray
+    motion: IntArray
+    mask: IntArray
+
+
+def tables_of(unit: Unit) -> Tables:
+    """The lanes of a program's shapes; nothing for shapes that have none."""
+    n = len(unit.program.templates)
+    tables = Tables(*(np.full(size, -1, dtype=np.int64) for size in ((n, N_LETTERS), n, n)), np.zeros(n, np.int64))
+    for shape in range(n):
+        lane = unit.plan_of_shape(shape).lane
+        if lane is not None:
+            for letter, slot in lane.axes:
+                tables.axes[shape, letter] = slot
+            tables.feed[shape], tables.motion[shape] = lane.feed, lane.motion
+            tables.mask[shape] = sum(1 << letter for letter, _ in lane.axes)
+    return tables
+
+
+def followed(
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: Tables
+) -> tuple[FloatArray, FloatArray]:
+    """The path (n + 1, 9) and the F words (n,) of blocks of some shapes with numbers from `first` on."""
+    path = np.empty((len(first) + 1, N_LETTERS))
+    path[0] = control.position
+    for letter in range(N_LETTERS):
+        path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[shapes, letter]))
+    return path, words(numbers, first, tables.feed[shapes])
+
+
+def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
+    """The numbers at some slots of blocks, NaN where the slot is -1."""
+    if len(slots) and slots.min() >= 0:
+        return numbers[first + slots]
+    values = np.full(len(slots), np.nan)
+    rows = np.flatnonzero(slots >= 0)
+    values[rows] = numbers[first[rows] + slots[rows]]
+    return values
+
+
+def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
+    """The commands of one axis at the ends of blocks with these words, (n,)."""
+    here, given = control.position[letter], ~np.isnan(words)
+    if not given.any():
+        return np.full(len(words), here)
+    if control.modal.incremental:
+        steps = np.where(given, control.scale[letter] * words, 0.0)
+        return np.cumsum(np.append(here, steps))[1:]
+    return filled(control.offset[letter] + control.scale[letter] * words, given, here)
+
+
+def followed_compiled(
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: Tables
+) -> tuple[FloatArray, FloatArray]:
+    """As `followed`."""
+    from ncfix.program.rs274 import lane_kernel
+
+    position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
+    incremental = control.modal.incremental
+    path, feed = lane_kernel.followed(
+        numbers, first, shapes, tables.axes, tables.feed, position, (offset, scale), incremental
+    )
+    return path, feed
 
 
 def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> FloatArray:
     """Every row's value, or the last one given above it; `before` where none is."""
+    if valid.all():
+        return values
     last = np.maximum.accumulate(np.where(valid, np.arange(len(values)), -1))
     return np.where(last >= 0, values[last], before)
 
 
-def count_allowed(control: Control, words: Words, motion: FloatArray, feed: FloatArray) -> int:
+def count_allowed(control: Control, stage: Stage, feed: FloatArray) -> int:
     """How many blocks run before one that the control would refuse for want of a feed."""
     modal = control.modal
     if not control.rules.strict:
-        return len(motion)
-    at_feed = (motion == 10) & ((words.mask != 0) | (words.motion == 10))
+        return len(feed)
+    at_feed = (stage.motion == 10) & ((stage.mask != 0) | stage.coded)
     if modal.feed_mode == INVERSE_TIME:
-        refused = at_feed & np.isnan(words.feed)
+        refused = at_feed & np.isnan(stage.feed)
     elif modal.feed_mode == PER_REVOLUTION and modal.speed == 0.0:
         refused = at_feed
     else:
         missing = np.isnan(feed) & (not modal.feed_given)
         refused = at_feed & (missing | (feed == 0.0))
-    return int(np.argmax(refused)) if refused.any() else len(motion)
+    return int(np.argmax(refused)) if refused.any() else len(feed)
 
 
-def take(control: Control, words: Words, motion: FloatArray, feed: FloatArray, block: int, main: bool) -> None:
+def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: bool) -> None:
     """Add the motions of a stretch, and leave the control as they leave it."""
     modal = control.modal
     unit = 1.0 if modal.feed_mode == INVERSE_TIME else modal.unit
     feeds = np.where(np.isnan(feed), modal.feed, unit * feed)
-    given = ~np.isnan(words.feed)
-    if given.any():
+    if not np.isnan(stage.feed).all():
         modal.feed, modal.feed_given = float(feeds[-1]), bool(feeds[-1] != 0.0)
-    modal.motion = modal.straight = int(motion[-1])
-    rows = np.flatnonzero(words.mask)
-    if not len(rows):
+    modal.motion = modal.straight = int(stage.motion[-1])
+    moving = stage.mask != 0
+    if not moving.any():
         return
-    ends = commands(control, words.axes[rows])
-    starts = np.vstack((control.position, ends[:-1]))
-    styles = np.where(motion[rows] == 0, style(control, Kind.RAPID), style(control, Kind.FEED))
-    blocks = block + rows if main else np.full(len(rows), control.row_block)
-    control.builder.extend(Stretch(blocks, words.mask[rows], styles, feeds[rows], starts, ends))
+    rows: IntArray | slice = slice(None) if moving.all() else np.flatnonzero(moving)
+    codes, blocks = stage.motion[rows], block + np.arange(len(moving))[rows]
+    styles = np.where(codes == 0, style(control, Kind.RAPID), style(control, Kind.FEED))
+    blocks = blocks if main else np.full(len(blocks), control.row_block)
+    starts, ends = stage.path[:-1][rows], stage.path[1:][rows]
+    control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends))
     control.position = ends[-1].tolist()
     modal.cycle.initial = None
-
-
-def commands(control: Control, axes: FloatArray) -> FloatArray:
-    """The commands at the ends of motions with these words, (n, 9)."""
-    ends = np.empty_like(axes)
-    for index in range(N_LETTERS):
-        column = axes[:, index]
-        valid = ~np.isnan(column)
-        here = control.position[index]
-        if not valid.any():
-            ends[:, index] = here
-        elif control.modal.incremental:
-            steps = np.where(valid, control.scale[index] * column, 0.0)
-            ends[:, index] = np.cumsum(np.append(here, steps))[1:]
-        else:
-            ends[:, index] = filled(control.offset[index] + control.scale[index] * column, valid, here)
-    return ends
 
 
 def style(control: Control, kind: Kind) -> int:

@@ -31,10 +31,10 @@ def unnamed(control: Control, block: Block) -> Unknown:
     if not named:
         return {}
     if control.modal.incremental:
-        doubtful = set() if control.is_rotated else {*control.unnamed}
+        doubtful = frozenset() if control.is_rotated else control.unnamed
     else:
-        doubtful = {*control.unnamed} if control.is_rotated else control.unnamed - named
-        doubtful = doubtful if named < control.unnamed else set()
+        doubtful = control.unnamed if control.is_rotated else control.unnamed - named
+        doubtful = doubtful if named < control.unnamed else frozenset()
     if doubtful or not control.modal.incremental:
         control.unnamed = frozenset()
     return dict.fromkeys(sorted(doubtful & {*control.machine}), AFTER_ROTATION)

@@ -1,0 +1,93 @@
+"""Which motions have to be left as they were because one that follows is: an arc that keeps its words needs its start.
+
+A refused line, increment or hole that starts a little elsewhere is the same path a little elsewhere, no farther from
+what is meant than an uncorrected one. So is an arc whose end and centre both count from its start. But an arc with
+an end or centre of its own no longer closes, so what is before it must end where it did, along the axes of its plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.moves import Kind, Moves, Rule
+
+Mask = NDArray[np.bool_]
+
+PINNED = "a refused arc that follows starts from its end"
+STILL = 1e-9
+"""A component of a unit normal so near to 1 is 1."""
+
+
+def closure_of_refusals(moves: Moves, kept: Mask) -> tuple[Mask, dict[int, int]]:
+    """Extend `kept` (n,) so that refused arcs begin where they began.
+
+    Returns the extended mask, and the rows added, each with the row of the arc that needs it.
+    """
+    walk = _Walk(moves, kept.copy())
+    for row in np.flatnonzero(kept & walk.anchored)[::-1].tolist():
+        walk.back_from(row)
+    return walk.kept, walk.added
+
+
+class _Walk:
+    """Goes back from refused arcs to motions that name all axes in question."""
+
+    def __init__(self, moves: Moves, kept: Mask) -> None:
+        self.moves = moves
+        self.kept = kept
+        self.added: dict[int, int] = {}
+        self.reached = len(moves)
+        self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
+        self.passed = moves.rule == Rule.PASS
+        self.anchored = (moves.kind == Kind.ARC) & ~self.passed & ~self._floating()
+
+    def _floating(self) -> Mask:
+        """Arcs of which both end and centre count from where they start: incremental ones, and full circles."""
+        moves = self.moves
+        named = [moves.programmed[:, column] for column in self.columns if column >= 0]
+        in_plane = np.abs(moves.normal) < 1 - STILL
+        own = np.stack(named, axis=1) & in_plane[:, [k for k, column in enumerate(self.columns) if column >= 0]]
+        return np.asarray(~moves.arc_absolute & (moves.incremental | ~own.any(axis=1)))
+
+    def back_from(self, arc: int) -> None:
+        """Keep the motions before an arc until every axis of its plane has been named by one."""
+        if arc >= self.reached:
+            return
+        self.reached, needed = arc, self._plane(arc)
+        while needed.any() and self.reached > 0:
+            self.reached -= 1
+            row = self.reached
+            if self.moves.tcp[row] != self.moves.tcp[row + 1]:
+                needed[:] = True
+            if not self.passed[row] and not self.kept[row]:
+                self.kept[row] = True
+                self.added[row] = arc
+            needed &= ~self._decided(row)
+            if self.anchored[row]:
+                needed |= self._plane(row)
+
+    def _plane(self, row: int) -> Mask:
+        """The axes of an arc's plane."""
+        axes = np.zeros(len(self.moves.axes), dtype=bool)
+        for column, across in zip(self.columns, np.abs(self.moves.normal[row]).tolist(), strict=True):
+            if column >= 0 and across < 1 - STILL:
+                axes[column] = True
+        return axes
+
+    def _decided(self, row: int) -> Mask:
+        """The axes that stand behind a motion where it says, wherever it began."""
+        moves = self.moves
+        if self.passed[row]:
+            return np.asarray(moves.moved[row])
+        decided = moves.programmed[row] & (moves.end[row] == moves.start[row + 1])
+        if moves.incremental[row]:
+            return np.zeros_like(decided)
+        turned = [
+            column
+            for column, own in zip(self.columns, moves.frames[moves.frame[row]].rotation, strict=True)
+            if column >= 0 and np.abs(own).max() < 1 - STILL
+        ]
+        if turned and not decided[turned].all():
+            decided[turned] = False
+        return decided

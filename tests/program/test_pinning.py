@@ -1,0 +1,91 @@
+"""A refused arc with an end of its own begins where it began; nothing else reaches back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.pinning import closure_of_refusals
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+from ncfix.program.trace import trace
+
+HEAD = "G21 G90 G94 G17 F100\nG0 X0 Y0 Z0\n"
+
+
+def moves_of(text: str, dialect: str = "linuxcnc") -> Moves:
+    program = read(f"{HEAD}{text}\nM2\n".encode(), "part.ngc", dialect)
+    return trace(program, Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()).moves
+
+
+def pinned(text: str, refused: int, dialect: str = "linuxcnc") -> list[int]:
+    """The motions (from 0, the one of the head) that are kept because motion `refused` is."""
+    moves = moves_of(text, dialect)
+    kept = np.zeros(len(moves), dtype=bool)
+    kept[refused] = True
+    found, added = closure_of_refusals(moves, kept)
+    assert sorted(np.flatnonzero(found & ~kept).tolist()) == sorted(added)
+    assert set(added.values()) <= {refused}
+    return sorted(added)
+
+
+@pytest.mark.parametrize(
+    ("text", "refused", "expected"),
+    [
+        ("G1 X5 Y5\nX1 Y1\nG2 X2 Y0 I1 J0", 3, [2]),
+        ("G1 X5 Y5\nZ3\nX1\nG2 X2 Y4 I1 J0", 4, [1, 2, 3]),
+        ("G1 X1 Y1\nG91 X5", 2, []),
+        ("G1 X1 Y1\nG91 G2 X2 Y0 I1 J0", 2, []),
+        ("G1 X1 Y1\nG90.1 G91 G2 X2 Y0 I2 J1", 2, [1]),
+        ("G1 X1 Y1\nG2 I1", 2, []),
+        ("G1 X1 Y1\nG2 I1 Z-1", 2, []),
+        ("G1 X1 Y1\nG2 X2 R5", 2, [1]),
+        ("G1 X1 Y1\nG91 X1\nG90 G2 X3 Y0 I1 J0", 3, [1, 2]),
+        ("G1 X1 Y1\nG2 X3 Y1 I1 J0\nG3 X5 Y1 I1 J0", 3, [1, 2]),
+        ("G1 X1 Y1\nG53 G0 X0 Y0\nG2 X2 Y0 I1 J0", 3, []),
+        ("G1 X1 Y1\nG53 G0 X0\nG2 X2 Y1 I1 J0", 3, [1]),
+        ("G18 G1 X1 Z1\nY4\nG2 X3 Z1 I1 K0", 3, [1, 2]),
+        ("G10 L2 P1 R30\nG1 X1 Y1\nX2\nZ1\nG2 X4 Y1 I1 J0", 4, [1, 2, 3]),
+    ],
+)
+def test_how_far_back_a_refusal_reaches(text: str, refused: int, expected: list[int]) -> None:
+    assert pinned(text, refused) == expected
+
+
+def test_holes_are_drilled_where_their_blocks_say() -> None:
+    assert pinned("G0 X1. Y1.\nG81 X2. Z-1. R1.\nX3.", 3, "fanuc") == []
+
+
+LINES = (
+    "G1 X1 Y2 Z3",
+    "G1 X2",
+    "G1 Y1 Z0",
+    "G91 G1 X1\nG90",
+    "G91 G2 X2 I1\nG90",
+    "G2 X4 Y4 R50",
+    "G2 I1",
+    "G53 G0 X0",
+)
+
+
+@settings(max_examples=80, derandomize=True, deadline=None)
+@given(st.lists(st.sampled_from(LINES), min_size=2, max_size=14), st.integers(0, 2**14 - 1))
+def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: int) -> None:
+    try:
+        moves = moves_of("\n".join(lines))
+    except Exception:  # an arc that cannot reach its end
+        return
+    kept = (moves.rule != Rule.CORRECT) | np.array([refused >> row & 1 for row in range(len(moves))], dtype=bool)
+    found, _ = closure_of_refusals(moves, kept)
+    off = np.zeros(3, dtype=bool)
+    for row in range(len(moves)):
+        own = moves.programmed[row].any() and not moves.incremental[row] and moves.kind[row] == Kind.ARC
+        if found[row] and own:
+            assert not off[:2].any()
+        if found[row] and not moves.incremental[row]:
+            off &= ~moves.programmed[row]
+        elif not found[row]:
+            off[:] = True
