@@ -1,10 +1,11 @@
-"""A few scenarios through the real program. The whole benchmark is `make hidden`."""
+"""A few scenarios through the real program, half a minute of one core. The whole benchmark is `make hidden`."""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ def command() -> str:
     return found
 
 
+@cache
 def needs(*verbs: str) -> Program:
     """The program, if its help lists these verbs."""
     done = subprocess.run([command(), "--help"], capture_output=True, text=True, check=False, timeout=60)
@@ -59,22 +61,22 @@ def test_both_kinematics_agree_on_the_base_machine(topology: str, tmp_path: Path
 
 
 def test_single_effects_are_named() -> None:
-    records = [record("single", index) for index in (1, 2, 4, 8, 10, 13)]
-    assert sum(bool(r.first_right) for r in records) >= 5, [(r.hidden, r.reported, r.error) for r in records]
+    """110 rows each: a third of the time of a whole design."""
+    records = [record("small", index) for index in (0, 2, 4)]
+    assert sum(bool(r.first_right) for r in records) >= 2, [(r.hidden, r.reported, r.error) for r in records]
     gaps = [(r.gap_after_um, r.gap_before_um) for r in records if r.first_right]
     assert all(after is not None and after < 0.6 * before for after, before in gaps)
 
 
 def test_nothing_is_named_where_nothing_is() -> None:
-    records = [record("clean", index) for index in range(4)]
-    assert [r.reported for r in records] == [()] * 4
+    assert record("clean", 0).reported == ()
 
 
 def test_a_stranger_is_said_to_be_unknown() -> None:
-    records = [record("foreign", index) for index in range(3)]
-    assert sum(r.unknown or bool(r.first_right) for r in records) >= 2, [(r.hidden, r.reported) for r in records]
+    answer = record("foreign", 1)
+    assert answer.unknown, (answer.hidden, answer.reported)
 
 
 def test_a_mistake_is_named() -> None:
-    records = [record("mistake", index) for index in (0, 1, 3)]
-    assert sum(bool(r.first_right) for r in records) >= 2, [(r.hidden, r.reported) for r in records]
+    answer = record("mistake", 0)
+    assert answer.first_right, (answer.hidden, answer.reported)
