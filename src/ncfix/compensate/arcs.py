@@ -22,6 +22,8 @@ NUDGE = 1e-3
 """mm by which the centre is moved to see what that does."""
 CLOSED = 1e-6
 """mm; ends closer to each other than this are one point."""
+TURNED = 1e-9
+"""Of a turn; nearer to whole turns an arc has whole ones."""
 APART = 4.0
 """So many rounding errors must lie between the ends of an arc that is not a full circle: rounded onto each other they
 would make it one."""
@@ -144,5 +146,12 @@ def _sound(
     chord = np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1)
     clear = closed | (chord > APART * rounding + CLOSED)
     same = np.abs(sweep - arcs.sweep) < 0.1 + 0.1 * np.abs(arcs.sweep)
+    same &= closed | (turns_begun(sweep) == turns_begun(arcs.sweep))
     result: Mask = agree & clear & same & np.isfinite(sweep)
     return result
+
+
+def turns_begun(sweep: Array) -> Array:
+    """How many turns, full ones and the last, a control is told of: a little more than one is next to nothing to it."""
+    begun: Array = np.ceil(np.abs(sweep) / (2 * np.pi) - TURNED)
+    return begun

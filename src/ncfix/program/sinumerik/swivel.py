@@ -36,12 +36,18 @@ PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "d
 
 SWIVEL = "swivelling (CYCLE800)"
 UNFOLLOWED = "a tilted plane (CYCLE800{}) is in force, which ncfix does not follow"
+OVER_FRAME = (
+    "a programmed frame (TRANS, ROT, ...) was in force at CYCLE800, and whether it stays is for machine data: "
+    "take it out before"
+)
 AFTER_SWIVEL = "where the axis {} stands after swivelling (CYCLE800) is not followed"
 
 
 def swivel(control: Sinumerik, block: int, step: Calling) -> None:
     """CYCLE800: without arguments it takes the tilt away, with them it tilts the plane."""
     control.suspended.pop("tilt", None)
+    if control.frames.program != WORLD:
+        control.suspended["frame"] = OVER_FRAME
     if all(part is None or isinstance(part, Text) for part in step.written):
         untilted(control)
         return
