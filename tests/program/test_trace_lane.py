@@ -12,22 +12,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ncfix import fast
 from ncfix.diagnostics import NcfixError
 from ncfix.program.moves import Moves
 from ncfix.program.rs274 import lane
 from program.tracing import KNOWN, follow
 
-ALWAYS, NEVER = 1, 10**9
+ALWAYS, NEVER, COMPILED = 1, 10**9, -1
 
 
 @contextmanager
 def stretches_of(shortest: int) -> Iterator[None]:
-    """Which stretches go through the fast lane."""
-    before, lane.SHORTEST = lane.SHORTEST, shortest
+    """Which stretches go through the fast lane; `COMPILED`: all of them, compiled if that is installed."""
+    before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
+    if shortest == COMPILED:
+        fast.engage()
     try:
         yield
     finally:
         lane.SHORTEST = before
+        fast.disengage()
 
 
 def columns(text: str, shortest: int, dialect: str) -> dict[str, object] | str:
@@ -46,13 +50,14 @@ def columns(text: str, shortest: int, dialect: str) -> dict[str, object] | str:
 
 
 def assert_same(text: str, dialect: str = "linuxcnc") -> None:
-    one, other = columns(text, ALWAYS, dialect), columns(text, NEVER, dialect)
-    if isinstance(one, str) or isinstance(other, str):
-        assert one == other
-        return
-    for name, values in one.items():
-        if name not in ("frame", "reason"):
-            np.testing.assert_array_equal(values, other[name], err_msg=name)
+    other = columns(text, NEVER, dialect)
+    for one in (columns(text, ALWAYS, dialect), columns(text, COMPILED, dialect)):
+        if isinstance(one, str) or isinstance(other, str):
+            assert one == other
+            continue
+        for name, values in one.items():
+            if name not in ("frame", "reason"):
+                np.testing.assert_array_equal(values, other[name], err_msg=name)
 
 
 def line(random: Random) -> str:

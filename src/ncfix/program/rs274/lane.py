@@ -101,7 +101,7 @@ class Tables:
 def tables_of(unit: Unit) -> Tables:
     """The lanes of a program's shapes; nothing for shapes that have none."""
     n = len(unit.program.templates)
-    tables = Tables(*(np.full(size, -1, dtype=np.int64) for size in ((n, N_LETTERS), n, n)), np.zeros(n, np.int64))
+    tables = Tables(np.full((n, N_LETTERS), -1), np.full(n, -1), np.full(n, -1), np.zeros(n, np.int64))
     for shape in range(n):
         lane = unit.plan_of_shape(shape).lane
         if lane is not None:
@@ -125,8 +125,6 @@ def followed(
 
 def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
     """The numbers at some slots of blocks, NaN where the slot is -1."""
-    if len(slots) and slots.min() >= 0:
-        return numbers[first + slots]
     values = np.full(len(slots), np.nan)
     rows = np.flatnonzero(slots >= 0)
     values[rows] = numbers[first[rows] + slots[rows]]
