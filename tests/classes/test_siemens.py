@@ -26,7 +26,7 @@ WORDS = [
     case("G91", "G91\nG1 X5 F100\nX5 Y1\nG90 X0", L4=R, L5=R, L6=R),
     case("inches", "G700\nG1 X1 Y.5 F10\nG91 X.25", L4=R, L5=R),
     case("diameters", "DIAMON\nG1 X5 F100\nDIAMOF\nX7", L4=R, L6=R),
-    case("radii beside diameters", "DIAM90\nG1 X6 F100\nG91 X1", L4=N, L5=N),
+    case("radii beside diameters", "DIAM90\nG1 X6 F100\nG91 X1", L4=R, L5=N),
     case("expressions of constants", "R1=5\nDEF REAL DEEP=-2\nG1 X=R1*2 Z=DEEP F100", L5=R),
     case("a frame variable", "$P_UIFR[1,X,TR]=5\nG54 G1 X5 F100", L4=N),
     case("tool data", "$TC_DP3[1,1]=100\nG1 X5 F100", L4=N),
