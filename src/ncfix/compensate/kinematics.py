@@ -13,17 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ncfix.compensate.findings import Array, Index, Mask, pose_error
-from ncfix.compensate.ragged import slices
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
+from ncfix.machine.aim import FLAT
+from ncfix.machine.steps import dot, volume
 
 SPATIAL = ("X", "Y", "Z")
-PROBE = 256.0
-"""mm; a power of two, so that dividing by it rounds nothing."""
-BATCH = 16_384
-"""Poses worked on at a time."""
-FLAT = 1e-6
-"""The volume spanned by the tip's motions per mm of X, Y and Z below which they do not reach every point."""
 
 
 def linear_columns(machine: Machine) -> Index:
@@ -51,27 +46,21 @@ def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tupl
     length = np.asarray(tool_length, dtype=np.float64)
     if len(q) > 1 and length.ndim == 0 and (still == still[0]).all():
         still = still[:1]
-    maps, offset = np.empty((len(still), 3, 3)), np.empty((len(still), 3))
-    for part in slices(len(still), BATCH):
-        probes = np.repeat(still[None, part], 4, axis=0)
-        for k, column in enumerate(columns):
-            probes[k + 1, :, column] = PROBE
-        tips = machine.tip(probes, length if length.ndim == 0 else length[part])
-        maps[part] = np.moveaxis(tips[1:] - tips[0], 0, -1) / PROBE
-        offset[part] = tips[0]
-    return maps, offset
+    return machine.follows(still, tuple(columns.tolist())), machine.tip(still, length)
 
 
 def solve(maps: Array, tips: Array) -> Array:
     """The linear motion that moves the tip by `tips` (n, 3): maps (n or 1, 3, 3) -> (n, 3) mm of X, Y, Z."""
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.linalg.solve(maps, tips[..., None])[..., 0], dtype=np.float64)
+    with np.errstate(all="ignore"):
+        whole, *normals = volume(*np.moveaxis(maps, 0, -1).swapaxes(0, 1))
+        share = 1 / whole
+        return np.stack([dot(normal, tips.T) * share for normal in normals], axis=-1)
 
 
 def regular(maps: Array) -> tuple[Array, Mask]:
     """The maps with those that cannot be inverted replaced by the identity, and which can (n or 1,)."""
     with np.errstate(invalid="ignore"):
-        fine = np.asarray(~(np.abs(np.linalg.det(maps)) < FLAT))
+        fine = np.asarray(~(np.abs(volume(*np.moveaxis(maps, 0, -1).swapaxes(0, 1))[0]) < FLAT))
     usable: Array = maps if fine.all() else np.where(fine[:, None, None], maps, np.eye(3))
     return usable, fine
 

@@ -7,14 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.kinematics import affine_tip, linear_columns, regular, solve
+from ncfix.compensate.kinematics import linear_columns
 from ncfix.machine import Machine, State
-
-CLOSE = 1e-6
-"""mm; a tip that is expected to be closer to its target than 1 nm has arrived."""
-PASSES = 40
-WHOLE_STEPS = 8
-"""After so many passes the steps are halved: whole steps jump to and fro where the error has a jump or a kink."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,35 +43,18 @@ def moved(q: Array, columns: Index, step: Array) -> Array:
     return result
 
 
-def steer(machine: Machine, q: Array, target: Array, state: State) -> tuple[Array, Mask]:
-    """Move X Y Z until the erroneous machine's tip is at `target`.
+def steer(machine: Machine, q: Array, target: Array | None, state: State) -> tuple[Array, Mask]:
+    """Move X Y Z until the erroneous machine's tip is at `target`; None: where a perfect machine has it at q.
 
     q       (n, n_axes) where to begin; only X Y Z are changed
     target  (n, 3) tool tip in the workpiece frame, mm
 
-    Newton's method with the analytic Jacobian of the perfect machine: the errors change it by parts in ten thousand
-    only, so each pass gains about as many digits. A pose has arrived when the gap, falling by the ratio that the last
+    See `Machine.aim`. Returns the positions and which of them have arrived: the gap, falling by the ratio that the last
     two passes show, will be under 1 nm.
-
-    Returns the positions and which of them have arrived.
     """
-    q = q.copy()
     columns = linear_columns(machine)
-    maps, fine = regular(affine_tip(machine, q, state.tool_length)[0])
-    arrived = np.zeros(len(q), dtype=bool)
-    active = np.flatnonzero(np.isfinite(target).all(axis=1) & np.isfinite(q).all(axis=1) & fine)
-    before = np.zeros(len(q))
-    for number in range(PASSES):
-        if not active.size:
-            break
-        everyone = active.size == len(q)
-        rows: Index | slice = slice(None) if everyone else active
-        gap = machine.actual_tip(q[rows], rows_of(state, rows)) - target[rows]
-        step = solve(maps if len(maps) == 1 else maps[rows], gap)
-        q[active[:, None], columns] -= step if number < WHOLE_STEPS else step / 2
-        size = np.sqrt(np.einsum("ij,ij->i", gap, gap))
-        done = (size < CLOSE) | (size * size < CLOSE * before[active])
-        before[active] = size
-        arrived[active[done]] = True
-        active = active[~done]
-    return q, arrived
+    x, y, z = columns.tolist()
+    aim = machine.aim(q, (x, y, z), state, target)
+    result = q.copy()
+    result[:, columns] = aim.place
+    return result, aim.arrived

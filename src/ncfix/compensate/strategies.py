@@ -60,7 +60,7 @@ class Position(Strategy):
 
     def solve(self, machine: Machine, q: Array, state: State, path: Path | None = None) -> Correction:
         """See `Strategy.solve`."""
-        return _position(machine, q, q, machine.tip(q, state.tool_length), state)
+        return _position(machine, q, state)
 
 
 class RotaryThenLinear(Strategy):
@@ -70,7 +70,8 @@ class RotaryThenLinear(Strategy):
     machine with the errors of its rotary axes only brings the tip to the intended point; the errors of all other
     joints are read there and taken off. Later passes take off what the whole machine still leaves, until that is below
     1 nm: the linear errors are then those at the commanded coordinates, and products of rotary and linear errors are
-    in. `passes = 1` stops after the first. Works on any chain: it does not matter which side a rotary axis is on.
+    in. `passes = 1` stops after the first. Where later passes follow it does not matter how the first one began, so
+    they begin at the program's position. Works on any chain: it does not matter which side a rotary axis is on.
     """
 
     name = "rotary-then-linear"
@@ -83,6 +84,8 @@ class RotaryThenLinear(Strategy):
         """See `Strategy.solve`."""
         if machine.is_perfect:
             return untouched(q)
+        if self.passes != 1:
+            return _position(machine, q, state)
         columns = linear_columns(machine)
         turning, rest = parted(machine)
         target = machine.tip(q, state.tool_length)
@@ -91,9 +94,7 @@ class RotaryThenLinear(Strategy):
         shifted = moved(q, columns, shift)
         nominal = target + np.einsum("...ij,...j->...i", maps, shift)
         first = moved(shifted, columns, -solve(maps, rest.actual_tip(shifted, state) - nominal))
-        if self.passes == 1:
-            return Correction(first, np.isfinite(first.sum(axis=1)) & fine, np.zeros(len(q), dtype=bool))
-        return _position(machine, q, first, target, state)
+        return Correction(first, np.isfinite(first.sum(axis=1)) & fine, np.zeros(len(q), dtype=bool))
 
 
 def parted(machine: Machine) -> tuple[Machine, Machine]:
@@ -104,10 +105,10 @@ def parted(machine: Machine) -> tuple[Machine, Machine]:
     return machine.replace(effects=turning), machine.replace(effects=rest)
 
 
-def _position(machine: Machine, q: Array, start: Array, target: Array, state: State) -> Correction:
+def _position(machine: Machine, q: Array, state: State) -> Correction:
     if machine.is_perfect:
         return untouched(q)
-    corrected, arrived = steer(machine, start, target, state)
+    corrected, arrived = steer(machine, q, None, state)
     return Correction(corrected, arrived, np.zeros(len(q), dtype=bool))
 
 

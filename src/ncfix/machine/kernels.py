@@ -9,6 +9,8 @@ holds the two together.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
@@ -20,8 +22,10 @@ Array = NDArray[np.float64]
 
 for function in (*steps.FORMULAS, *loops.HELPERS):
     register_jitable(function)
-tips = njit(cache=True, nogil=True, error_model="numpy")(loops.tips)
-follows = njit(cache=True, nogil=True, error_model="numpy")(loops.follows)
+# Without the runtime that keeps account of arrays, which would take most of the time: loops make none.
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+tips = njit(**OPTIONS)(loops.tips)
+aim = njit(**OPTIONS)(loops.aim)
 
 
 @njit(inline="always")

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix.machine import bending, fingerprint, jacobian, linear, se3
+from ncfix.machine.aim import Aim, aimed, aimed_at_once, at_once, taken
 from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects
 from ncfix.machine.forward import Chain, build_chain, carry
 from ncfix.machine.jacobian import Jacobians
-from ncfix.machine.route import Route, route_of
+from ncfix.machine.route import Route, Turns, route_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.signals import with_lags
 from ncfix.machine.state import Poses, State, flatten
@@ -145,6 +146,51 @@ class Machine:
         """Where the tip really is in the workpiece frame, shape (..., 3) [mm]."""
         return self._tip(q, state, None if self.is_perfect else self._model)
 
+    def aim(
+        self,
+        q: ArrayLike,
+        axes: tuple[int, int, int],
+        state: State = State(),  # noqa: B008
+        target: ArrayLike | None = None,
+    ) -> Aim:
+        """Where linear axes (columns `axes`: X, Y, Z) must stand so that the real tip is at `target`.
+
+        q       (n, n_axes) where to begin, and where all other axes are
+        target  (n, 3) mm; where a perfect machine has the tip at q if not given
+
+        Rows are poses in what is returned. An axis that cannot bring the tip there is left where that shows.
+        """
+        _, poses = self._poses(q, state, self._model)
+        goal = None if target is None else np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
+        n = poses.positions.shape[1]
+        place, arrived, gap = np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty((3, n))
+        for part, chunk in poses.chunks():
+            found = self._aim(chunk, axes, None if goal is None else goal[:, part])
+            place[:, part], arrived[part], gap[:, part] = found.place, found.arrived, found.gap
+        return Aim(place.T, arrived, gap.T)
+
+    def _aim(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
+        perfect, route = self._perfect_route, self._route
+        assert perfect is not None
+        if route is None or not at_once(route, poses, axes):
+            return self._aim_plainly(poses, axes, target)
+        found, rest = aimed_at_once(poses, axes, perfect, route, target)
+        rows = np.flatnonzero(rest)
+        if rows.size:
+            goal = None if target is None else target[:, rows]
+            again = self._aim_plainly(taken(poses, poses.positions, rows), axes, goal)
+            found.place[:, rows], found.arrived[rows], found.gap[:, rows] = again.place, again.arrived, again.gap
+        return found
+
+    def _aim_plainly(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
+        perfect, route = self._perfect_route, self._route
+        assert perfect is not None
+
+        def tips(here: Poses, turns: Turns) -> Array:
+            return self._tips_along(route, here, self._model, turns)
+
+        return aimed(poses, axes, perfect, (route or perfect).turns(poses), tips, target)
+
     def nominal(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """`workpiece_from_tool` of a perfect machine, shape (..., 4, 4)."""
         return self._pose(q, State(tool_length), None)
@@ -162,6 +208,15 @@ class Machine:
         shift = actual[..., :3, 3] - nominal[..., :3, 3]
         turn = se3.rotation_vector(actual[..., :3, :3] @ np.swapaxes(nominal[..., :3, :3], -1, -2))
         return np.concatenate([shift, turn], axis=-1)
+
+    def follows(self, q: ArrayLike, axes: tuple[int, ...]) -> Array:
+        """How the tip of a perfect machine follows linear axes, shape (..., 3, axes) mm per mm, workpiece frame."""
+        shape, poses = flatten(q, State(), self.axes, frozenset())
+        assert self._perfect_route is not None
+        out = np.empty((3, len(axes), poses.positions.shape[1]))
+        for part, chunk in poses.chunks():
+            out[:, :, part] = self._perfect_route.follows(chunk, axes)
+        return _poses_first(out, shape)
 
     def axis_jacobian(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """The derivative of the nominal tip pose by the axis positions, shape (..., 6, n_axes); see `Jacobians`."""
@@ -200,7 +255,8 @@ class Machine:
         machine if not given, and may be any others of its joints.
         """
         effects = self.effects if effects is None else tuple(effects)
-        model = compile_effects(self.axes, self.tool, [linear.switched_on(effect) for effect in effects])
+        alike = {dataclasses.replace(effect, name=f"EX{effect.joint}", coefficients=()): effect for effect in effects}
+        model = compile_effects(self.axes, self.tool, [linear.switched_on(effect) for effect in alike.values()])
         shape, poses = self._poses(q, state, model)
         return _poses_first(linear.design(self.axes, self.tool, effects, poses), shape)
 
@@ -221,15 +277,21 @@ class Machine:
         route = self._perfect_route if model is None else self._route
 
         def tips(part: Poses) -> Array:
-            if route is None:
-                return self._carried_tips(part, model)
-            tip, largest = route.tips(part)
-            large = np.flatnonzero(largest >= SMALL)
-            if large.size:
-                tip[:, large] = self._carried_tips(part, model)[:, 0, large]
-            return tip[:, None]
+            return self._tips_along(route, part, model)[:, None]
 
         return self._evaluated(tips, q, state, model, 1)[..., 0]
+
+    def _tips_along(
+        self, route: Route | None, part: Poses, model: ErrorModel | None, turns: Turns | None = None
+    ) -> Array:
+        """The tip (3, n) by the route, but for poses at which small motions are large."""
+        if route is None:
+            return self._carried_tips(part, model)[:, 0]
+        tip, largest = route.tips(part, turns)
+        large = np.flatnonzero(largest >= SMALL)
+        if large.size:
+            tip[:, large] = self._carried_tips(part, model)[:, 0, large]
+        return tip
 
     def _carried_tips(self, part: Poses, model: ErrorModel | None) -> Array:
         """The tip by any chain, with small motions of any size, (3, 1, n)."""

@@ -17,11 +17,15 @@ from ncfix.machine import se3, steps
 from ncfix.machine.axis import Axis, Tool, Vector
 from ncfix.machine.error_model import ErrorModel, Group, Slot
 from ncfix.machine.forward import Joint, lies_on_axis
+from ncfix.machine.loops import Columns, Packed, packed, room
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Steps
 from ncfix.machine.terms import Place, Terms, terms_of
 from ncfix.machine.transport import SmallMotion, columns, versine
+
+Turns = tuple[Array, Array]
+"""Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""
 
 
 @dataclass(frozen=True)
@@ -33,41 +37,45 @@ class Route:
     """
 
     plain: tuple[Steps, Functions]
-    compiled: tuple[Steps, Functions]
+    compiled: Packed
     terms: Terms
     rotary: tuple[int, ...]
 
-    def tips(self, poses: Poses) -> tuple[Array, Array]:
-        """The tip (3, n), and the largest squared angle of a small motion at each pose (n,)."""
-        sine, versed = self.turns(poses)
-        given, n = self.terms.given(poses), poses.positions.shape[1]
+    def tips(self, poses: Poses, turns: Turns | None = None) -> tuple[Array, Array]:
+        """The tip (3, n), and the largest squared angle of a small motion at each pose (n,); `turns` if known."""
+        turns = turns or self.turns(poses)
+        n = poses.positions.shape[1]
         if _are_many(n):
             from ncfix.machine import kernels
 
-            stack = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
-            return kernels.tips(*self.compiled, poses.tool_length, poses.positions, sine, versed, stack)
+            given, out = self.columns(poses, turns), np.empty((4, n))
+            kernels.tips(*self.compiled, given, room(self.compiled, given), out)
+            return out[:3], out[3]
         legs, functions = self.plain
-        found, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
-        steps.work_out_functions(functions, poses.positions, sine, versed, given, found)
-        steps.add_up(functions, found, values)
+        results, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
+        steps.work_out_functions(functions, poses.positions, *turns, self.terms.given(poses), results)
+        steps.add_up(functions, results, values)
         tip, largest = np.empty((3, n)), np.zeros(n)
-        *point, largest = steps.carried(legs, values, poses.tool_length, poses.positions, sine, versed, largest)
+        *point, largest = steps.carried(legs, values, poses.tool_length, poses.positions, *turns, largest)
         tip[0], tip[1], tip[2] = point
         return tip, largest
 
-    def follows(self, poses: Poses, axes: Sequence[int]) -> Array:
+    def follows(self, poses: Poses, axes: Sequence[int], turns: Turns | None = None) -> Array:
         """How the tip follows linear axes, (3, axes, n) mm per mm; of a route without errors."""
-        sine, versed = self.turns(poses)
-        if _are_many(poses.positions.shape[1]):
-            from ncfix.machine import kernels
-
-            return kernels.follows(self.compiled[0], np.array(axes), sine, versed)
+        turns = turns or self.turns(poses)
         out = np.empty((3, len(axes), poses.positions.shape[1]))
         for place, axis in enumerate(axes):
-            out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, sine, versed)
+            out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, *turns)
         return out
 
-    def turns(self, poses: Poses) -> tuple[Array, Array]:
+    def columns(self, poses: Poses, turns: Turns) -> Columns:
+        """What compiled kernels are given."""
+        n = poses.positions.shape[1]
+        given = self.terms.given(poses)
+        others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
+        return Columns(poses.positions, *turns, others, poses.tool_length)
+
+    def turns(self, poses: Poses) -> Turns:
         """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""
         q, held = poses.positions, self.terms.held
         sine, versed = (np.empty((len(q) + len(held), q.shape[1])) for _ in range(2))
@@ -110,7 +118,7 @@ def route_of(
     start = np.array([ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)])
     legs = _numbers(start, found)
     listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
-    return Route(listed, (legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
+    return Route(listed, packed(legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
 
 @dataclass(frozen=True, slots=True)

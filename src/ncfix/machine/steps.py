@@ -212,5 +212,35 @@ def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
     return x, y, z
 
 
-FORMULAS = (turned, factors, screw_factor, twice_crossed, held_signal, next_wave, carried, follows)
+def volume(a: Any, b: Any, c: Any) -> Any:
+    """What three vectors x y z span, and their cross products b x c, c x a and a x b."""
+    p = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]
+    q = c[1] * a[2] - c[2] * a[1], c[2] * a[0] - c[0] * a[2], c[0] * a[1] - c[1] * a[0]
+    r = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return dot(a, p), p, q, r
+
+
+def dot(a: Any, b: Any) -> Any:
+    """The scalar product of vectors x y z, summed in this order."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def has_arrived(size: Number, before: Number, close: float) -> Any:
+    """Whether a gap, falling by the ratio that the last two passes show, will be below `close`."""
+    return (size < close) | (size * size < close * before)
+
+
+FORMULAS = (
+    turned,
+    factors,
+    screw_factor,
+    twice_crossed,
+    held_signal,
+    next_wave,
+    carried,
+    follows,
+    volume,
+    dot,
+    has_arrived,
+)
 """What compiled kernels are made of, too."""

@@ -45,6 +45,11 @@ class Terms:
     groups: tuple[tuple[Group, Array | None], ...]
     held: tuple[tuple[int, float, float], ...]
 
+    def see(self, axes: Sequence[int]) -> bool:
+        """Whether any of these functions changes with one of the axes."""
+        signals = [signal for group, _ in self.groups for signal in (group.signal, group.factor)]
+        return any(signal is not None and signal.axis in axes for signal in signals)
+
     def given(self, poses: Poses) -> list[Array]:
         """The functions that bases work out, (n,) or (1,) each, in order."""
         found: list[Array] = []
