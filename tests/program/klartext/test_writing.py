@@ -8,6 +8,7 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.proof import SelfCheckError
+from ncfix.machine import loads
 from ncfix.program.klartext.poles import pole_in_force
 from ncfix.program.reader import read
 from ncfix.program.writer import apply
@@ -86,6 +87,28 @@ def test_an_arc_is_refused_where_nobody_knows_which_pole_comes_back() -> None:
 def test_a_pole_that_nobody_relies_on_does_not_come_back() -> None:
     found = lines("L X+120 Y+0 Z+0 FMAX\nCC X+110 Y+10\nCR X+130 Y+10 R+10 DR+ F500\nCC X+1 Y+1\nLP PR+30 PA+10")
     assert [line for line in found if line.startswith("CC X+110")] == ["CC X+110 Y+10"]
+
+
+BARELY = loads(
+    """
+    ncfix = 1
+    name = "barely"
+    topology = "w F X Y Z t"
+    least_increment = { linear = 0.0001, rotary = 0.0001 }
+    axis.X = { type = "linear", direction = [1, 0, 0] }
+    axis.Y = { type = "linear", direction = [0, 1, 0] }
+    axis.Z = { type = "linear", direction = [0, 0, 1] }
+    tool = { direction = [0, 0, 1], point = [0, 0, 0] }
+    effect = [{ name = "EXX", coefficients = [0.005] }, { name = "EYY", coefficients = [-1.3e-5] }]
+    """
+)
+"""A machine that is off by just over half an output step of a program in inches along Y."""
+
+
+def test_the_end_of_an_arc_with_more_digits_than_the_control_takes() -> None:
+    """Rounded, the corrected end is next to the programmed one, which stays; the radius must be of that."""
+    body = "L X-0.98267717 Y+1.14173228 FMAX\nCC X-0.41771654 Y+1.14173228\nC X-0.41771654 Y+0.57677165 DR+ F50"
+    assert "Y+0.57677165" in fixed(body, BARELY, unit="INCH").text.decode()
 
 
 def test_a_departure_goes_on_along_the_corrected_line() -> None:

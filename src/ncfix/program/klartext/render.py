@@ -206,7 +206,7 @@ class Renderer(WordWriter):
             result[column] = base + round(float(end[column]) - base, int(self.target.decimals[column]))
             if word is not None and isinstance(word.value, Literal):
                 original = base + float(self.program.values_of(self.block)[word.value.slot])
-                if abs(end[column] - original) < self.half[column]:
+                if abs(result[column] - original) < self.half[column]:
                     result[column] = original
         return result
 
