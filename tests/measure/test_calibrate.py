@@ -12,7 +12,7 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import dumps, loads
 from ncfix.measure.calibrate import Calibration, calibrate
 from ncfix.measure.measurement import Measurement
-from ncfix.measure.prediction import deviations, over_the_travels
+from ncfix.measure.prediction import deviations, guesses, over_the_travels
 from ncfix.measure.selection import Selection
 from ncfix.measure.synthetic import Faults, simulate
 
@@ -199,3 +199,15 @@ def test_the_worst_prediction_over_the_travels_is_found():
     worst = over_the_travels(found)
     assert 0.2 < worst.rms_um < worst.worst_um < 20
     assert set(worst.at) == {*known.axis_names, "tool_length"}
+    assert guesses(found, worst) == ()
+
+
+def test_a_model_that_follows_the_noise_is_said_to_be_a_guess():
+    """As many unknowns as values, nearly: the fit is perfect, and means nothing between the poses."""
+    known = machine("wCBXFZYSt")
+    found = calibrate([simulate(plan(known, "tcp", 40), known, Faults(noise_um=1.0), seed=3)], perfect(known), "all")
+    worst = over_the_travels(found)
+    (message,) = guesses(found, worst)
+    assert message.code == "NCF641"
+    assert f"{worst.worst_um:.1f} um" in message.text
+    assert found.after_um < 1.0 < found.before_um < worst.worst_um

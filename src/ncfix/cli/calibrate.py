@@ -13,6 +13,7 @@ from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
     from ncfix.measure.calibrate import Calibration
+    from ncfix.measure.prediction import Prediction
 
 LOSSES = ("auto", "none", "huber", "tukey")
 
@@ -63,6 +64,7 @@ def calibrate(
     """
     from ncfix.machine import dumps
     from ncfix.measure.calibrate import calibrate as calibrated
+    from ncfix.measure.prediction import guesses, over_the_travels
     from ncfix.measure.reader import reads
 
     target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
@@ -70,19 +72,21 @@ def calibrate(
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):
         found = calibrated(data, machine, effects, loss, prune, knots, time_constants)
-    console.tell(*found.remarks)
+    over = over_the_travels(found)
+    remarks = (*found.remarks, *guesses(found, over))
+    console.tell(*remarks)
     target.write(dumps(found.machine).encode())
     if as_json:
-        console.put_json(**_as_dict(found), output=target.path)
+        said = [message.as_dict() for message in remarks]
+        console.put_json(**_as_dict(found, over), remarks=said, output=target.path)
     elif output != STREAM:
-        _print(found)
+        _print(found, over)
     return ExitCode.DONE
 
 
-def _as_dict(found: Calibration) -> dict[str, Any]:
+def _as_dict(found: Calibration, over: Prediction) -> dict[str, Any]:
     from dataclasses import asdict
 
-    from ncfix.measure.prediction import over_the_travels
     from ncfix.measure.residuals import residuals, rms_by_set
 
     diagnosis = residuals(found.problem, found.estimate)
@@ -101,10 +105,9 @@ def _as_dict(found: Calibration) -> dict[str, Any]:
         "freedom": found.freedom,
         "condition": found.estimate.solution.condition,
         "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
-        "prediction": asdict(over_the_travels(found)),
+        "prediction": asdict(over),
         "largest_cook": float(diagnosis.cook.max(initial=0.0)),
         **{name: rows for name, rows in tests.items() if rows},
-        "remarks": [message.as_dict() for message in found.remarks],
     }
 
 
@@ -132,9 +135,7 @@ def _set_up(found: Calibration) -> dict[str, float]:
     return dict(zip(labels, found.estimate.unknowns.tolist(), strict=False))
 
 
-def _print(found: Calibration) -> None:
-    from ncfix.measure.prediction import over_the_travels
-
+def _print(found: Calibration, over: Prediction) -> None:
     rows = []
     for label, value, deviation in zip(
         found.labels, found.estimate.coefficients.tolist(), found.sigma.tolist(), strict=True
@@ -147,7 +148,6 @@ def _print(found: Calibration) -> None:
         _say_bar(bar)
     for row in _positioning(found):
         _say_positioning(row)
-    over = over_the_travels(found)
     console.say(f"sigma of the tip error over the travels: {over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms")
     console.say(
         f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "

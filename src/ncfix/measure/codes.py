@@ -137,4 +137,11 @@ CODES = {
         "How long after its input an effect follows, with its standard deviation. That of the coefficients holds for "
         "this constant.",
     ),
+    "NCF641": Code(
+        "a model that is a guess in places",
+        "The coefficients fit the measured poses, but somewhere in the travels the tip error that they predict is more "
+        "uncertain than the error was large: the model follows the noise there. Corrections by it may do harm.",
+        "Measure more poses, and where `ncfix plan --existing FILE` says; or estimate fewer effects (`--effects`), or "
+        "drop what is not significant (`--prune 0.99`).",
+    ),
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.machine.error_model import signals_of
 from ncfix.measure.calibrate import Calibration
@@ -41,6 +42,19 @@ def over_the_travels(found: Calibration) -> Prediction:
     row = int(sigma.argmax())
     at = {name: float(places.columns[name][row]) for name in (*machine.axis_names, "tool_length")}
     return Prediction(float(sigma[row]), float(np.sqrt((sigma**2).mean())), at)
+
+
+def guesses(found: Calibration, over: Prediction) -> tuple[Message, ...]:
+    """A warning (NCF641) if somewhere in the travels the tip error is known to less than what was to be corrected."""
+    if over.worst_um <= found.before_um:
+        return ()
+    at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
+    text = (
+        f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {found.before_um:.1f} um "
+        "rms were there before: away from the measured poses the model is a guess"
+    )
+    hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects, --prune 0.99"
+    return (Message("NCF641", text, hint=hint),)
 
 
 def deviations(found: Calibration, q: Array, state: State) -> Array:
