@@ -57,7 +57,8 @@ FAMILIES = {
         Family("location", "a line error the file lacks", 24, amplitudes_um=(10.0,), source="location", extra=True,
                layouts=(designs.FREE,)),
         Family("poor", "one effect, one tool, one direction, in order", 24, layouts=(designs.ORDERED,), extra=True),
-        Family("small", "one effect, 110 rows", 24, amplitudes_um=(10.0,), layouts=(designs.SMALL,), extra=True, gap=True),
+        Family("small", "one effect, 110 rows", 24, amplitudes_um=(10.0,), layouts=(designs.SMALL,), extra=True,
+               gap=True),
         Family("blind", "pitch and backlash that the poses cannot show", 16, amplitudes_um=(10.0,), source="blind",
                layouts=(designs.ON_PITCH,), extra=True),
     )

@@ -21,7 +21,7 @@ LEFT_OUT = "..."
 NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z0-9_])")
 UNSTEADY = re.compile(r"p = \S+(?=[),;])|log odds \d+|, \d+ less")
 """Figures that the last digits of a computer's arithmetic decide."""
-HEADLINE = re.compile(r"verdict: [a-z-]+(?=:)|(?!gap|where|unknown|to tell)[A-Za-z0-9 ]+: .*")
+HEADLINE = re.compile(r"verdict: [a-z-]+(?=:)|(?!gap|where|unknown|to tell)[A-Za-z][A-Za-z0-9 ]*: .*")
 """Of a diagnosis: its verdict, and the line with a name. The rest of it, runners-up and patterns, is for the reader."""
 RELATIVE, ABSOLUTE = 0.1, 0.15
 """How far figures may be from the printed ones: sums in another order, another release of a library."""
