@@ -119,6 +119,34 @@ def test_a_departure_goes_on_along_the_corrected_line() -> None:
     assert "DEP LT LEN20" in fixed(straight).text.decode("latin-1").splitlines()
 
 
+LEADING = [
+    ("APPR LT X+100 Y+20 LEN15 RR F100", "APPR LT"),
+    ("APPR LN X+100 Y+20 LEN15 RR F100", "APPR LN"),
+    ("APPR CT X+100 Y+20 CCA180 R+10 RR F100", "APPR CT"),
+    ("APPR LCT X+100 Y+20 R10 RR F100", "APPR LCT"),
+    ("APPR PLT PR+100 PA+20 LEN15 RL F100", "APPR LT"),
+    ("APPR PLN PR+100 PA+20 LEN10 RL F100", "APPR LN"),
+    ("APPR PCT PR+100 PA+20 CCA90 R+10 RL F100", "APPR CT"),
+    ("APPR PLCT PR+100 PA+20 R+10 RL F100", "APPR LCT"),
+    ("DEP LT LEN12.5 F100", "DEP LT LEN12.5 F100"),
+    ("DEP LN LEN+20 F100", "DEP LN LEN+20 F100"),
+    ("DEP CT CCA 180 R+8 F100", "DEP CT CCA 180 R+8 F100"),
+    ("DEP LCT X+110 Y+12 R8 R0 F100", "DEP LCT"),
+    ("DEP PLCT PR+150 PA+10 R8 R0 F100", "DEP LCT"),
+]
+
+
+@pytest.mark.parametrize(("block", "written"), LEADING)
+def test_all_ways_to_and_from_a_contour(block: str, written: str) -> None:
+    body = f"L X+120 Y-10 Z+0 R0 FMAX\nCC X+0 Y+0\nL X+150 RL F100\n{block}\nL X+90 Y+40\nL X+120 Y+40 R0 FMAX"
+    report = fixed(body).report
+    found = next(line for line in lines(body) if line.startswith(("APPR", "DEP")))
+    assert found.startswith(written)
+    assert "PA" not in found
+    unknown_after = block.startswith(("DEP LN", "DEP CT"))
+    assert [refusal.line for refusal in report.refused] == ([6] if unknown_after else [])
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

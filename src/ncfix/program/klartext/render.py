@@ -107,11 +107,10 @@ class Renderer(WordWriter):
         return position
 
     def _straightened(self) -> None:
-        """What is not straight by its words becomes an L, and an approach in polar words a Cartesian one."""
-        name = self.layout.name
-        if not name.startswith("dep"):
-            self._function(name.upper().replace(" P", " ") if name.startswith("appr") else "L")
-        self._drop(*self.layout.polar, None if name.startswith(("appr", "dep")) else self.layout.radius)
+        """What is not straight by its words becomes an L, an approach or departure in polar words a Cartesian one."""
+        name, leads = self.layout.name, self.layout.name.startswith(("appr", "dep"))
+        self._function(name.upper().replace(" P", " ") if leads else "L")
+        self._drop(*self.layout.polar, None if leads else self.layout.radius)
         if self.layout.sense is not None:
             self._drop_span(self.layout.sense)
 
