@@ -18,7 +18,7 @@ CLEARLY = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why a block is refused: a code that `ncfix explain` knows, a sentence, and the block that is the cause (or -1)."""
+    """Why a block is refused: a code that `ncfix explain` knows, a sentence, and the block that causes it (or -1)."""
 
     code: str
     text: str

@@ -35,7 +35,7 @@ def _steered(intent: Intent, rows: Index, nominal: Array, wanted: Array) -> tupl
     moves, machine = intent.moves, intent.machine
     meant = intent.joints(rows, nominal)
     q = np.where(machine.rotary, intent.joints(rows, wanted), meant)
-    fit = np.isfinite(q).all(axis=1)
+    fit: Mask = np.asarray(np.isfinite(q).all(axis=1))
     good = rows[fit]
     arrived, commands = fit.copy(), nominal.copy()
     target = machine.tip(meant[fit], intent.lengths(good))

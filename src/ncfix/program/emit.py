@@ -188,7 +188,7 @@ class _Emitter:
         if row + 1 == len(self.moves) or self.reading.start is not None:
             return
         moves, risen = self.moves, self.levels.returns(row)
-        if risen.any():
+        if self.levels.approach is not None:
             self.position = np.where(risen, self.levels.approach, self.position)
         back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
         self.position = np.where(back & ~risen, self.start[row], self.position)

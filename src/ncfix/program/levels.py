@@ -38,7 +38,7 @@ class LevelBook:
     def wanted(
         self, row: int, piece: int, number: int, frame: FrameMap, as_programmed: FrameMap, here: FloatArray
     ) -> dict[str, Any]:
-        """What a target has to say of R, in the numbers of `frame`, whose number that is; `here` (n_axes,) it stands."""
+        """What a target has to say of R, in the numbers of `frame` (its `number`), while the axes stand `here`."""
         moves, approach = self.moves, self.pieces.approach
         if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
             return {}

@@ -118,8 +118,8 @@ class Moves:
     held         (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane without
                  tool-centre-point control); None: nowhere
     pointing     how rotary axes point the tool, where programs give its direction as a vector
-    approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to which
-                 it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
+    approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
+                 which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
     """
 
     axes: tuple[str, ...]

@@ -90,4 +90,4 @@ class _Walk:
         ]
         if turned and not decided[turned].all():
             decided[turned] = False
-        return decided
+        return np.asarray(decided)
