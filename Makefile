@@ -28,8 +28,9 @@ bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md
 tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
 	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py
 
-hidden:          ## the hidden-effect benchmark into docs/accuracy.md (an hour); FINAL=1 for the final seeds
-	$(PYTHON) -m tests.hidden --command $(dir $(PYTHON))ncfix $(if $(FINAL),--final) --table docs/accuracy.md
+hidden:          ## the hidden-effect benchmark into docs/accuracy.md (two hours); FINAL=1 for the final seeds, COUNT="10 single=40"
+	$(PYTHON) -m tests.hidden --callable tests.diagnose.resident:resident --table docs/accuracy.md \
+		$(if $(FINAL),--final) $(foreach count,$(COUNT),--count $(count)) $(if $(RECORDS),--records $(RECORDS))
 
 metamorphic:     ## 500 pairs of programs for each relation of tests/metamorphic (an hour)
 	NCFIX_PAIRS=500 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/metamorphic
