@@ -1,0 +1,201 @@
+"""Random SINUMERIK programs for a machine with a cradle: short, and made of whatever there is a manual's page for."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable
+
+HEAD = ["G17 G40 G90 G94 G710", "T1 D1 M6", "G54", "G0 X0 Y0 Z40 A0 C0 F1000"]
+SWIVEL_MODES = (57, 54, 27, 39, 30, 45, 64 + 57, 128 + 57, 128 + 54)
+
+
+class Author:
+    """Writes one program; coordinates stay where the machine can follow."""
+
+    def __init__(self, seed: int) -> None:
+        self.chance = random.Random(seed)
+        self.lines = list(HEAD)
+        self.transformed = self.swivelled = self.incremental = False
+
+    def program(self) -> str:
+        """A program of some length."""
+        for _ in range(self.chance.randint(5, 14)):
+            self.part()
+        return "\n".join(self.lines) + "\nM30\n"
+
+    def part(self) -> None:
+        """A few blocks of one kind."""
+        kinds: list[tuple[float, Callable[[], None]]] = [
+            (10, self.straight),
+            (6, self.arc),
+            (2, self.tangential),
+            (2, self.polar),
+            (2, self.frame),
+            (1, self.transformation),
+            (1, self.swivel),
+            (1, self.angles),
+            (1, self.values),
+            (1, self.units),
+            (1, self.holes),
+            (1, self.contour),
+            (1, self.tool),
+            (1, self.increments),
+        ]
+        weights = [weight for weight, _ in kinds]
+        self.chance.choices([kind for _, kind in kinds], weights)[0]()
+
+    def number(self, low: float = -35.0, high: float = 35.0) -> str:
+        """A number with up to three decimals."""
+        return f"{self.chance.uniform(low, high):.{self.chance.randint(0, 3)}f}"
+
+    def anew(self) -> None:
+        """A rapid to a known place, in whatever coordinates are in force."""
+        words = [f"{letter}=AC({self.number(5, 45) if letter == 'Z' else self.number()})" for letter in "XYZ"]
+        self.lines.append("G0 " + " ".join(words) + (" A=AC(5) C=AC(10)" if self.transformed else ""))
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def straight(self) -> None:
+        """G0 or G1."""
+        words = [self.word(letter) for letter in "XYZ" if self.chance.random() < 0.65] or [self.word("X")]
+        self.lines.append(self.chance.choice(("G0 ", "G1 ", "G1 ")) + " ".join(words + self.turn()))
+
+    def word(self, letter: str) -> str:
+        """An axis word in one of its forms."""
+        value = self.number(5, 45) if letter == "Z" else self.number()
+        plain = [f"{letter}{value}", f"{letter}={value}"]
+        return self.chance.choice(
+            [f"{letter}=AC({value})", f"{letter}=IC({self.number(-8, 8)})"] + plain * (not self.incremental)
+        )
+
+    def turn(self) -> list[str]:
+        """Rotary words, or the direction of the tool."""
+        if self.swivelled or self.chance.random() < 0.6:
+            return []
+        both = [f"A=AC({self.number(-50, 50)})", f"C=AC({self.number(-80, 80)})"]
+        vector = [f"A3={self.number(-0.5, 0.5)}1", f"B3={self.number(-0.5, 0.5)}1", "C3=1"]
+        around = [f"C={self.chance.choice(('DC', 'ACP', 'ACN'))}({self.number(0, 359)})"]
+        return self.chance.choice([both, vector, around, both[:1]]) if self.transformed else both
+
+    def arc(self) -> None:
+        """An arc by its centre, radius, angles or an intermediate point; now and then a helix or a full circle."""
+        radius, begin = self.chance.choice((3, 5, 8.5, 12.25)), self.chance.uniform(0, 2 * math.pi)
+        angle, code = self.chance.choice((30, 90, 150, 200, 300)), self.chance.choice((2, 3))
+        sense = math.radians(angle) * (1 if code == 3 else -1)
+
+        def at(share: float) -> tuple[float, float]:
+            place = begin + share * sense
+            return radius * (math.cos(place) - math.cos(begin)), radius * (math.sin(place) - math.sin(begin))
+
+        end = "X=IC({:.4f}) Y=IC({:.4f})".format(*at(1.0))
+        height = f" Z=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
+        centre = f"I{-radius * math.cos(begin):.4f} J{-radius * math.sin(begin):.4f}"
+        forms = [
+            f"G{code} {end}{height} {centre}",
+            f"G{code} {end}{height} CR={radius if angle < 180 else -radius}",
+            f"G{code} {end}{height} AR={angle}",
+            f"G{code}{height} {centre} AR={angle}",
+            f"G{code} {centre}",
+            f"G{code}{height} {centre} TURN=1",
+            "CIP {} I1=IC({:.4f}) J1=IC({:.4f})".format(end, *at(0.5)),
+        ]
+        self.lines.append(self.chance.choice(forms))
+
+    def tangential(self) -> None:
+        """CT, twice perhaps."""
+        self.lines.append(f"G1 X=IC({self.number(3, 9)}) Y=IC({self.number(-6, 6)})")
+        self.lines.append(f"CT X=IC({self.number(2, 8)}) Y=IC({self.number(-8, 8)}) Z=IC({self.chance.choice((0, 2))})")
+        self.lines += [f"X=IC({self.number(2, 8)}) Y=IC({self.number(-8, 8)})"] * self.chance.randint(0, 1)
+
+    def polar(self) -> None:
+        """AP and RP about a pole."""
+        self.lines.append(f"G{self.chance.choice((110, 111, 112))} X{self.number(-5, 5)} Y{self.number(-5, 5)}")
+        self.lines.append(f"G1 AP=AC({self.number(0, 359)}) RP=AC({self.number(5, 25)})")
+        self.lines.append(f"AP=IC({self.number(-60, 60)}) RP=AC({self.number(5, 15)})")
+        self.anew()
+
+    def contour(self) -> None:
+        """Cutter compensation and roundings: the control's business."""
+        self.lines += ["G41 G1 X=AC(5) Y=AC(5)", "G1 X=AC(25) RND=1", "G3 X=IC(5) Y=IC(5) CR=5", "G40 G1 Y=AC(30)"]
+
+    def holes(self) -> None:
+        """A modal drilling cycle."""
+        self.lines.append("MCALL CYCLE81(45,0,2,2)")
+        self.lines += [f"G0 X=AC({self.number()}) Y=AC({self.number()})" for _ in range(2)]
+        self.lines.append("MCALL")
+        self.anew()
+
+    # -- what is in force ---------------------------------------------------------------------------------------------
+
+    def frame(self) -> None:
+        """A settable or programmable frame."""
+        pick, number = self.chance.choice, self.number
+        shift = f"X{number(-5, 5)} Y{number(-5, 5)} Z{number(-3, 3)}"
+        angles = " ".join(
+            f"{letter}{number(-25, 25)}" for letter in self.chance.sample("XYZ", self.chance.randint(1, 3))
+        )
+        factor = pick(("0.8", "1.1"))
+        forms = [
+            pick(("TRANS ", "ATRANS ")) + shift,
+            pick(("ROT ", "AROT ")) + angles,
+            f"{pick(('ROT', 'AROT'))} RPL={number(-60, 60)}",
+            pick(("MIRROR ", "AMIRROR ")) + pick(("X0", "Y0", "X0 Y0")),
+            f"{pick(('SCALE', 'ASCALE'))} X{factor} Y{factor} Z{factor}",
+            pick(("G54", "G55", "G505")),
+            "TRANS",
+        ]
+        self.lines.append(pick(forms))
+        self.anew()
+
+    def transformation(self) -> None:
+        """TRAORI on or off."""
+        if self.swivelled:
+            return
+        self.transformed = not self.transformed
+        self.lines += ["TRANS", "TRAORI" if self.transformed else "TRAFOOF"]
+        self.lines += ["ORIAXES"] * (self.transformed and self.chance.random() < 0.7)
+        self.anew()
+
+    def angles(self) -> None:
+        """The direction of the tool by angles."""
+        if not self.transformed:
+            return
+        words = " ".join(f"{name}={self.number(-35, 35)}" for name in ("A2", "B2", "C2"))
+        self.lines += [self.chance.choice(("ORIEULER", "ORIRPY")), f"G1 X=AC({self.number()}) {words}"]
+
+    def swivel(self) -> None:
+        """A tilted plane, or out of it."""
+        if self.transformed:
+            return
+        self.lines.append("TRANS")
+        if self.swivelled:
+            self.lines.append("CYCLE800()")
+        else:
+            shift, angles = ([self.number(-9, 9) for _ in "XYZ"], [self.number(-25, 25) for _ in "ABC"])
+            places = ",".join([*shift, *angles, "0", "0", self.number(-2, 2)])
+            mode, way = self.chance.choice(SWIVEL_MODES), self.chance.choice((-1, 1))
+            self.lines.append(f'CYCLE800(0,"T",200000,{mode},{places},{way})')
+        self.swivelled = not self.swivelled
+        self.anew()
+
+    def values(self) -> None:
+        """Variables, expressions, a branch and a jump over nothing."""
+        self.lines += [f"R2={self.number(2, 6)}", "G1 X=AC(R2*SIN(30)+3) Y=AC(-R2)"]
+        self.lines += ["IF R2>4", "G1 X=IC(R2/2)", "ELSE", "G1 Y=IC(-R2)", "ENDIF"]
+
+    def units(self) -> None:
+        """Inches for a while, or diameters."""
+        inches = ["G700", f"G1 X=AC({self.chance.uniform(-1, 1):.4f})", "G2 X=IC(0.2) Y=IC(0.2) I0.2 J0", "G710"]
+        diameters = ["DIAMON", f"G1 X=AC({self.number()}) Y=AC({self.number()})", "G3 X=IC(4) Y=IC(2) I0 J2", "DIAMOF"]
+        self.lines += self.chance.choice((inches, diameters))
+
+    def tool(self) -> None:
+        """Another tool."""
+        self.lines.append(f"T{self.chance.choice((1, 2))} D1 M6")
+        self.anew()
+
+    def increments(self) -> None:
+        """G91 or G90."""
+        self.incremental = not self.incremental
+        self.lines.append("G91" if self.incremental else "G90")
