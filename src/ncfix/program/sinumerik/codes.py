@@ -40,4 +40,10 @@ SINUMERIK_CODES: dict[str, Code] = {
         "keeps it depends on its machine data; here it stays.",
         "Program the frame anew after TRAORI or TRAFOOF.",
     ),
+    "NCF256": Code(
+        "Blocks cannot be numbered anew",
+        "Block numbers are targets of jumps, and here nobody can tell which block is meant: a number stands more than "
+        "once, or a text that looks like one stands in the program.",
+        "Leave out `--block-numbers renumber`, or jump to labels.",
+    ),
 }

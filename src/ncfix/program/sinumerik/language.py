@@ -15,6 +15,7 @@ from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.interpreter import Interpreter
 from ncfix.program.sinumerik.layout import layout_of
+from ncfix.program.sinumerik.numbering import renumbered
 from ncfix.program.sinumerik.render import render
 from ncfix.program.sinumerik.scanning import scan
 from ncfix.program.sinumerik.state import Sinumerik
@@ -59,4 +60,5 @@ SINUMERIK = Language(
     arc_pieces=True,
     unroll=unroll,
     bulk=in_bulk,
+    renumber=renumbered,
 )
