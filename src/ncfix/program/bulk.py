@@ -96,6 +96,7 @@ class Bulk:
             return None
         stretch = stretch if count == stop - row else Stretch.of(self, row, row + count, position, frame, decimals)
         self.parts.append(stretch.splices())
+        self.added += int(np.count_nonzero(stretch.further))
         return stretch.commands()
 
     def _compiled(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
@@ -152,10 +153,10 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
 
 
 def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
-    """(n,) motions in one straight piece; in several, if they are compiled and nothing but words goes with them."""
+    """(n,) motions in one straight piece; in several, if nothing but words goes with them."""
     single: Mask = (np.diff(first_piece) == 1) & ~pieces.arc[first_piece[:-1]]
     several = np.flatnonzero(~single)
-    if fast.engaged() and len(several):
+    if len(several):
         straight = np.add.reduceat(pieces.arc, first_piece[:-1], dtype=np.int64)[several] == 0
         timed = (moves.feed_mode[several] == FeedMode.INVERSE_TIME) & (moves.modal[several] != 0)
         finite = np.logical_and.reduceat(np.isfinite(pieces.end).all(axis=1), first_piece[:-1])[several]
@@ -165,8 +166,10 @@ def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece
 
 @dataclass(slots=True)
 class Stretch:
-    """One stretch while it is written; k motions, columns by axis.
+    """One stretch while it is written; k pieces of its motions, columns by axis.
 
+    block     (k,) the block of the motion
+    further   (k,) the piece is not the first one of its motion: it gets a line of its own
     words     (k, n_axes) index of the number of each axis word, -1 where there is none
     wanted    (k, n_axes) program numbers of the corrected ends
     values    (k, n_axes) what will stand there: as written now, as written anew, or where the axis is left
@@ -176,7 +179,8 @@ class Stretch:
     """
 
     bulk: Bulk
-    row: int
+    block: IntArray
+    further: Mask
     position: FloatArray
     frame: FrameMap
     decimals: IntArray
@@ -192,31 +196,43 @@ class Stretch:
     def of(cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Stretch:
         """Work out which words change."""
         program = bulk.program
-        words = _words(bulk, row, stop)
+        rows = slice(bulk.first_piece[row], bulk.first_piece[stop])
+        move = bulk.pieces.move[rows]
+        block = bulk.moves.block[move].astype(np.int64)
+        further = np.diff(move, prepend=-1) == 0
+        words = _words(bulk, block, further)
         present = words >= 0
-        wanted = frame.program(bulk.pieces.end[bulk.first_piece[row:stop]].copy())
+        wanted = frame.program(bulk.pieces.end[rows].copy())
         half = _halves(decimals)
         original = np.where(present, program.numbers[np.maximum(words, 0)], 0.0)
-        rewrite = present & (np.abs(wanted - original) >= half)
+        rewrite = present & ((np.abs(wanted - original) >= half) | np.append(further[1:], False)[:, None])
         styles = styles_of(np.frombuffer(program.source, dtype=np.uint8), program.number_spans[words[present]])
         digits = np.broadcast_to(decimals, words.shape).copy()
         digits[present] = np.maximum(digits[present], styles.decimals)
         clear = is_plain(wanted, digits) | (present & ~rewrite)
         clear[present] &= styles.clear | ~rewrite[present]
         values = np.where(present & ~rewrite, original, rounded(wanted, digits))
-        add = _missing(frame.program(position.copy()), values, present, wanted, half, clear)
-        return cls(bulk, row, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
+        add = np.zeros_like(present)
+        if not present.all():
+            add = _missing(frame.program(position.copy()), values, present, wanted, half, clear)
+            clear[further & ~add.any(axis=1)] = False
+        return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
     def count_clear(self) -> int:
-        """How many motions from the first on are clear."""
+        """How many motions from the first on are clear, with all their pieces."""
         fine = np.asarray(self.clear.all(axis=1))
-        return len(fine) if fine.all() else int(np.argmin(fine))
+        count = len(fine) if fine.all() else int(np.argmin(fine))
+        begun = np.cumsum(~self.further)
+        return int(begun[-1] if count == len(fine) else begun[count] - 1)
 
     def commands(self) -> FloatArray:
-        """The commands at the ends of the motions, (k, n_axes): an axis that is not told to move stays where it was."""
+        """The commands at the ends of the pieces, (k, n_axes): an axis that is not told to move stays where it was."""
         told = (self.words >= 0) | self.add
+        commands = self.frame.command(self.values)
+        if told.all():
+            return commands
         last = np.maximum.accumulate(np.where(told, np.arange(len(told))[:, None], -1), axis=0)
-        commands = np.take_along_axis(self.frame.command(self.values), np.maximum(last, 0), axis=0)
+        commands = np.take_along_axis(commands, np.maximum(last, 0), axis=0)
         result: FloatArray = np.where(last >= 0, commands, self.position)
         return result
 
@@ -235,14 +251,17 @@ class Stretch:
         return Splices(spans[:, 0], spans[:, 1], texts.length, texts.data)
 
     def _added(self) -> Splices:
-        """The words that are missing, in the order in which programs write them."""
+        """The words that are missing, and those of further pieces, in the order in which programs write them."""
         program, layouts = self.bulk.program, self.bulk.layouts
         rows, columns = np.nonzero(self.add[:, layouts.by_letter])
         columns = layouts.by_letter[columns]
-        blocks = self.bulk.moves.block[self.row + rows].astype(np.int64)
-        shapes = program.template[blocks]
-        at = layouts.places(program, blocks)
-        texts = plain(self.wanted[rows, columns], self.decimals[columns], layouts.heads[shapes, columns])
+        blocks, further = self.block[rows], self.further[rows]
+        at = np.where(further, program.blocks[blocks, 1], layouts.places(program, blocks))
+        heads = np.zeros((len(rows), 4), dtype=np.uint8)
+        heads[:, 2:] = layouts.heads[program.template[blocks], columns]
+        begins = further & (np.diff(rows, prepend=-1) != 0)
+        heads[begins, :3] = np.frombuffer(line_end(program.source).rjust(2, b"\0") + b"\0", dtype=np.uint8)
+        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads)
         return Splices(at, at, texts.length, texts.data)
 
 
@@ -268,9 +287,9 @@ def _missing(
     return add
 
 
-def _words(bulk: Bulk, row: int, stop: int) -> IntArray:
-    """(k, n_axes) the number of each axis word, -1 where there is none."""
-    blocks = bulk.moves.block[row:stop]
-    found = bulk.layouts.slots[bulk.program.template[blocks]]
-    words: IntArray = np.where(found >= 0, bulk.program.first_number[blocks][:, None] + found, -1)
+def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:
+    """(k, n_axes) the number of each axis word of pieces, -1 where there is none."""
+    found = bulk.layouts.slots[bulk.program.template[block]]
+    found[further] = -1
+    words: IntArray = np.where(found >= 0, bulk.program.first_number[block][:, None] + found, -1)
     return words

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import NUMERIC, POINT, SIGN
+from ncfix.program.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -19,6 +19,8 @@ Mask = NDArray[np.bool_]
 
 MOST_DECIMALS = 9
 """Decimals that are written in bulk; a number with more goes one by one."""
+LONGEST = 2 * EIGHT
+"""Bytes, but for its sign, of the longest number that is rewritten in bulk."""
 LARGEST = 1e9
 """Values of that many output steps go one by one: their products with powers of ten are not exact enough."""
 TIE = 1e-5
@@ -46,43 +48,21 @@ class Styles:
 
 def styles_of(text: NDArray[np.uint8], spans: IntArray) -> Styles:
     """The styles of the numbers at `spans` (m, 2)."""
+    low, high = (int(spans[:, 0].min()), int(spans[:, 1].max())) if len(spans) else (0, 0)
+    text, spans = text[low:high], spans - low
     starts, stops = spans[:, 0], spans[:, 1]
-    decimals, point = _decimals(text, starts, stops)
-    first = starts + SIGN[text[starts]]
-    whole = stops - first - decimals - point
-    padded = (whole > 1) & (text[first] == ZERO)
+    signs = text[starts]
+    first = starts + SIGN[signs]
+    found = digits_of(text, np.stack((first, stops), axis=1))
+    whole = stops - first - found.decimals - found.points
     return Styles(
-        decimals=decimals,
-        point=point,
-        plus=text[starts] == PLUS,
+        decimals=found.decimals,
+        point=found.points > 0,
+        plus=signs == PLUS,
         leading_zero=whole > 0,
-        width=np.where(padded, whole, 0),
-        clear=_pure(text, starts, stops) & (stops - starts <= MOST_DECIMALS + 8),
+        width=np.where((whole > 1) & (text[first] == ZERO), whole, 0),
+        clear=found.pure & (found.points < 2) & (stops - first <= LONGEST) & (found.decimals <= MOST_DECIMALS),
     )
-
-
-def _decimals(text: NDArray[np.uint8], starts: IntArray, stops: IntArray) -> tuple[IntArray, Mask]:
-    """Digits after the point of each number, and whether it has one; at most `MOST_DECIMALS` are looked at."""
-    decimals, point = np.zeros(len(starts), dtype=np.int64), np.zeros(len(starts), dtype=np.bool_)
-    for count in range(MOST_DECIMALS + 1):
-        at = stops - 1 - count
-        here = (at >= starts) & (text[np.maximum(at, 0)] == POINT) & ~point
-        decimals[here] = count
-        point |= here
-        if count == 0 and point.all():
-            break
-    return decimals, point
-
-
-def _pure(text: NDArray[np.uint8], starts: IntArray, stops: IntArray) -> Mask:
-    """Which numbers have no blanks inside, and a sign only in front."""
-    if not len(starts):
-        return np.ones(0, dtype=np.bool_)
-    low, high = int(starts.min()), int(stops.max())
-    odd = np.flatnonzero(~NUMERIC[text[low:high]]) + low
-    inside = np.searchsorted(odd, stops) - np.searchsorted(odd, starts)
-    result: Mask = inside == SIGN[text[starts]]
-    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +82,7 @@ class Texts:
 def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
     """Which values can be written in bulk with so many decimals: not too large, and clearly nearer to one output."""
     with np.errstate(invalid="ignore"):
-        steps = np.abs(values) * 10.0**decimals
+        steps = np.abs(values) * POWERS[decimals]
         off = np.abs(steps - np.floor(steps) - 0.5)
         plain: Mask = (steps < LARGEST) & (off > TIE)
     return plain
@@ -110,7 +90,7 @@ def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
 
 def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
     """What a reader makes of values written with so many decimals (for those that are `is_plain`)."""
-    scale = 10.0 ** np.asarray(decimals)
+    scale = POWERS[decimals]
     result: FloatArray = np.rint(values * scale) / scale + 0.0
     return result
 
@@ -118,8 +98,8 @@ def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
 def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> Texts:
     """Values in the styles of written numbers, as `NumberStyle.write` does it; all `is_plain`, all `clear`."""
     digits = np.maximum(decimals, styles.decimals)
-    steps = np.rint(np.abs(values) * 10.0**digits).astype(np.int64)
-    value = np.copysign(steps / 10.0**digits, values) + 0.0
+    steps = np.rint(np.abs(values) * POWERS[digits]).astype(np.int64)
+    value = np.copysign(steps / POWERS[digits], values) + 0.0
     kept = digits.copy()
     for _ in range(int(digits.max(initial=0))):
         zero = (kept > styles.decimals) & (steps % 10 == 0)
@@ -136,10 +116,10 @@ def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8]) -> T
 
     heads  (m, 2) bytes to put before each, 0 for none
     """
-    steps = np.rint(np.abs(values) * 10.0**decimals).astype(np.int64)
+    steps = np.rint(np.abs(values) * POWERS[decimals]).astype(np.int64)
     sign = np.where(np.signbit(values), MINUS, 0)
     everywhere = np.ones(len(values), dtype=np.bool_)
-    value = np.copysign(steps / 10.0**decimals, values)
+    value = np.copysign(steps / POWERS[decimals], values)
     return _laid_out(steps, decimals, sign, np.zeros_like(steps), everywhere, ~everywhere, value, heads)
 
 
@@ -154,25 +134,36 @@ def _laid_out(
     heads: NDArray[np.uint8] | None = None,
 ) -> Texts:
     """Sign, whole digits, point and decimals in fixed columns, of which those that are wanted are taken."""
-    power = 10**decimals
-    whole, fraction = np.divmod(steps, power)
-    most = int(decimals.max(initial=0))
-    fraction = (fraction * 10 ** (most - decimals)).astype(np.int64)
-    columns = max(len(str(int(whole.max(initial=0)))), int(width.max(initial=0)))
-    digits = np.maximum(np.searchsorted(10 ** np.arange(1, 18), whole, side="right") + 1, width)
+    power = TENS[decimals]
+    whole = steps // power
+    fraction = steps - whole * power
+    left, right = max(len(str(int(whole.max(initial=0)))), int(width.max(initial=0))), int(decimals.max(initial=0))
+    digits = np.maximum(np.searchsorted(TENS[1:], whole, side="right") + 1, width)
     digits[(whole == 0) & ~leading_zero & (decimals > 0)] = 0
-    cells = np.empty((len(steps), columns + most + 2), dtype=np.uint8)
-    wanted = np.empty(cells.shape, dtype=np.bool_)
-    cells[:, 0], wanted[:, 0] = sign, sign != 0
-    for place in range(columns):
-        column = columns - place
-        whole, digit = np.divmod(whole, 10)
-        cells[:, column], wanted[:, column] = digit + ZERO, digits > place
-    cells[:, columns + 1], wanted[:, columns + 1] = POINT, point | (decimals > 0)
-    for place in range(most - 1, -1, -1):
-        column = columns + 2 + place
-        fraction, digit = np.divmod(fraction, 10)
-        cells[:, column], wanted[:, column] = digit + ZERO, decimals > place
+    pointed = point | (decimals > 0)
+    signs, points = sign[:, None].astype(np.uint8), np.full((len(steps), 1), POINT, dtype=np.uint8)
+    parts = [signs, _in_quads(whole, left), points, _in_quads(fraction * TENS[right - decimals], right)]
+    masks = [signs != 0, AT_END[left][digits], pointed[:, None], AT_START[right][decimals]]
     if heads is not None:
-        cells, wanted = np.hstack((heads, cells)), np.hstack((heads != 0, wanted))
-    return Texts(cells[wanted].tobytes(), wanted.sum(axis=1, dtype=np.int64), value)
+        parts, masks = [heads, *parts], [heads != 0, *masks]
+    length = digits + decimals + pointed + (sign != 0) + (0 if heads is None else (heads != 0).sum(axis=1))
+    return Texts(np.concatenate(parts, axis=1)[np.concatenate(masks, axis=1)].tobytes(), length, value)
+
+
+TENS = 10 ** np.arange(19)
+WIDEST = 19
+AT_END = [np.arange(n) >= n - np.arange(WIDEST)[:, None] for n in range(WIDEST)]
+"""The last k of n cells."""
+AT_START = [np.arange(n) < np.arange(WIDEST)[:, None] for n in range(WIDEST)]
+"""The first k of n cells."""
+QUADS = (np.arange(10_000)[:, None] // (1000, 100, 10, 1) % 10 + ZERO).astype(np.uint8)
+"""The numbers of four digits as text."""
+
+
+def _in_quads(values: IntArray, digits: int) -> NDArray[np.uint8]:
+    """Whole numbers as so many digits, four at a time, (m, digits)."""
+    cells = np.empty((len(values), 4 * -(-digits // 4)), dtype=np.uint8)
+    for stop in range(cells.shape[1], 0, -4):
+        cells[:, stop - 4 : stop] = QUADS[values % 10_000 if digits > 4 else values]
+        values = values // 10_000
+    return cells[:, cells.shape[1] - digits :]

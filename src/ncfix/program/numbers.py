@@ -134,20 +134,10 @@ EIGHT = 8
 
 def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The values of runs of digits and points, exactly rounded; and which are malformed."""
-    stops, lengths = runs[:, 1], runs[:, 1] - runs[:, 0]
-    padded = np.concatenate((np.zeros(2 * EIGHT, dtype=np.uint8), text))
-    words = np.ndarray(len(text) + EIGHT + 1, dtype="<u8", buffer=padded.data, strides=(1,))
-    last = Digits.of(words[stops + EIGHT], np.minimum(lengths, EIGHT))
-    mantissa, decimals, points = last.value, last.decimals, last.points
-    long = np.flatnonzero(lengths > EIGHT)
-    if len(long):
-        front = Digits.of(words[stops[long]], np.minimum(lengths[long] - EIGHT, EIGHT))
-        mantissa[long] += front.value * 10 ** (EIGHT - points[long])
-        decimals[long] += np.where(front.points > 0, front.decimals + EIGHT, 0)
-        points[long] += front.points
-    digits = lengths - points
-    values = mantissa / 10.0 ** np.minimum(decimals, EXACT_DIGITS)
-    broken = (points > 1) | (digits == 0)
+    found = digits_of(text, runs)
+    digits = runs[:, 1] - runs[:, 0] - found.points
+    values = found.value / POWERS[np.minimum(found.decimals, EXACT_DIGITS)]
+    broken = (found.points > 1) | (digits == 0)
     for row in np.flatnonzero(digits > EXACT_DIGITS):
         number = text[slice(*runs[row])].tobytes()
         broken[row] = number.count(b".") > 1
@@ -156,23 +146,42 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     return values, broken | np.isinf(values)
 
 
+def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> Digits:
+    """What stands in runs of digits and points; of long ones in their last sixteen bytes."""
+    stops, lengths = runs[:, 1], runs[:, 1] - runs[:, 0]
+    padded = np.concatenate((np.zeros(2 * EIGHT, dtype=np.uint8), text))
+    words = np.ndarray(len(text) + EIGHT + 1, dtype="<u8", buffer=padded.data, strides=(1,))
+    found = Digits.of(words[stops + EIGHT], np.minimum(lengths, EIGHT))
+    long = np.flatnonzero(lengths > EIGHT)
+    if len(long):
+        front = Digits.of(words[stops[long]], np.minimum(lengths[long] - EIGHT, EIGHT))
+        found.value[long] += front.value * 10 ** (EIGHT - found.points[long])
+        found.decimals[long] += np.where(front.points > 0, front.decimals + EIGHT, 0)
+        found.points[long] += front.points
+        found.pure[long] &= front.pure
+    return found
+
+
 def repeated(byte: int) -> np.uint64:
     """Eight bytes alike as one number."""
     return np.uint64(int.from_bytes(bytes([byte]) * EIGHT, "little"))
 
 
-ONES, TOPS, FOURS, POINTS = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT))
+ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
 """Every second group of so many bits."""
+POWERS = 10.0 ** np.arange(23)
+"""Those powers of ten that a double holds exactly."""
 
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """Up to eight characters each, digits and points: the digits as a whole number, those behind the point, points."""
+    """Up to sixteen characters each: their digits as a whole number, those behind the point, points, nothing else."""
 
     value: NDArray[np.int64]
     decimals: NDArray[np.int64]
     points: NDArray[np.int64]
+    pure: NDArray[np.bool_]
 
     @classmethod
     def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64]) -> Digits:
@@ -186,6 +195,9 @@ class Digits:
         words = words >> high << high
         rest = words ^ POINTS
         points = (rest - ONES) & ~rest & TOPS
+        digits = words ^ ZEROS
+        others = (((digits & ~TOPS) + ABOVE) | digits) & TOPS
+        pure = others == points | (TOPS ^ TOPS >> high << high)
         point = points >> np.uint64(7)
         below = np.where(points, words & (point - np.uint64(1)), 0)
         words = np.where(points, (words & ~((point << np.uint64(8)) - np.uint64(1))) | below << np.uint64(8), words)
@@ -195,4 +207,4 @@ class Digits:
         power = point.astype(np.float64).view(np.int64) >> 52
         decimals = np.where(points, EIGHT - 1 - (power - 1023) // 8, 0)
         several = (points & (points - np.uint64(1))) != 0
-        return cls(value.astype(np.int64), decimals, (points != 0) + several.astype(np.int64))
+        return cls(value.astype(np.int64), decimals, (points != 0) + several.astype(np.int64), pure)

@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ncfix.program.number_text import LARGEST, MINUS, MOST_DECIMALS, PLUS, TIE, ZERO
-from ncfix.program.numbers import POINT
+from ncfix.program.number_text import LARGEST, LONGEST, MINUS, MOST_DECIMALS, PLUS, TENS, TIE, ZERO
+from ncfix.program.numbers import POINT, POWERS
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -22,10 +22,6 @@ Rows = NDArray[np.int32]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-POWERS = 10.0 ** np.arange(19)
-TENS = 10 ** np.arange(19)
-LONGEST = MOST_DECIMALS + 8
-"""Bytes of the longest number that is rewritten here."""
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
 ROOM = LONGEST + MOST_STEPS + 4
@@ -52,7 +48,7 @@ def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, 
         elif character < ZERO or character > ZERO + 9:
             return 0, False, False, 0, False
     decimals = stop - point - 1 if point >= 0 else 0
-    clear = stop - start <= LONGEST and decimals <= MOST_DECIMALS
+    clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
     return decimals, point >= 0, text[start] == PLUS, stop - first - decimals - (point >= 0), clear
 
 
