@@ -115,6 +115,7 @@ def lines(records: Sequence[Record]) -> list[Line]:
         share("one effect 2.5 um: true name in the set", of["weak"], lambda r: r.in_set),
         share("clean null: any name", of["clean"], named, 0.02, True, "0.038"),
         share("null with 1 um clutter: any name", of["clutter"], named, 0.05, True, "0.04 to 0.10"),
+        share("null, clean or cluttered: said to be unknown", of["clean"] + of["clutter"], lambda r: r.unknown),
         share("foreign effect: said to be unknown", of["foreign"], unknown_or_right, 0.97, prototype="0.99"),
         share("name deleted, no close relative: confident wrong name", far, confident, 0.05, True, "0.10"),
         share("name deleted, a close relative: family right or unknown", near, family_or_unknown, 0.90),
