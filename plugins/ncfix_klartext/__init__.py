@@ -31,7 +31,7 @@ HEIDENHAIN = Dialect(
     ),
     passes=(
         "M91 and M92, M140, TCH PROBE, the turn of PLANE ... TURN, rapids after a retract, DEP without an end",
-        "CYCL CALL alone, rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
+        "rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
     ),
     refuses=(
         "free contours (FK), patterns, cycles with a path of their own, called programs (they are not rewritten)",

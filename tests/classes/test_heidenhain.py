@@ -117,7 +117,15 @@ CYCLES = {
 
 
 @pytest.mark.parametrize("name", CYCLES)
-@pytest.mark.parametrize("holes", ["L X+5 Y+6 FMAX M99\nL IX+5 FMAX M99", "L X+5 Y+6 FMAX M89\nL X+10 FMAX\nL Y+9 M99"])
+@pytest.mark.parametrize(
+    "holes",
+    [
+        "L X+5 Y+6 FMAX M99\nL IX+5 FMAX M99",
+        "L X+5 Y+6 FMAX M89\nL X+10 FMAX\nL Y+9 M99",
+        "L X+5 Y+6 FMAX\nCYCL CALL M3\nL X+10 FMAX\nCYCL CALL",
+        "CC X+5 Y+6\nLP PR+5 PA+30 FMAX M99\nLP IPA+60 Z+20 FMAX M99",
+    ],
+)
 def test_holes_are_right_down_to_their_bottom(name: str, holes: str) -> None:
     known = machine()
     text = (HEAD + CYCLES[name] + "\n" + holes + "\nM30\nEND PGM C MM\n").encode()

@@ -217,9 +217,10 @@ def test_holes_of_old_cycles_count_from_where_they_begin() -> None:
     assert ends(body)[1:] == [[1, 0, -7], [2, 0, -7]]
 
 
-def test_a_cycle_that_is_called_without_a_position_passes() -> None:
+def test_a_cycle_may_be_called_without_a_position() -> None:
     moves = follow("CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL X+1 Y+1 Z+20 FMAX\nCYCL CALL").moves
-    assert moves.rule.tolist() == [Rule.CORRECT, Rule.PASS]
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT]
+    assert moves.end[-1].tolist() == [1, 1, -14]
 
 
 def test_tool_centre_point_control_begins_at_once_and_ends_after_its_block() -> None:

@@ -111,6 +111,32 @@ def test_the_end_of_an_arc_with_more_digits_than_the_control_takes() -> None:
     assert "Y+0.57677165" in fixed(body, BARELY, unit="INCH").text.decode()
 
 
+DRILL = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL X+120 Y+90 Z+50 FMAX\n"
+
+
+def test_a_hole_gets_a_surface_of_its_own_which_is_taken_back() -> None:
+    found = lines(DRILL + "7 L X+200 FMAX M99\nL Z+100 FMAX")
+    assert re.fullmatch(r"7 FN 1: Q203 = \+Q203 \+ [+-]0\.\d+", found[2])
+    assert re.match(r"7 L X\+200\.\d+ .*FMAX M99", found[3])
+    assert found[4] == found[2].replace("FN 1", "FN 2").replace("+Q203 +", "+Q203 -")
+
+
+def test_a_called_cycle_is_positioned_anew_for_its_bottom() -> None:
+    tilted = loads(
+        """
+        name = "leaning"
+        topology = "w F X Y Z t"
+        axis.X = { type = "linear", direction = [1, 0, 0] }
+        axis.Y = { type = "linear", direction = [0, 1, 0] }
+        axis.Z = { type = "linear", direction = [0, 0, 1] }
+        tool = { direction = [0, 0, 1], point = [0, 0, 0] }
+        effect = [{ name = "EXZ", basis = "polynomial", degree = [1], coefficients = [0.001] }]
+        """
+    )
+    found = fixed(DRILL + "CYCL CALL M3", tilted).text.decode().splitlines()
+    assert found[3:5] == ["L X+119.95 Y+90 Z+50 FMAX", "L X+120.014 FMAX M99 M3"]
+
+
 def test_a_departure_goes_on_along_the_corrected_line() -> None:
     body = "L X+120 Y+0 Z+0 FMAX\nL X+140 RL F500\nL X+300 Y+30\nDEP LT LEN20\nL Z+100 R0 FMAX"
     ends = fixed(body).text.decode("latin-1").splitlines()

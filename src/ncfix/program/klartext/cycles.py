@@ -18,7 +18,6 @@ from ncfix.program.rs274.coordinates import DEGREE, INDEX, X, Y, Z
 from ncfix.program.rs274.faults import Fault
 
 NO_CYCLE = "NCF272"
-DEPTHS = "NCF274"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 """Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
 
@@ -43,8 +42,7 @@ AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
 PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
 IN_PLANE = 1 << X | 1 << Y
-IN_PLACE = "a cycle is executed where the axes stand; the block has no position to correct"
-LEFT = "the depths of old cycles are left as they are; only the position of a hole is corrected"
+FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
 
 
 # -- definition -------------------------------------------------------------------------------------------------------
@@ -163,6 +161,8 @@ def call(control: Control, step: Step) -> None:
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
     height = where.inner[Z]
     bottom, clear, refusal = levels(control, height)
+    if cycle.number in OLD_DRILLING and "IZ" in step.words.values:
+        refusal = refusal or FROM_INCREMENT
     if step.name == "cycl call pos" and cycle.number in DRILLING:
         bottom, clear = bottom + height, clear + height
     drill(control, where, axes, (bottom, clear, refusal))
@@ -193,12 +193,9 @@ def drill(control: Control, where: Where, axes: int, heights: tuple[float, float
     if not refusal:
         where.unknown.pop(Z, None)
     target, unknown = command_of(control, where, axes | 1 << Z)
-    passing = "" if axes & ~(1 << Z) else IN_PLACE
     programmed = axes & ~(1 << Z)
     code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
-    if code == FROM_START:
-        control.warn(DEPTHS, LEFT, "the error along the tool axis stays, at most that of the first hole to the last")
-    control.move(Kind.CYCLE, programmed, target, unknown, code, refusal="" if passing else refusal, passing=passing)
+    control.move(Kind.CYCLE, programmed, target, unknown, code, refusal=refusal)
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
     if refusal == DEPTH_AT_RUN_TIME:

@@ -20,12 +20,6 @@ KLARTEXT_CODES: dict[str, Code] = {
         "The vectors or points of a PLANE block lie in one line, or its angles give no plane.",
         "Check its words.",
     ),
-    "NCF274": Code(
-        "Depths of cycles stay",
-        "The depths of the old cycles 1, 2 and 17 count from where the tool stands when they are called. They are left "
-        "as they are; the position of each hole is corrected for its bottom, the error along the tool axis stays.",
-        "Use a cycle of the 200s, whose surface (Q203) can be moved, where the depth matters.",
-    ),
     "NCF275": Code(
         "No beginning",
         "A Klartext program begins with BEGIN PGM, its name, and MM or INCH.",

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
 from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
+from ncfix.program.klartext.holes_text import HoleWriter
 from ncfix.program.klartext.layout import Layout, poles_move
 from ncfix.program.klartext.number_text import value_of
 from ncfix.program.klartext.poles import is_relied_on, pole_in_force
-from ncfix.program.klartext.words_text import WordWriter
 from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program
 
@@ -28,7 +28,6 @@ SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
 WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
-SURFACE = "Q203"
 CLOCKWISE = 20
 EXACT = 1e-9
 
@@ -38,7 +37,7 @@ def render(program: Program, block: int, layout: Layout, target: Target) -> Rend
     return Renderer(program, block, layout, target).render()
 
 
-class Renderer(WordWriter):
+class Renderer(HoleWriter):
     """Renders one motion of one block. A short-lived worker: `render()` is called once."""
 
     def render(self) -> Rendered:
@@ -106,14 +105,6 @@ class Renderer(WordWriter):
             self._straightened()
         return position
 
-    def _straightened(self) -> None:
-        """What is not straight by its words becomes an L, an approach or departure in polar words a Cartesian one."""
-        name, leads = self.layout.name, self.layout.name.startswith(("appr", "dep"))
-        self._function(name.upper().replace(" P", " ") if leads else "L")
-        self._drop(*self.layout.polar, None if leads else self.layout.radius)
-        if self.layout.sense is not None:
-            self._drop_span(self.layout.sense)
-
     def _further_line(self, position: FloatArray, end: FloatArray) -> FloatArray:
         position = position.copy()
         words = ["L" if not self.layout.vector else "LN"]
@@ -130,55 +121,6 @@ class Renderer(WordWriter):
             words.append("FMAX")
         self._line(words)
         return position
-
-    # -- cycles -------------------------------------------------------------------------------------------------------
-
-    def _over_the_hole(self) -> None:
-        """The position over a hole, and its depth."""
-        target = self.target
-        across = target.spatial[2]
-        position = target.start.copy()
-        polar = self._polar_columns()
-        for column, letter in self.columns:
-            word = self.layout.axes.get(letter)
-            if column == across:
-                position[column] = self._bottom(across) + self._sunk(across)
-            elif word is not None:
-                self._present(position, column, target.ends[0][column], word)
-            elif not self._left_alone(column):
-                self._absent(position, column, target.ends[0][column], column in polar)
-        if polar:
-            self._straightened()
-        self.out.ends.append(position)
-
-    def _sunk(self, across: int) -> float:
-        """Move the surface from which the cycle counts its depth, for this hole only; by how much.
-
-        A change of Q203 itself counts for the calls that follow (TNC 640, "Cycle programming": define the parameter of
-        the cycle directly). It is taken back after the block, so other holes and formulas find the value they knew.
-        """
-        target = self.target
-        off = float(target.ends[0][across] - target.nominal[across])
-        if target.code != BY_DEPTH or abs(off) < self.half[across] or SURFACE in self.program.text_of(self.block):
-            return 0.0
-        text = self._number(off, across)
-        start = int(self.program.blocks[self.block, 0])
-        before = f"{self._prefix()}FN 1: {SURFACE} = +{SURFACE} + {text}{self._line_end()}"
-        self.out.edits.append((start, start, before))
-        self._line([f"FN 2: {SURFACE} = +{SURFACE} - {text}"])
-        return value_of(text)
-
-    def _bottom(self, across: int) -> float:
-        """Where the hole ends: as its depth says, or as far below the start as it was meant to be.
-
-        Of holes one after another the start is given as the bottom of the one before.
-        """
-        target, word = self.target, self.layout.axes.get("Z")
-        lower = float(target.nominal[across])
-        if target.code != FROM_START or (word is not None and word.address[0] != "I"):
-            return lower
-        depth, shift = float(target.origin[2]) - lower, float(target.start[across] - target.origin[2])
-        return lower + (shift + depth if abs(shift) > abs(depth) / 2 else shift)
 
     # -- arcs ---------------------------------------------------------------------------------------------------------
 

@@ -99,6 +99,14 @@ class WordWriter:
         self.added.append(self.layout.blank + self.target.letters[column] + text)
         position[column] = value_of(text)
 
+    def _straightened(self) -> None:
+        """What is not straight by its words becomes an L, an approach or departure in polar words a Cartesian one."""
+        name, leads = self.layout.name, self.layout.name.startswith(("appr", "dep"))
+        self._function(name.upper().replace(" P", " ") if leads else "L")
+        self._drop(*self.layout.polar, None if leads else self.layout.radius)
+        if self.layout.sense is not None:
+            self._drop_span(self.layout.sense)
+
     # -- the direction of the tool ------------------------------------------------------------------------------------
 
     def _turning(self) -> tuple[int, ...]:
