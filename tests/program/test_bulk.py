@@ -141,7 +141,7 @@ def test_long_stretches(modal: bool) -> None:
     pieces = moved(moves, 3, 0.01)
     with mock.patch.object(Stretch, "splices", autospec=True, side_effect=Stretch.splices) as written:
         emit(program, moves, pieces, STEPS)
-    assert sum(len(call.args[0].words) for call in written.call_args_list) > 1500
+    assert sum(len(call.args[0].block) for call in written.call_args_list) > 1500
     assert_same(program, moves, pieces)
 
 

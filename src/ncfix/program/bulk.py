@@ -8,7 +8,7 @@ not on the digits) ends a stretch, and the emitter takes it by itself.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ Mask = NDArray[np.bool_]
 
 SHORTEST = 16
 """Stretches of fewer motions go one by one."""
-FIRST, LONGEST = 256, 1 << 15
-"""Motions that are tried at once: few at first, and after a stretch that went through four times as many."""
+LONGEST = 1 << 12
+"""Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
 @dataclass(slots=True)
@@ -48,7 +48,6 @@ class Bulk:
     first_piece: IntArray
     layouts: Layouts
     stop: IntArray
-    reach: int = FIRST
     parts: list[Splices] = field(default_factory=list)
     added: int = 0
 
@@ -86,15 +85,12 @@ class Bulk:
         """
         if fast.engaged():
             return self._compiled(row, position, frame, decimals)
-        stop = min(int(self.stop[row]), row + self.reach)
+        stop = min(int(self.stop[row]), row + LONGEST)
         if stop - row < SHORTEST:
             return None
-        stretch = Stretch.of(self, row, stop, position, frame, decimals)
-        count = stretch.count_clear()
-        self.reach = min(4 * self.reach, LONGEST) if count == stop - row else max(count, FIRST)
-        if count < SHORTEST:
+        stretch = Stretch.of(self, row, stop, position, frame, decimals).clear_head()
+        if not len(stretch.block):
             return None
-        stretch = stretch if count == stop - row else Stretch.of(self, row, row + count, position, frame, decimals)
         self.parts.append(stretch.splices())
         self.added += int(np.count_nonzero(stretch.further))
         return stretch.commands()
@@ -218,12 +214,15 @@ class Stretch:
             clear[further & ~add.any(axis=1)] = False
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
-    def count_clear(self) -> int:
-        """How many motions from the first on are clear, with all their pieces."""
+    def clear_head(self) -> Stretch:
+        """The motions up to the first one that is not clear in all its pieces."""
         fine = np.asarray(self.clear.all(axis=1))
-        count = len(fine) if fine.all() else int(np.argmin(fine))
-        begun = np.cumsum(~self.further)
-        return int(begun[-1] if count == len(fine) else begun[count] - 1)
+        if fine.all():
+            return self
+        count = int(np.flatnonzero(~self.further[: int(np.argmin(fine)) + 1])[-1])
+        styles = self.styles.rows(np.arange(np.count_nonzero(self.words[:count] >= 0)))
+        columns = ("block", "further", "words", "wanted", "values", "rewrite", "add", "clear")
+        return replace(self, styles=styles, **{name: getattr(self, name)[:count] for name in columns})
 
     def commands(self) -> FloatArray:
         """The commands at the ends of the pieces, (k, n_axes): an axis that is not told to move stays where it was."""

@@ -23,9 +23,9 @@ LONGEST = 2 * EIGHT
 """Bytes, but for its sign, of the longest number that is rewritten in bulk."""
 LARGEST = 1e9
 """Values of that many output steps go one by one: their products with powers of ten are not exact enough."""
-TIE = 1e-5
-"""So close to the middle between two outputs (in output steps) a value counts as on it; a hundred times the rounding of
-the largest."""
+TIE = 1e-14
+"""So close to the middle between two outputs, as a share of it, a value counts as on it; a hundred times the rounding
+of a product of doubles."""
 
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 
@@ -84,7 +84,7 @@ def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
     with np.errstate(invalid="ignore"):
         steps = np.abs(values) * POWERS[decimals]
         off = np.abs(steps - np.floor(steps) - 0.5)
-        plain: Mask = (steps < LARGEST) & (off > TIE)
+        plain: Mask = (steps < LARGEST) & (off > TIE * steps)
     return plain
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -150,8 +151,8 @@ class Reading:
         """Read the blocks from `first` up to `stop`."""
         found = self.scan(first, stop)
         known = list(map(self.index.get, found.shapes))
-        if None in known and found.group is not None:
-            known = self.learned(first, found, known)
+        if None in known and self.learned(first, found, known):
+            known = list(map(self.index.get, found.shapes))
         if None not in known:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
@@ -164,15 +165,14 @@ class Reading:
         counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
         return Columns(counts, spans + self.blocks[first, 0], values)
 
-    def learned(self, first: int, found: Scan, known: list[int | None]) -> list[int | None]:
-        """The templates of shapes that are given once each; of a new one from its first block, if that will do."""
-        _, rows = np.unique(np.asarray(found.group), return_index=True)
-        templates = list(known)
-        for number in sorted((n for n, template in enumerate(known) if template is None), key=rows.__getitem__):
-            templates[number] = self.understood(first, int(rows[number]), found, found.shapes[number])
-            if templates[number] is None:
-                break
-        return templates
+    def learned(self, first: int, found: Scan, known: list[int | None]) -> bool:
+        """Learn the shapes that are not known yet from the first block of each; whether that will do."""
+        rows = range(len(known)) if found.group is None else np.unique(found.group, return_index=True)[1].tolist()
+        new = {found.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
+        return None not in new and all(
+            self.understood(first, row, found, shape) is not None
+            for shape, row in sorted(new.items(), key=itemgetter(1))
+        )
 
     def understood(self, first: int, row: int, found: Scan, shape: bytes | None) -> int | None:
         """The template of a new shape; None where its block cannot be read, or has to be taken as it is."""

@@ -58,7 +58,7 @@ def steps_of(value: float, decimals: int) -> int:
     if decimals > MOST_STEPS:
         return -1
     steps = abs(value) * POWERS[decimals]
-    if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE):
+    if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE * steps):
         return -1
     return int(np.rint(steps))
 
