@@ -18,6 +18,7 @@ from ncfix.program.sinumerik.vocabulary import ABSOLUTE
 CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
 VIA_AT_RUNTIME = "the intermediate point of the arc is known only at run time"
 POLAR_ARC = "an arc in polar coordinates"
+DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
 VIA = ("I1", "J1", "K1")
 FLAT = 1e-9
 """A triangle of a smaller height, relative, has no circle."""
@@ -31,7 +32,7 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
     end = destination(control, words)
     doubtful = bool(end.unknown or control.unknown or words.runtime("I", "J", "K", "CR", "AR", "TURN"))
     clockwise, plane = code == CLOCKWISE, control.modal.plane
-    refusal = refusal_of(words, plane)
+    refusal = refusal_of(words, plane) or doubtful_diameter(control, words, "I")
     try:
         centre, end = geometry(control, words, end, clockwise=clockwise)
     except Fault:
@@ -51,6 +52,14 @@ def refusal_of(words: Words, plane: Plane) -> str:
     if words.runtime(*letters, "CR", "AR", "TURN"):
         return CENTRE_AT_RUNTIME
     return POLAR_ARC if {"AP", "RP"} & words.values.keys() else ""
+
+
+def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
+    """Why an arc is refused whose point with this X might be meant as a diameter."""
+    form = words.forms.get(address, "")
+    absolute = form == ABSOLUTE or (address == "I1" and not form and not control.modal.incremental)
+    counts = control.modal.diameter and absolute and address in words.values
+    return DIAMETERS.format(address) if counts else ""
 
 
 def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> tuple[Point, End]:
@@ -128,14 +137,16 @@ def through_point(control: Sinumerik, words: Words, code: int) -> None:
     """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
     control.settle_all()
     end = destination(control, words)
-    if words.runtime(*VIA):
-        control.go(Kind.FEED, words, end, code, refusal=VIA_AT_RUNTIME)
+    why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
+    if why:
+        control.go(Kind.FEED, words, end, code, refusal=why)
         return
     if end.unknown or control.unknown:
         control.go(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known")
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
     circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
+    circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
     control.go(Kind.ARC, words, end, code, arc=circle)
 
 

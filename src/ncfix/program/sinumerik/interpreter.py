@@ -33,7 +33,7 @@ SAFE_ACTION = re.compile(
     re.IGNORECASE,
 )
 
-OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_dp|tc_carr|m[nca]_|aa_off|ac_trans)|toff")
+OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_dp|tc_carr|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$")
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 

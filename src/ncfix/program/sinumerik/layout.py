@@ -26,7 +26,7 @@ AFTER_MOTION = frozenset({"RND", "CHF", "CHR"})
 POLAR = ("AP", "RP")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SinumerikLayout(Layout):
     """The writable parts of a motion block.
 

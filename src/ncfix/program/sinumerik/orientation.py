@@ -43,6 +43,8 @@ WHICH_ANGLES = (
 )
 IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS)"
 BY_AXES = "oriaxes"
+ON_CURVES = ("oricon", "oricurve", "oripath")
+BY_CURVE = "the tool turns on a cone, or after a curve ({})"
 
 FAR = math.radians(0.1)
 """rad. The tool that turns in a plane (ORIVECT) strays from where rotary axes of even speed would point it. The tip is
@@ -68,6 +70,8 @@ def by_direction(control: Sinumerik, words: Words) -> str:
         return AT_RUNTIME
     if control.modes.orientation_in_machine:
         return IN_MACHINE
+    if control.modes.orientation.startswith(ON_CURVES):
+        return BY_CURVE.format(control.modes.orientation.upper())
     pointing = control.pointing
     if pointing is None:
         return NO_KINEMATICS

@@ -138,6 +138,8 @@ def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
     warn_of_frame(control, step)
+    if len(step.written) > 1:
+        control.suspended["coordinates"] = "TRAORI with a direction of the tool of its own is in force"
     control.modes.transformed = True
     control.switch_tcp()
 
@@ -169,7 +171,8 @@ def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """MCALL: what follows it is called after each motion; alone it ends that."""
     turn.modal = True
     control.modes.modal_cycle = None
-    control.suspended.pop("cycle", None)
+    if control.suspended.pop("cycle", None):
+        control.lose_all(AFTER_CYCLE)
 
 
 def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
@@ -226,13 +229,14 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
 
 def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     """A subprogram, or a cycle of the machine's builder."""
+    if turn.modal:
+        text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
+        control.suspended["cycle"] = text
+        return
     unit = find(step.name)
     if unit is not None:
         turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
         turn.times = round(turn.words.get("P", 1.0))
-        return
-    if turn.modal:
-        control.suspended["cycle"] = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not know"
         return
     text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")

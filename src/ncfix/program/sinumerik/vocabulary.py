@@ -52,6 +52,7 @@ _HARMLESS = """
     cancel cycle832 group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
     coupdef coupdel coupon coupof couponc coupofs waitc ctabdef ctabend ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
+    drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
 """
 HARMLESS = frozenset(_HARMLESS.split())
 """Names that move no geometry axis and change no coordinates: passed over."""
@@ -91,10 +92,16 @@ UNFOLLOWED = {
     "tangon": "tangential control (TANGON)",
     "execstring": "text that is executed as a block (EXECSTRING)",
     "corrtc": "a corrected tool carrier (CORRTC)",
+    "ptp": "motion from point to point (PTP)",
+    "ptpg0": "motion from point to point (PTPG0)",
+    "ptpwoc": "motion from point to point (PTPWOC)",
+    "extcall": "a program from elsewhere (EXTCALL)",
+    "isocall": "a program in another language (ISOCALL)",
+    **dict.fromkeys(("diamona", "diamofa", "diam90a", "diamchan", "diamchana"), "diameters axis by axis (DIAMONA)"),
 }
 """Names after which coordinates are no longer those that are followed."""
 
-ENDS = frozenset({"trafoof", "torotof", "parotof"})
+ENDS = frozenset({"trafoof", "torotof", "parotof", "cp"})
 """Names that end some of them."""
 
 ASYNCHRONOUS = {
