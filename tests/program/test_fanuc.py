@@ -246,11 +246,11 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
         ("G68.2P2Q1X1.\nG0X1.", "tilted plane (G68.2)"),
         ("G68X0Y0Z0I0J0K1.R30.\nG0X1.", "tilted plane"),
         ("G43.5H1\nG0X1.", "tool direction is given by I J K"),
-        ("G1X5.F100.,R2.", "the corner"),
         ("G10L50\nG0X1.", "parameters of the control"),
         ("G10L2P0X1.\nG0X1.", "external work offset"),
         ("G66.1P1\nM30\nO1\nM99", ""),
-        ("G12.1\nG0X1.", "G12.1"),
+        ("G12.1\nG0X1.", "polar interpolation (G12.1)"),
+        ("G1X5.,A45.F100.", "given by its angle"),
         ("G107\nG0X1.", "G107"),
     ],
 )

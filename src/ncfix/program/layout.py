@@ -32,6 +32,7 @@ class Layout:
     code_at   where a missing motion code goes: before the first axis word
     blank     what separates words in this block
     prefix    the span of the block skip, which further pieces repeat
+    allowed   axes that may get a word where they have none; None: all
     """
 
     axes: dict[str, Word]
@@ -46,6 +47,7 @@ class Layout:
     code_at: Anchor
     blank: str
     prefix: Span | None
+    allowed: frozenset[str] | None = None
 
 
 def layout_of(program: Program, block: int) -> Layout:

@@ -99,6 +99,8 @@ class BlockRenderer:
     def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
         if not np.isfinite(end) or abs(end - position[column]) < self.half[column]:
             return
+        if self.layout.allowed is not None and self.target.letters[column] not in self.layout.allowed:
+            return
         base = position[column] if self.target.incremental else 0.0
         text = f"{end - base:.{self.target.decimals[column]}f}"
         self._add(self.target.letters[column], text)

@@ -11,6 +11,7 @@ from ncfix.program.fanuc import polar, system
 from ncfix.program.fanuc.arithmetic import variable_number
 from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
+from ncfix.program.fanuc.corners import CORNER
 from ncfix.program.fanuc.flow import BAD_JUMP, MacroFlow
 from ncfix.program.fanuc.lengths import lone_number
 from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
@@ -35,9 +36,8 @@ DRILLING = frozenset("KLQ")
 SCALED = frozenset("XYZABCUVWIJKRQ")
 NO_UNIT = "NCF215"
 ANGLE = ",A"
-CORNER = frozenset((",R", ",C", ANGLE))
+BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
-ROUNDED_CORNER = "the control rounds or breaks the corner (,R ,C) by itself"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
 
@@ -69,6 +69,7 @@ class MacroInterpreter(Interpreter):
         self.modal_calls: list[ModalCall] = []
         self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
         self.moved = False
+        self.cornered = False
         self.unit_said = False
 
     def prepared(self) -> MacroFlow:
@@ -80,8 +81,9 @@ class MacroInterpreter(Interpreter):
         return MacroFlow(control, self.main, self.find)
 
     def takes_stretches(self) -> bool:
-        """Not while a macro is called after every motion, or words are polar."""
-        return super().takes_stretches() and not self.modal_calls and self.control.polar is None
+        """Not while a macro is called after every motion, words are polar, or a corner is put in."""
+        special = self.modal_calls or self.cornered or self.control.polar is not None
+        return super().takes_stretches() and not special
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
@@ -108,10 +110,14 @@ class MacroInterpreter(Interpreter):
             self.macro(plan, codes)
             return False
         refusal = self.control.refusal
-        if plan.letters & CORNER:
-            self.control.refusal = refusal or ROUNDED_CORNER
+        if ANGLE in plan.letters:
+            self.control.refusal = refusal or BY_ANGLE
+        self.control.whole = self.cornered or bool(plan.letters & CORNER)
         ended = super().execute_words(plan, index)
-        if plan.letters & CORNER:
+        if self.moved:
+            self.cornered = bool(plan.letters & CORNER)
+        self.control.whole = False
+        if ANGLE in plan.letters:
             self.control.refusal = refusal
             self.note_angle(plan)
         return ended
@@ -119,9 +125,8 @@ class MacroInterpreter(Interpreter):
     def note_angle(self, plan: Plan) -> None:
         """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
         plane = self.control.modal.plane
-        if ANGLE in plan.letters:
-            missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
-            self.control.lose(missing, AFTER_ANGLE)
+        missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
+        self.control.lose(missing, AFTER_ANGLE)
 
     def note_command(self, plan: Plan) -> None:
         """A command of a machine's own: nobody knows what it does."""

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from ncfix.program.fanuc.blocks import parse_block
 from ncfix.program.fanuc.control import MacroControl
+from ncfix.program.fanuc.corners import axes_of_corner, has_corners
 from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Run
+from ncfix.program.layout import Layout
 from ncfix.program.moves import Trace
-from ncfix.program.rs274.language import RS274
+from ncfix.program.rs274.language import RS274, writable
 from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.shapes import Scan, scan
 from ncfix.program.tree import Literal, Program
@@ -54,10 +56,23 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None
-    return RS274.bulk(program, block)
+    return None if has_corners(program) else RS274.bulk(program, block)
+
+
+def layout(program: Program, block: int) -> Layout | None:
+    """The layout of a block; at a corner that the control rounds, axes outside its plane get no words."""
+    found = writable(program, block)
+    return None if found is None else replace(found, allowed=axes_of_corner(program, block))
 
 
 FANUC: Language = replace(
-    RS274, scan=scanned, parse=parse_block, follow=follow, bulk=in_bulk, unroll=unroll, follower=None
+    RS274,
+    scan=scanned,
+    parse=parse_block,
+    follow=follow,
+    layout=layout,
+    bulk=in_bulk,
+    unroll=unroll,
+    follower=None,
 )
 """Not followed part by part: jumps and calls may lead anywhere in the text."""

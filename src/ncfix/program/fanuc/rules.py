@@ -20,7 +20,7 @@ MACRO = "macro call"
 
 FOREIGN = frozenset(
     {
-        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923, 121, 131),
+        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923),
         *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, *groups.THREADS, 431, 432, 411, 421, 890),
     }
 )

@@ -86,6 +86,7 @@ class Control:
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
+    whole      the motions of the block must not be split, as under cutter compensation
     saved      the modal states that M70 saved, one place for each call level
     """
 
@@ -121,6 +122,7 @@ class Control:
         self.tilted = False
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
+        self.whole = False
         self.ends: list[Vector] | None = None
         self.external = ""
         self.tcp = setup.tcp
@@ -301,7 +303,7 @@ class Control:
                 modal.incremental,
                 modal.arc_absolute,
                 self.tcp,
-                modal.compensated != 0,
+                modal.compensated != 0 or self.whole,
                 tool,
                 length,
                 modal.feed_mode,

@@ -73,7 +73,7 @@ ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 8
     LENGTH=(434, 435, 440),
     SYSTEM=(541,),
     ROTATION=(680, 690),
-    UNFOLLOWED=(121, 131, 150, 160, 500, 501, 510, 511, 682, 683, 684),
+    UNFOLLOWED=(121, 131, 1120, 1130, 150, 160, 500, 501, 510, 511, 682, 683, 684),
 )
 
 ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187)) | {51}

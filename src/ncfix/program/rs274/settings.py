@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import INCH, PLANES, X, Y, Z
+from ncfix.program.rs274.coordinates import INCH, PLANES
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.modal import Modal, Saved
 from ncfix.program.rs274.systems import activate
@@ -20,13 +20,14 @@ UNFOLLOWED = {
     510: ("scaling", "scaling (G51)"),
     511: ("mirror", "mirroring (G51.1)"),
     121: ("polar plane", "polar interpolation (G12.1)"),
+    1120: ("polar plane", "polar interpolation (G112)"),
     682: ("tilt", "a tilted plane (G68.2)"),
     683: ("tilt", "a tilted plane (G68.3)"),
     684: ("tilt", "a tilted plane (G68.4)"),
 }
 """Codes of ISO controls that change coordinates in a way that is not followed: what they switch on, in words."""
 
-ENDS = {150: "polar", 500: "scaling", 501: "mirror", 131: "polar plane", 690: "tilt"}
+ENDS = {150: "polar", 500: "scaling", 501: "mirror", 131: "polar plane", 1130: "polar plane", 690: "tilt"}
 """The codes that end them."""
 
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
@@ -85,7 +86,7 @@ def unfollowed(control: Control, block: Block, code: int) -> None:
         key, words = UNFOLLOWED[code]
         control.suspended[key] = f"{words} is in force, which ncfix does not follow"
     elif control.suspended.pop(ENDS[code], None):
-        control.lose((X, Y, Z), AFTER_UNFOLLOWED)
+        control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
 def unknown_code(control: Control, code: int) -> None:
