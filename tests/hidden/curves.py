@@ -24,14 +24,14 @@ def smooth(rng: Generator) -> Curve:
     Half of them are waves, the others bows, joints of rails, hills or walks; the argument is itself bent, and a
     saturation acts on one draw in three.
     """
-    families = (_waves, _bow, _joints, _hills, _walk)
+    families = (wavy, bowed, jointed, hilly, walked)
     shape = families[int(rng.choice(len(families), p=(0.5, 0.125, 0.125, 0.125, 0.125)))](rng)
     bend, where, rate = rng.uniform(-0.2, 0.2), rng.uniform(0, 2 * np.pi), rng.uniform(1.5, 3.0)
     limit = rng.uniform(0.8, 1.8) if rng.random() < 1 / 3 else np.inf
     return straightened(saturated(lambda u: shape(u + bend * np.sin(rate * u + where)), limit))
 
 
-def _waves(rng: Generator) -> Curve:
+def wavy(rng: Generator) -> Curve:
     """Waves of unrelated lengths, from six times the travel down to a fifth of it, falling with a drawn power."""
     count = int(rng.integers(6, 20))
     waves = np.exp(rng.uniform(np.log(0.5), np.log(rng.uniform(7.0, 16.0)), count))
@@ -40,7 +40,7 @@ def _waves(rng: Generator) -> Curve:
     return lambda u: np.sin(np.multiply.outer(u, waves) + phase) @ size
 
 
-def _bow(rng: Generator) -> Curve:
+def bowed(rng: Generator) -> Curve:
     """A sagging or crowned way: a power of the distance from somewhere, unlike on both sides."""
     centre, left, right = rng.uniform(-0.5, 0.5), rng.uniform(1.5, 4.0), rng.uniform(1.5, 4.0)
     lean = rng.uniform(-1.0, 1.0)
@@ -52,7 +52,7 @@ def _bow(rng: Generator) -> Curve:
     return curve
 
 
-def _joints(rng: Generator) -> Curve:
+def jointed(rng: Generator) -> Curve:
     """Rails screwed down in pieces: two to four bends, each rounded over a tenth of the travel or so."""
     count = int(rng.integers(2, 5))
     place, turn = rng.uniform(-0.8, 0.8, count), rng.normal(size=count)
@@ -60,14 +60,14 @@ def _joints(rng: Generator) -> Curve:
     return lambda u: np.logaddexp(0.0, (np.subtract.outer(u, place)) / soft) @ (soft * turn)
 
 
-def _hills(rng: Generator) -> Curve:
+def hilly(rng: Generator) -> Curve:
     """Two to five hills and hollows of unlike widths."""
     count = int(rng.integers(2, 6))
     place, width, size = rng.uniform(-1, 1, count), rng.uniform(0.15, 0.6, count), rng.normal(size=count)
     return lambda u: (1 / (1 + (np.subtract.outer(u, place) / width) ** 2)) @ size
 
 
-def _walk(rng: Generator) -> Curve:
+def walked(rng: Generator) -> Curve:
     """What scraping left: a walk that was smoothed over a drawn length."""
     knots = int(rng.integers(6, 14))
     shape = CubicSpline(np.linspace(-1.3, 1.3, knots), np.cumsum(rng.normal(size=knots)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -57,6 +58,14 @@ def test_smooth_curves_are_no_cubics() -> None:
     left = [share_left(curves.smooth(rng)(GRID), np.vander(GRID, 4)) for _ in range(200)]
     assert np.median(left) > 0.15  # of the curve's rms: more than a cubic leaves out of a measured straightness
     assert np.min(left) > 1e-3
+
+
+@pytest.mark.parametrize("family", [curves.wavy, curves.bowed, curves.jointed, curves.hilly, curves.walked])
+def test_every_family_of_shapes_is_unlike_a_cubic(family: Callable[[np.random.Generator], curves.Curve]) -> None:
+    rng = np.random.default_rng(1)
+    left = [share_left(curves.straightened(family(rng))(GRID), np.vander(GRID, 4)) for _ in range(60)]
+    assert np.median(left) > 0.05
+    assert all(np.isfinite(left))
 
 
 def test_curves_of_an_angle_are_not_two_harmonics() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hidden import files, instruments, mistakes, remeasure
+from hidden import files, instruments, mistakes, remeasure, workshop
 from hidden.families import FAMILIES, FINAL_RANGE, development_seed, final_seed, tasks
 from hidden.scenario import Scenario, observe, scenario
 from hidden.world import rms
@@ -219,6 +219,44 @@ def test_noise_has_the_size_that_is_stated_and_heavy_tails() -> None:
     assert len(bad) == 0
     _, bad = instruments.draw_noise(np.random.default_rng(0), instruments.Noise(outliers=0.01), time, 3)
     assert np.mean(np.isin(np.arange(20000), bad)) == pytest.approx(0.01, rel=0.2)
+
+
+def test_instruments_differ_and_have_three_micrometres_each() -> None:
+    drawn = [instruments.draw_instrument(np.random.default_rng(seed), clean=False) for seed in range(40)]
+    assert {noise.sigma_um for noise in drawn} == {3.0}
+    assert len({(noise.tails, noise.memory, noise.wander_um, noise.outliers) for noise in drawn}) == 40
+    assert all(noise.tails > 4 and 0.1 <= noise.wander_um <= 0.6 and noise.outliers < 0.02 for noise in drawn)
+    clean = instruments.draw_instrument(np.random.default_rng(1), clean=True)
+    assert (clean.wander_um, clean.outliers, clean.sigma_um) == (0.0, 0.0, 3.0)
+
+
+def test_what_wanders_is_part_of_the_noise_that_is_stated() -> None:
+    noise = instruments.Noise(sigma_um=3.0, tails=20.0, outliers=0.0, wander_um=2.0, memory=300.0)
+    drawn, _ = instruments.draw_noise(np.random.default_rng(3), noise, np.arange(0, 3e6, 60.0), 1)
+    assert 1e3 * np.std(drawn) == pytest.approx(3.0, rel=0.03)
+
+
+def test_families_take_turns_and_can_be_cut_short() -> None:
+    some = tasks(["single", "two", "clean"], counts={"": 2, "single": 4})
+    assert [task.family for task in some[:3]] == ["single", "two", "clean"]
+    assert [sum(task.family == name for task in some) for name in ("single", "two", "clean")] == [4, 2, 2]
+    assert {task.seed for task in some} <= {task.seed for task in tasks(["single", "two", "clean"])}
+
+
+def test_a_good_design_has_some_three_hundred_rows() -> None:
+    given = [int(scenario(seed, "clean", seed).given.sum()) for seed in range(12)]
+    assert all(250 < rows < 500 for rows in given)
+    assert 270 < np.median(given) < 350
+
+
+def test_no_two_machines_are_alike() -> None:
+    drawn = [workshop.draw_machine(np.random.default_rng(seed), "wCAYFXZSt") for seed in range(20)]
+    assert len({(m.size, m.lengths, m.joint("A").direction, m.joint("A").point) for m in drawn}) == 20
+    for machine in drawn:
+        axis = machine.joint("A")
+        assert np.linalg.norm(axis.direction) == pytest.approx(1)
+        assert axis.triad[0] == axis.direction  # its errors are named along and about it
+        assert np.asarray(axis.triad) @ np.asarray(axis.triad).T == pytest.approx(np.eye(3))
 
 
 def test_repeats_follow_each_other_with_the_same_approach(scenes: dict[tuple[str, int], Scenario]) -> None:
