@@ -130,3 +130,19 @@ def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
     )
     assert by_axes.rule[-1] == 0
     assert np.abs(by_plane.end[-1] - by_axes.end[-1]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("way", "known"),
+    [
+        ("PLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX", True),
+        ("PLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX COORD ROT", True),
+        ("PLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX TABLE ROT", False),
+        ("L C+10 FMAX\nPLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX", False),
+        ("L C+10 FMAX\nPLANE RESET TURN FMAX", False),
+        ("L C+10 FMAX\nPLANE RESET TURN FMAX\nL B+0 C+0 FMAX\nL X+5 Y+6 Z+7 FMAX", True),
+    ],
+)
+def test_an_axis_that_is_free_to_turn_stands_where_nobody_knows(root: Path, way: str, known: bool) -> None:
+    moves = moves_of(root, program(way, "L X+5 Y+6 Z+7 FMAX"))
+    assert bool(moves.rule[-1] == 0) is known

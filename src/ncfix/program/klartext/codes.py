@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from ncfix.program.klartext.control import RETRACTED, Control
+from ncfix.program.klartext.posture import pointing_of
 from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words
 
@@ -47,10 +48,16 @@ def before_motion(control: Control, step: Step) -> None:
 
 
 def end_of_short_ways(control: Control, on: bool) -> None:
-    """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn."""
-    past = [index for index in control.machine if control.rotary[index] and not 0 <= control.position[index] < FULL]
-    if on and control.shortest:
-        control.lose([index for index in past if index not in control.unknown], COUNTED)
+    """M127 after M126: an axis that went past a turn may count from there, or from the angle below a turn.
+
+    M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
+    """
+    pointing = pointing_of(control) if on and control.shortest else None
+    tilts = None if pointing is None else control.machine[pointing.columns[1]]
+    for index in control.machine if on and control.shortest else ():
+        below = control.position[index] < 0 and index != tilts
+        if control.rotary[index] and index not in control.unknown and (below or control.position[index] >= FULL):
+            control.lose([index], COUNTED)
     control.shortest = not on
 
 

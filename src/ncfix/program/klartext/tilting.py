@@ -132,15 +132,16 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
     if sign:
         master = control.machine[pointing.columns[1]]
         ways = [way for way in ways if abs(way[master]) < 1e-9 or (way[master] < 0) == (sign == "-")]
-    if flags & {"turn", "move"} and pointing.at_pole(np.array(normal)):
-        return way_at_pole(control, ways[0], flags)
+    if pointing.at_pole(np.array(normal)):
+        turned = "table rot" in flags and tilt is not None and tilt != IDENTITY
+        return None if turned else way_at_pole(control, ways[0])
     if len(ways) > 1:
         angles = " ".join(f"{'XYZABC'[index]}{angle / DEGREE:.3f}" for index, angle in ways[0].items())
         control.warn(WAY, f"the rotary axes are taken to turn to {angles}, the nearest of several ways", WAY_HINT)
     return ways[0] if ways else None
 
 
-def way_at_pole(control: Control, way: dict[int, float], flags: frozenset[str]) -> dict[int, float] | None:
+def way_at_pole(control: Control, way: dict[int, float]) -> dict[int, float] | None:
     """The way to a plane to which the tool is square wherever the axis next to the workpiece stands.
 
     That axis is free: by COORD ROT, which counts where nothing is said, some controls turn it to zero, others leave it;
@@ -148,7 +149,7 @@ def way_at_pole(control: Control, way: dict[int, float], flags: frozenset[str]) 
     """
     assert control.pointing is not None
     free = control.machine[control.pointing.columns[0]]
-    return way if "table rot" not in flags and abs(way[free]) < NONE else None
+    return way if abs(way[free]) < NONE else None
 
 
 def turn_axes(control: Control, way: dict[int, float] | None) -> None:
