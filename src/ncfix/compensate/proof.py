@@ -110,6 +110,8 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
     """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
     pieces, ends = settled.plan.pieces, settled.moves.end
     kept = pieces.kept[rows]
+    if not kept.any():
+        return kept
     last = pieces.fraction == 1
     shifts = np.abs(pieces.end[last] - ends[pieces.move[last]])
     most = max(STRAY, STRAYS * float(np.max(shifts[np.isfinite(shifts)], initial=0.0)))
@@ -118,5 +120,9 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
 
 
 def _differs(found: Array, meant: Array) -> Mask:
-    same: Mask = np.asarray(np.isclose(found, meant, rtol=0, atol=SAME, equal_nan=True).all(axis=1))
-    return ~same
+    with np.errstate(invalid="ignore"):
+        same: Mask = np.asarray(np.abs(found - meant) <= SAME)
+    if not same.all():
+        same |= (found == meant) | (np.isnan(found) & np.isnan(meant))
+    differs: Mask = ~same.all(axis=1)
+    return differs

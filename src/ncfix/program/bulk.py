@@ -63,7 +63,7 @@ class Bulk:
         jumps: Mask,
     ) -> Bulk:
         """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
-        first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
+        first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         layouts = Layouts.of(language, program, moves)
         fit = _qualified(program, moves, pieces, first_piece, layouts) & ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False

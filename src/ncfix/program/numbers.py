@@ -62,10 +62,12 @@ def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDA
     free = ~fixed[at.characters]
     covered = numeric.copy()
     fill(covered, runs[~free], False)
-    runs, at = runs[free], Before(at.places[free], at.characters[free])
+    rows = np.flatnonzero(free)
+    runs, at = runs.take(rows, axis=0), Before(at.places[rows], at.characters[rows])
     values, broken = convert(text, runs)
     negative = with_sign(text, runs, at, covered)
-    return Numbers(runs, np.where(negative, -values, values), broken, covered)
+    values[negative] *= -1
+    return Numbers(runs, values, broken, covered)
 
 
 def is_numeric(text: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -115,16 +117,15 @@ def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def with_sign(
     text: NDArray[np.uint8], runs: NDArray[np.int64], at: Before, covered: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """Put the sign that stands before a run into it, if it belongs to it, and mark it; which runs are negative."""
+) -> NDArray[np.int64]:
+    """Put the sign that stands before a run into it, if it belongs to it, and mark it; the runs that are negative."""
     rows = np.flatnonzero(SIGN[at.characters])
     further = last_before(text, at.places[rows]).characters
     rows = rows[~UNSIGNED_AFTER[further]]
     signs = at.places[rows]
     fill(covered, np.stack((signs, runs[rows, 0]), axis=1), True)
     runs[rows, 0] = signs
-    negative = np.zeros(len(runs), dtype=np.bool_)
-    negative[rows] = text[signs] == ord("-")
+    negative: NDArray[np.int64] = rows[text[signs] == ord("-")]
     return negative
 
 
@@ -136,14 +137,15 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     """The values of runs of digits and points, exactly rounded; and which are malformed."""
     found = digits_of(text, runs)
     digits = runs[:, 1] - runs[:, 0] - found.points
-    values = found.value / POWERS[np.minimum(found.decimals, EXACT_DIGITS)]
-    broken = (found.points > 1) | (digits == 0)
-    for row in np.flatnonzero(digits > EXACT_DIGITS):
-        number = text[slice(*runs[row])].tobytes()
-        broken[row] = number.count(b".") > 1
-        values[row] = float(number) if not broken[row] else np.nan
-    values[broken] = np.nan
-    return values, broken | np.isinf(values)
+    values = found.value / POWERS[found.decimals]
+    broken = np.zeros(len(runs), dtype=np.bool_)
+    for row in np.flatnonzero((found.points > 1) | (digits == 0) | (digits > EXACT_DIGITS)):
+        try:
+            values[row] = float(text[slice(*runs[row])].tobytes())
+        except ValueError:
+            values[row] = np.nan
+        broken[row] = not np.isfinite(values[row])
+    return values, broken
 
 
 def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> Digits:
@@ -198,13 +200,13 @@ class Digits:
         digits = words ^ ZEROS
         others = (((digits & ~TOPS) + ABOVE) | digits) & TOPS
         pure = others == points | (TOPS ^ TOPS >> high << high)
-        point = points >> np.uint64(7)
-        below = np.where(points, words & (point - np.uint64(1)), 0)
-        words = np.where(points, (words & ~((point << np.uint64(8)) - np.uint64(1))) | below << np.uint64(8), words)
+        point, pointed = points >> np.uint64(7), points != 0
+        behind = ~((point << np.uint64(8)) - np.uint64(1))
+        words = np.where(pointed, words & behind | (words & (point - np.uint64(1))) << np.uint64(8), words)
         value = words & FOURS
         for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
             value = value * np.uint64((weight << bits) + 1) >> np.uint64(bits) & np.uint64(MASKS[bits])
         power = point.astype(np.float64).view(np.int64) >> 52
-        decimals = np.where(points, EIGHT - 1 - (power - 1023) // 8, 0)
+        decimals = np.where(pointed, EIGHT - 1 - (power - 1023 >> 3), 0)
         several = (points & (points - np.uint64(1))) != 0
-        return cls(value.astype(np.int64), decimals, (points != 0) + several.astype(np.int64), pure)
+        return cls(value.view(np.int64), decimals, pointed + several.astype(np.int64), pure)
