@@ -74,7 +74,7 @@ class Author:
         if self.swivelled or self.chance.random() < 0.6:
             return []
         both = [f"A=AC({self.number(-50, 50)})", f"C=AC({self.number(-80, 80)})"]
-        vector = [f"A3={self.number(-0.5, 0.5)}1", f"B3={self.number(-0.5, 0.5)}1", "C3=1"]
+        vector = [f"{name}={self.chance.uniform(-0.5, 0.5):.4f}" for name in ("A3", "B3")] + ["C3=1"]
         around = [f"C={self.chance.choice(('DC', 'ACP', 'ACN'))}({self.number(0, 359)})"]
         return self.chance.choice([both, vector, around, both[:1]]) if self.transformed else both
 
