@@ -39,12 +39,11 @@ class Joint:
     before: Array
     after: Array
 
-    def only(self, chosen: Sequence[int]) -> Joint:
-        """The same with some of the members; what they are stays as it was fitted with all."""
-        numbers, covariances, shown = (
-            tuple(each[k] for k in chosen) for each in (self.numbers, self.covariances, self.shown)
-        )
-        return Joint(self.constants, numbers, covariances, shown, self.before, self.after)
+    @property
+    def together(self) -> Array:
+        """What all members show, (m,) um."""
+        whole: Array = np.sum([np.zeros(len(self.before)), *self.shown], axis=0)
+        return whole
 
 
 def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.diagnose.groups import Group
+from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal
 
 LASTING = 900.0
 """s: how long an instrument's wandering lasts."""
@@ -78,7 +79,7 @@ def background(view: View, groups: Sequence[Group], relative: Array, wanders: bo
     """Estimate how much the instrument wanders and find the coordinates."""
     sigma, freedom = _noise(view)
     left = _contrasts(view.base / relative[:, None])
-    everything = _everything(groups, relative)
+    everything = _everything(view, groups, relative)
     y = left.T @ (view.y / relative) / sigma
     inner = left.T @ everything
     inner = inner @ inner.T
@@ -110,18 +111,21 @@ def _contrasts(base: Array) -> Array:
     """An orthonormal basis of what is orthogonal to the base, (m, n)."""
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
-    left, values, _ = np.linalg.svd(scaled, full_matrices=True)
-    rank = int((values > 1e-9 * values[0]).sum()) if len(values) else 0
-    contrasts: Array = left[:, rank:]
+    basis = orthonormal(scaled)
+    contrasts: Array = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
     return contrasts
 
 
-def _everything(groups: Sequence[Group], relative: Array) -> Array:
-    """A little of every candidate: columns whose sum of squares is that of 1 um, each name with the same share."""
+def _everything(view: View, named: Sequence[Group], relative: Array) -> Array:
+    """A little of every candidate: columns whose sum of squares is that of 1 um, each name with the same share.
+
+    But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
+    """
+    groups = [group for group in named if not group.owner.constant]
     names = {group.owner.name for group in groups}
     forms = {name: sum(group.owner.name == name for group in groups) for name in names}
     parts = [group.columns / np.sqrt(forms[group.owner.name] * len(names)) for group in groups]
-    return np.concatenate([np.zeros((len(relative), 0)), *parts], axis=1) / relative[:, None]
+    return apart(view, np.concatenate([np.zeros((len(relative), 0)), *parts], axis=1), named) / relative[:, None]
 
 
 def _wandering(view: View, relative: Array) -> Array | None:

@@ -8,22 +8,26 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose import addition, checks, gapmap, holdout, mistakes, next_poses, noise, outliers
+from ncfix.diagnose import addition, checks, constants, gapmap, holdout, mistakes, next_poses, noise, outliers, rest
 from ncfix.diagnose.background import Background, background
 from ncfix.diagnose.catalogue import Candidate, catalogue, without
-from ncfix.diagnose.evidence import Court
+from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.groups import Gathered, gather
 from ncfix.diagnose.rivals import rivals, scaled
-from ncfix.diagnose.selection import UNNAMED, Selected, aliases, select
+from ncfix.diagnose.selection import Selected, aliases, select
 from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.solve import orthonormal
+from ncfix.measure.solve import without as without_free
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 MATERIAL_UM = 0.8
 """An effect that moves the tool tip by less is not worth a name."""
-MOSTLY = 0.5
-"""Share of the largest named effect from which on an unknown one decides the verdict."""
+RATHER = 0.5
+"""An effect smaller than this share of what is left without a name is as good as part of it."""
+MUCH = 1 / 3
+"""Share of what all names together show from which on what has none decides the verdict."""
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""
 ALIKE = 3.0
@@ -118,8 +122,9 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     candidates, unheard_of = without(catalogue(seen.reach), refused)
     gathered = gather(seen, candidates)
     ground, outlying = _ground(seen, gathered)
-    court = Court(ground, (*gathered.groups, *rivals(seen)))
-    selected = _gated(court, select(court))
+    court = Court(ground, (*gathered.groups, *rivals(seen, gathered.groups)), len(gathered.groups))
+    inner = constants.freed(court)
+    selected = _gated(court, constants.added(court, rest.completed(inner, select(inner))))
     found = _concluded(court, selected, gathered, candidates, outlying, unheard_of)
     return mistakes.told(found, wrong) if wrong else found
 
@@ -133,22 +138,37 @@ def _ground(seen: View, gathered: Gathered) -> tuple[Background, NDArray[np.bool
 
 def _gated(court: Court, selected: Selected) -> Selected:
     """Without the members that do not predict held-out poses, or that are too small to matter."""
+    view = court.background.view
+    free = orthonormal(view.base / view.relative[:, None])
+    least = max(MATERIAL_UM, RATHER * _nameless(court, selected))
     while selected.members:
         members = list(selected.members.values())
-        share = addition.likeliest_share(court.heard(members).null)
+        share = _share(court, members)
         held = holdout.held_out(court, members, share)
         joint = addition.fitted(court, members, share)
+        sizes = [_visible(view, free, shown) for shown in joint.shown]
         names = list(selected.members)
         failed = [
             name
             for k, name in enumerate(names)
-            if not _passes(holdout.gain(held, held.less[k])) or court.background.view.rms(joint.shown[k]) < MATERIAL_UM
+            if name in selected.named
+            and (sizes[k] < least or not (_sure(court, selected, name) or _passes(holdout.gain(held, held.less[k]))))
         ]
         if not failed:
             break
         weakest = min(failed, key=lambda name: selected.odds[name])
         selected = selected.without(weakest, court)
     return selected
+
+
+def _sure(court: Court, selected: Selected, name: str) -> bool:
+    """Whether it is a constant beside effects that can do the same where it is left out."""
+    return court.constant(name) and not all(court.constant(each) for each in selected.named)
+
+
+def _visible(view: View, free: Array, shown: Array) -> float:
+    """The size of what an effect shows beside what is free, um."""
+    return view.rms(without_free(free, (shown / view.relative)[:, None])[:, 0] * view.relative)
 
 
 def _passes(gain: tuple[float, float]) -> bool:
@@ -165,64 +185,60 @@ def _concluded(
     unheard_of: tuple[str, ...],
 ) -> Diagnosis:
     ground, seen = court.background, court.background.view
-    members = list(selected.members.values())
-    null = court.heard(members).null
-    share = addition.likeliest_share(null)
-    joint = addition.fitted(court, members, share)
+    told = [selected.members[name] for name in selected.named]
+    # names are fitted without what has none: that shall explain only what they leave (Plumlee 2017)
+    share = _share(court, list(selected.members.values()))
+    joint = addition.fitted(court, told, share)
     keep = ~outlying[np.maximum(seen.row, 0)] & (seen.row >= 0)
-    sigma = _sigma(court, selected, share)
+    sigma = _sigma(court, selected)
     checks.agreeing(seen, joint.before, sigma)
     floor = noise.floor(seen, ground, sigma, keep)
-    named = [(name, k) for k, name in enumerate(selected.members) if name not in UNNAMED]
-    machine, added = addition.machine_with(court, [members[k] for _, k in named], joint.only([k for _, k in named]))
+    machine, added = addition.machine_with(court, told, joint)
     findings = tuple(
         Finding(
-            court.groups[members[k].group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
-            tuple(aliases(selected, name, ALIKE)), seen.rms(joint.shown[k], keep), effects, joint.shown[k],
+            court.groups[member.group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
+            tuple(aliases(selected, name, ALIKE)), seen.rms(shown, keep), effects, shown,
         )
-        for (name, k), effects in zip(named, added, strict=True)
+        for name, member, effects, shown in zip(selected.named, told, added, joint.shown, strict=True)
     )  # fmt: skip
-    rest = [k for k, name in enumerate(selected.members) if name in UNNAMED]
-    told = [members[k] for _, k in named]
-    after = addition.fitted(court, told, share).after if rest else joint.after
-    unknown_um = seen.rms(after - joint.after, keep) if rest else 0.0
+    parameters = float(np.linalg.matrix_rank(seen.base))
+    p_left = noise.lack_of_fit(floor, joint.after[keep], parameters + sum(map(len, joint.numbers)) / 2)
+    noise_um = _length(seen, keep, floor.sigma_um)
+    unknown_um = _nameless(court, selected, keep)
+    beyond = noise.beyond(floor, noise_um, seen.rms(joint.after, keep))
+    if p_left is not None and p_left < LACKING and beyond > EXCESS_UM:
+        unknown_um = max(unknown_um, beyond)
+    told_um = _visible(seen, orthonormal(seen.base / seen.relative[:, None]), joint.together)
     held = holdout.held_out(court, told, share)
     known = np.isfinite(held.without) & np.isfinite(held.with_all) & keep
-    parameters = float(np.linalg.matrix_rank(seen.base))
-    p_left = noise.lack_of_fit(floor, after[keep], parameters + sum(len(joint.numbers[k]) for _, k in named) / 2)
-    excess = np.sqrt(max(seen.rms(after, keep) ** 2 - _length(seen, keep, floor.sigma_um) ** 2, 0.0))
-    if p_left is not None and p_left < LACKING and excess > EXCESS_UM:
-        unknown_um = max(unknown_um, float(excess))
     return Diagnosis(
-        verdict=_verdict(findings, unknown_um),
+        verdict=_verdict(findings, unknown_um, told_um, floor, noise_um),
         findings=findings,
         unknown_um=unknown_um,
-        unknown_kind=_kind([court.groups[members[k].group].owner.title for k in rest], unknown_um),
+        unknown_kind=_kind(court, selected, unknown_um),
         gap=Gap(
-            seen.rms(joint.before, keep), seen.rms(after, keep), _length(seen, keep, floor.sigma_um),
+            seen.rms(joint.before, keep), seen.rms(joint.after, keep), noise_um,
             seen.rms(held.without, known), seen.rms(held.with_all, known),
         ),
         floor=floor,
         machine=machine if any(added) else None,
         patterns=tuple(gapmap.patterns(ground, sigma)),
         clustering=(
-            gapmap.clustering(ground, joint.before, scaled(seen)), gapmap.clustering(ground, after, scaled(seen)),
+            gapmap.clustering(ground, joint.before, scaled(seen)), gapmap.clustering(ground, joint.after, scaled(seen)),
         ),
         outlying=outlying,
         p_lack=noise.lack_of_fit(floor, joint.before[keep], parameters),
         p_left=p_left,
         view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
-        before=joint.before, after=after, court=court,
-        proposal=_proposal(court, selected, named[0], joint, sigma) if named else None,
+        before=joint.before, after=joint.after, court=court,
+        proposal=_proposal(court, selected, joint, sigma) if told else None,
     )  # fmt: skip
 
 
-def _proposal(
-    court: Court, selected: Selected, first: tuple[str, int], joint: addition.Joint, sigma: float
-) -> next_poses.Proposal | None:
+def _proposal(court: Court, selected: Selected, joint: addition.Joint, sigma: float) -> next_poses.Proposal | None:
     """Poses that tell the first name from those that come near it."""
-    name, k = first
-    runners = {n: odds for n, odds in selected.runners[name].items() if n not in UNNAMED}
+    name = selected.named[0]
+    runners = selected.runners[name]
     reach = ALIKE if any(runners[n] > selected.odds[name] - ALIKE for n in runners) else NEAR
     near = [n for n in sorted(runners, key=lambda n: -runners[n]) if runners[n] > selected.odds[name] - reach]
     owners = {group.owner.name: group.owner for group in court.groups}
@@ -234,16 +250,32 @@ def _proposal(
     rivals = [evidence.best(court.forms[n]) for n in near]
     chosen = court.groups[selected.members[name].group]
     pairs = [(court.groups[r.group], r.size) for r in rivals]
-    return next_poses.propose(court, chosen, joint.numbers[k], pairs, sigma)
+    return next_poses.propose(court, chosen, joint.numbers[0], pairs, sigma)
 
 
-def _kind(titles: Sequence[str], unknown_um: float) -> str:
+def _nameless(court: Court, selected: Selected, keep: NDArray[np.bool_] | None = None) -> float:
+    """How much of what the names leave something without a name explains, rms um."""
+    if not selected.unnamed:
+        return 0.0
+    told, every = [selected.members[name] for name in selected.named], list(selected.members.values())
+    share = _share(court, every)
+    left = [court.background.view.rms(addition.fitted(court, each, share).after, keep) for each in (told, every)]
+    return float(np.sqrt(max(left[0] ** 2 - left[1] ** 2, 0.0)))
+
+
+def _share(court: Court, members: Sequence[Member]) -> float:
+    return addition.likeliest_share(court.heard(members, among=range(0)).null)
+
+
+def _kind(court: Court, selected: Selected, unknown_um: float) -> str:
+    titles = [court.groups[selected.members[name].group].owner.title for name in selected.unnamed]
     return " and ".join(titles) or ("something that follows no pattern that was looked for" if unknown_um else "")
 
 
-def _sigma(court: Court, selected: Selected, share: float) -> float:
+def _sigma(court: Court, selected: Selected) -> float:
     """Noise of one value, um, with the members there."""
-    y, _, _ = court.whitened(share, list(selected.members.values()))
+    members = list(selected.members.values())
+    y, _ = court.whitened(_share(court, members), members)
     freedom = court.background.freedom
     return court.background.sigma * float(np.sqrt((y @ y + freedom) / (len(y) + freedom)))
 
@@ -253,9 +285,12 @@ def _length(seen: View, keep: NDArray[np.bool_], sigma: float) -> float:
     return seen.rms(np.where(seen.row >= 0, sigma * seen.relative, 0.0), keep)
 
 
-def _verdict(findings: Sequence[Finding], unknown_um: float) -> str:
+def _verdict(findings: Sequence[Finding], unknown_um: float, told_um: float, floor: noise.Floor, length: float) -> str:
+    """Without repeats a smooth rest may as well be the part's or the instrument's: only a large one decides."""
+    doubtful = floor.source == "neighbours"
+    decides = unknown_um > (max(EXCESS_UM, length) if doubtful else EXCESS_UM)
     if not findings:
-        return UNKNOWN if unknown_um > 0 else NOTHING
-    if unknown_um >= MOSTLY * max(each.size_um for each in findings):
+        return UNKNOWN if decides else NOTHING
+    if decides and unknown_um >= (told_um if doubtful else MUCH * told_um):
         return UNKNOWN
     return AMBIGUOUS if any(each.aliases for each in findings) else FOUND

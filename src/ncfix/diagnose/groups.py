@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.diagnose.catalogue import Candidate
-from ncfix.diagnose.view import View
+from ncfix.diagnose.view import HARDLY, View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
 
@@ -52,8 +52,10 @@ def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
     basis = orthonormal(view.base / view.relative[:, None])
     groups: list[Group] = []
     invisible = []
-    for candidate in candidates:
-        design = view.design(candidate.effects)
+    every = view.design([effect for candidate in candidates for effect in candidate.effects])
+    ends = np.cumsum([0, *(sum(effect.basis.size for effect in each.effects) for each in candidates)])
+    for candidate, start, stop in zip(candidates, ends[:-1], ends[1:], strict=True):
+        design = every[:, start:stop]
         forms = [
             form for loading in candidate.loadings if (form := _form(view, candidate, loading, design)) is not None
         ]
@@ -63,6 +65,20 @@ def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
         if not seen:
             invisible.append((candidate, max(shares, default=0.0)))
     return Gathered(tuple(groups), tuple(invisible))
+
+
+def apart(view: View, columns: Array, named: Sequence[Group]) -> Array:
+    """Columns without what constants that the machine file lacks would show: that is left to those."""
+    constants = [group.columns for group in named if group.owner.constant]
+    if not constants:
+        return columns
+    lacking = np.concatenate(constants, axis=1)
+    free = np.concatenate([view.base, lacking], axis=1) / view.relative[:, None]
+    size = np.linalg.norm(free, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    shares = np.linalg.lstsq(free / size, columns / view.relative[:, None], rcond=HARDLY)[0] / size[:, None]
+    rest: Array = columns - lacking @ shares[view.base.shape[1] :]
+    return rest
 
 
 def _form(view: View, candidate: Candidate, loading: Array, design: Array) -> Group | None:

@@ -12,6 +12,14 @@ from ncfix.diagnose.background import Background
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array, groups
 
+TAILS = 2.0
+"""Variance of a standard deviation from repeats, times their freedom, over its square: Student's t with 5 degrees."""
+TRUSTED = 0.1
+"""How far a noise that was given may be off."""
+USUAL_UM = 1.0
+"""rms of the little of everything that all machines have."""
+ASTRAY = 5.0
+"""Standard deviations beyond which a repeat is not noise."""
 ENOUGH = 10
 """Degrees of freedom of repeats from which on they say something."""
 
@@ -42,6 +50,15 @@ def floor(view: View, ground: Background, sigma_um: float, keep: NDArray[np.bool
     return Floor(sigma_um, "neighbours", 0)
 
 
+def beyond(floor: Floor, noise_um: float, left_um: float) -> float:
+    """What is left beyond the noise and what machines have of everything, um rms.
+
+    Noise that comes from repeats with long tails is known to two standard deviations only, a given one to a tenth.
+    """
+    doubt = 2 * np.sqrt(TAILS / floor.freedom) if floor.freedom else TRUSTED
+    return float(np.sqrt(max(left_um**2 - (noise_um * (1 + doubt)) ** 2 - USUAL_UM**2, 0.0)))
+
+
 def repeats(view: View, keep: NDArray[np.bool_]) -> tuple[float, int]:
     """Sum of squares about the means of values taken at one commanded state one after another, and its freedom."""
     same = states(view)
@@ -53,8 +70,17 @@ def repeats(view: View, keep: NDArray[np.bool_]) -> tuple[float, int]:
         return 0.0, 0
     _, index = groups(keys)
     counts = np.bincount(index)
-    mean = np.bincount(index, values) / counts
-    return float(((values - mean[index]) ** 2).sum()), int((counts - 1).sum())
+    apart = (values - np.bincount(index, values)[index] / counts[index]) * np.sqrt(counts / np.maximum(counts - 1, 1))[
+        index
+    ]
+    several = counts[index] > 1
+    if not several.any():
+        return 0.0, 0
+    usual = 1.4826 * float(np.median(np.abs(apart[several])))
+    kept = several & (np.abs(apart) <= ASTRAY * usual)
+    counts = np.bincount(index[kept], minlength=len(counts))
+    mean = np.bincount(index[kept], values[kept], minlength=len(counts)) / np.maximum(counts, 1)
+    return float(((values - mean[index])[kept] ** 2).sum()), int(np.maximum(counts - 1, 0).sum())
 
 
 def states(view: View) -> list[int]:

@@ -38,11 +38,18 @@ def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses:
     """See `Machine.design`; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
     by_joint = joint_jacobian(axes, tool, poses)
+    responses: dict[object, Array] = {}
+    curves: dict[object, Array] = {}
     parts = [np.empty((6, 0, n))]
     for effect in effects:
-        twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
-        response = np.einsum("ijn,jn->in", by_joint[:, joint_index(axes, effect)], twist)
-        parts.append(response[:, None] * functions(axes, effect, poses))
+        seen = (effect.name, effect.reference, effect.carried)
+        course = replace(effect, name=f"EX{effect.joint}", coefficients=())
+        if seen not in responses:
+            twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
+            responses[seen] = np.einsum("ijn,jn->in", by_joint[:, joint_index(axes, effect)], twist)
+        if course not in curves:
+            curves[course] = functions(axes, effect, poses)
+        parts.append(responses[seen][:, None] * curves[course])
     return np.concatenate(parts, axis=1)
 
 

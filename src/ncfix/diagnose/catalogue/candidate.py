@@ -36,6 +36,7 @@ class Candidate:
     remedy    what can be done about it besides compensation, in words
     grows     it belongs to the measurement: what stands on the table expands; `effects` then only say what drives it
     lead      how many of the effects are the effect itself, the rest only comes with it; 0: all
+    constant  a constant of the machine that its file does not have: it goes before all that is not one
     """
 
     name: str
@@ -48,6 +49,7 @@ class Candidate:
     remedy: str = ""
     grows: bool = False
     lead: int = 0
+    constant: bool = False
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,9 @@ def _curves(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     for component in LETTERS + TURNS:
         name = f"E{component}{axis.name}"
         parts = zero([Effect(each, (), shapes.spline(), **span) for each in (name, *swept(component, axis))])
-        smooth = [shapes.smooth(length) for length in shapes.SMOOTH]
-        loadings = tuple(stacked(form, *[PIVOT * form] * (len(parts) - 1)) for form in smooth)
+        shift, tilt = ([shapes.bent(length, powers) for length in shapes.SMOOTH] for powers in (2, 1))
+        own = shift if component in LETTERS else tilt
+        loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
         yield Candidate(
             name, catalogue.title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN
         )

@@ -23,14 +23,16 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
                 title = catalogue.title(name, axis)
                 remedy = "re-measure where the axis lies"
                 effect = zero([Effect(name, ())])
-                yield Candidate(name, title, axis.name, f"{axis.name} location", effect, ONE, (), remedy)
+                yield Candidate(name, title, axis.name, f"{axis.name} location", effect, ONE, (), remedy, constant=True)
     for axis in reach.linear:
         own = along(axis)
         name = f"E{LETTERS[own or 0]}{axis.name}"
         if own is not None and not any(_is_gain(effect, name) for effect in reach.machine.effects):
             gain = zero([Effect(name, (), Polynomial(degree=(1,)), **reach.scaled(axis))])
             title = f"scale of {axis.name}: positions too long or too short in proportion"
-            yield Candidate(f"scale {axis.name}", title, axis.name, f"{axis.name} geometry", gain, ONE, (), "")
+            yield Candidate(
+                f"scale {axis.name}", title, axis.name, f"{axis.name} geometry", gain, ONE, (), "", constant=True
+            )
 
 
 def _is_gain(effect: Effect, name: str) -> bool:

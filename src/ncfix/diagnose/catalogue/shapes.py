@@ -39,6 +39,17 @@ def smooth(length: float, low: float = -1.0, high: float = 1.0, pieces: int = PI
     return loading
 
 
+@lru_cache(maxsize=64)
+def bent(length: float, powers: int) -> Array:
+    """The same without its mean (`powers` 1), and without its slope too (2): those are constants of the machine."""
+    knots = np.asarray(spline().knots)
+    places = np.array([knots[i + 1 : i + 4].mean() for i in range(PIECES + 3)])
+    straight = np.linalg.qr(places[:, None] ** np.arange(powers))[0]
+    loading = smooth(length)
+    rest: Array = loading - straight @ (straight.T @ loading)
+    return rest
+
+
 def harmonics(count: int = 4) -> tuple[float, ...]:
     """Variances of cos and sin of the first orders."""
     return tuple(v for v in HARMONICS[:count] for _ in range(2))

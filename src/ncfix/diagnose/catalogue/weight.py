@@ -84,11 +84,23 @@ def _deflected(
 
 
 def _sloped(form: Array, factor: float) -> Array:
-    """The loading of [f, f', shifts of a foot elsewhere] for f with these columns of powers."""
+    """The loading of [f, f', shifts of a foot elsewhere] for f with these columns of powers.
+
+    The shifts are without mean and slope, which are constants of the machine: where an axis lies, and its gain.
+    """
     slope = np.zeros_like(form)
     slope[:-1] = factor * form[1:] * np.arange(1, len(form))[:, None]
-    both = np.concatenate([form, slope])
-    return stacked(both, FOOT * slope, FOOT * slope)
+    both = np.concatenate([_bent(form), slope])
+    return stacked(both, _bent(FOOT * slope), _bent(FOOT * slope))
+
+
+def _bent(form: Array) -> Array:
+    """Columns of powers without what is constant and straight over -1 ... 1."""
+    powers = np.arange(len(form))[:, None]
+    rest: Array = form.astype(np.float64)
+    rest[0] -= (form / (powers + 1))[0::2].sum(axis=0)
+    rest[1] -= (3 * form / (powers + 2))[1::2].sum(axis=0)
+    return rest
 
 
 def _nod(reach: Reach, axis: Axis) -> Iterator[Candidate]:
