@@ -35,9 +35,7 @@ CEC = "NC_CEC.INI"
 ROOM = 1.5
 """MD32720 as a multiple of the largest correction."""
 WORTH = 0.9
-"""Rotary axes keep their values if less than this share of what correcting them leaves at the tip is left then."""
-ENOUGH = 0.5
-"""Unless correcting them leaves (rms) less than this share of the target anyway."""
+"""Rotary axes keep their values if less than this share of what correcting them leaves at the worst is left then."""
 CHECKS = 1000
 
 
@@ -105,12 +103,8 @@ def _scheme(request: Request, settings: Settings) -> Scheme:
         return automatic(job, settings.rotary != "keep")
     keeping, turning = automatic(job, False), automatic(job, True)
     allowed = _largest(request, turning)[request.machine.rotary].max() <= request.machine.max_correction[1]
-    good = _left(turning) <= max(_left(keeping) / WORTH, ENOUGH * request.target)
+    good = turning.missed <= max(keeping.missed / WORTH, request.target)
     return turning if allowed and good else keeping
-
-
-def _left(scheme: Scheme) -> float:
-    return float(np.hypot(scheme.rest, scheme.dropped))
 
 
 def _largest(request: Request, scheme: Scheme) -> Array:
@@ -160,7 +154,9 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     products = sum(bool(table.multiply) for table in cec)
     yield f"Scheme {settings.scheme}: {len(cec)} tables of {settings.limits.tables}, {products} of them multiplied."
     if scheme.rest > request.target / 10:
-        yield f"{1e3 * scheme.rest:.2f} um rms of the correction cannot be said in this form and are left."
+        yield f"{1e3 * scheme.rest:.2f} um rms of the correction take three axes at once and are left."
+    if scheme.bound > request.target / 10:
+        yield f"No sums and products of pairs leave less than {1e3 * scheme.bound:.2f} um at the worst."
     if scheme.dropped > request.target / 10:
         yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
     yield from _turned(request, scheme)

@@ -16,6 +16,7 @@ import numpy as np
 from ncfix.machine import Machine, State
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array
+from ncfix.tables.minimax import Remainder, least_worst
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.scheme_curves import Sample, followed
 from ncfix.tables.scheme_layout import Layout, absorbed
@@ -23,7 +24,7 @@ from ncfix.tables.scheme_nodes import Line
 from ncfix.tables.scheme_parts import Face, Selection, needed
 from ncfix.tables.scheme_rotary import rotary_correction
 from ncfix.tables.scheme_tables import Corrections, Stage, by_way
-from ncfix.tables.separable import taken_apart, taken_apart_along
+from ncfix.tables.separable import Parts, taken_apart, taken_apart_along
 
 NODES = 8
 """Positions of each axis at which the correction is taken apart; fewer if there are more than five axes."""
@@ -34,7 +35,7 @@ ROTARY_SHARE = 3
 """Rotary axes get one table in so many, if tables are few."""
 SMALL = 0.1
 """Parts that are below this share of the target (rms) together are left out."""
-AGAINST_REST = 0.3
+AGAINST_REST = 0.15
 """So are parts that are below this share of what cannot be said anyway."""
 MERGED = 0.25
 """Share of what may be left out that may be lost each time by writing a function as a multiple of others."""
@@ -57,6 +58,7 @@ class Scheme:
 
     missed   the largest displacement that the tables lack at random poses, mm
     rest     rms of what sums and products of pairs cannot say, mm
+    bound    what no sums and products of pairs could leave less than at the worst, mm
     dropped  rms of what was left out because it is small or for want of tables, mm
     """
 
@@ -64,6 +66,7 @@ class Scheme:
     missed: float
     rest: float
     dropped: float
+    bound: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +90,7 @@ def automatic(job: Job, rotary: bool = True) -> Scheme:
         most -= used
     moved, _ = _staged(job, linear_axes(job.machine), moving(job, done.tables), 1.0, most)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
-    return Scheme(tables, moved.missed, moved.rest, moved.dropped)
+    return Scheme(tables, moved.missed, moved.rest, moved.dropped, moved.bound)
 
 
 def turning(job: Job) -> Corrections:
@@ -109,45 +112,53 @@ def moving(job: Job, done: Compensation) -> Corrections:
 
 def _staged(job: Job, outputs: Sequence[int], correct: Corrections, scale: float, most: int) -> tuple[Scheme, int]:
     """The tables of some axes, and how many of the `most` they take."""
-    nodes, lines = coarse_nodes(job.space), lines_of(job)
-    selection = _parts(job, outputs, correct, scale, nodes)
+    lines = lines_of(job)
+    nodes = coarse_nodes(job.space, [line.modulo for line in lines])
+    selection, left = _parts(job, outputs, correct, scale, nodes)
     selection.drop_small(selection.tolerance / MERGED)
     allowed, used = most, most + 1
     while used > most:
         selection.fit_into(allowed)
-        layouts = _followed(selection, nodes, lines, correct, scale)
+        layouts = _followed(selection, left, lines, correct, scale)
         used = sum(needed(output, each, selection.free) for output, each in layouts.items())
         allowed -= used - most
     unscaled = {output: [one.scaled(1 / scale) for one in each] for output, each in layouts.items()}
-    tables, missed = Stage(lines, unscaled, correct, scale).settled(max(job.target, selection.rest), job.limits.points)
-    return Scheme(tables, missed, selection.rest, selection.lost), used
+    stage = Stage(lines, unscaled, correct, scale)
+    tables, missed = stage.settled(max(job.target, AGAINST_REST * left.rms), job.limits.points, left.largest)
+    return Scheme(tables, missed, left.rms, selection.lost, left.bound), used
 
 
 def _followed(
-    selection: Selection, nodes: Sequence[Array], lines: Sequence[Line], correct: Corrections, scale: float
+    selection: Selection, left: Remainder, lines: Sequence[Line], correct: Corrections, scale: float
 ) -> dict[int, list[Layout]]:
     """The layouts with their functions over all positions of the axes; what they need may show there only."""
     known = {output: selection.layouts(output) for output in selection.outputs}
     fine = [line.fine for line in lines]
-    found = followed(Sample.of(nodes), known, fine, by_way(lambda q, direction: scale * correct(q, direction)))
+    evaluate = by_way(lambda q, direction: scale * correct(q, direction))
+    found = followed(Sample.of(left.nodes), known, fine, evaluate, left.along)
     return {output: [absorbed(one, selection.tolerance) for one in each] for output, each in found.items()}
 
 
-def _parts(job: Job, outputs: Sequence[int], correct: Corrections, scale: float, nodes: Sequence[Array]) -> Selection:
-    """The corrections of some axes, taken apart."""
+def _parts(
+    job: Job, outputs: Sequence[int], correct: Corrections, scale: float, nodes: Sequence[Array]
+) -> tuple[Selection, Remainder]:
+    """The corrections of some axes, taken apart, and what no pair can say of them, left where it hurts least."""
+    enough = np.inf if job.machine.rotary[list(outputs)].any() else SMALL * job.target
     counts = [len(line) for line in nodes]
     q = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, len(nodes))
     evaluate = by_way(correct)
-    found = {}
+    found: dict[Face, Parts] = {}
     for way in (None, *ways_that_matter(job.machine)):
         values = scale * evaluate(q, way).reshape(*counts, len(outputs))
+        if way is None:
+            left = least_worst(nodes, [line.modulo for line in lines_of(job)], values, enough)
+            values = values - left.values
         for number, output in enumerate(outputs):
             face: Face = (output, way)
             one = values[..., number]
             found[face] = taken_apart(one) if way is None else taken_apart_along(one, way)
     free = frozenset(outputs) if job.limits.own_free else frozenset[int]()
-    rest = np.sqrt(sum(parts.rest**2 for parts in found.values()))
-    return Selection(found, MERGED * max(SMALL * job.target, AGAINST_REST * float(rest)), free)
+    return Selection(found, MERGED * max(SMALL * job.target, AGAINST_REST * left.rms), free), left
 
 
 def ways_that_matter(machine: Machine) -> list[int]:
@@ -161,11 +172,18 @@ def ways_that_matter(machine: Machine) -> list[int]:
     return sorted(found)
 
 
-def coarse_nodes(space: Array) -> list[Array]:
-    """Where corrections are taken apart: evenly over each axis, but not so evenly that a screw's period could hide."""
+def coarse_nodes(space: Array, turns: Sequence[bool]) -> list[Array]:
+    """Where corrections are taken apart: evenly over each axis, but not so evenly that a screw's period could hide.
+
+    The ends are among them, since most is left there; of axes that repeat (`turns`) there are none.
+    """
     count = min(NODES, int(GRID ** (1 / len(space)) + 1e-9))
     shaken = np.arange(count) + 0.5 + 0.3 * (np.mod(np.arange(1, count + 1) * 0.618034, 1.0) - 0.5)
-    return [low + (high - low) * shaken / count for low, high in space.tolist()]
+    stretched = (shaken - shaken[0]) / (shaken[-1] - shaken[0])
+    return [
+        low + (high - low) * (shaken / count if turn else stretched)
+        for (low, high), turn in zip(space.tolist(), turns, strict=True)
+    ]
 
 
 def lines_of(job: Job) -> tuple[Line, ...]:

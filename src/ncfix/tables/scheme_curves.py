@@ -83,13 +83,21 @@ Layouts = Mapping[int, Sequence[Layout]]
 """Output -> its layouts. The outputs are in the order in which `Evaluate` has them."""
 
 
-def followed(sample: Sample, layouts: Layouts, fine: Sequence[Array], evaluate: Evaluate) -> dict[int, list[Layout]]:
+Left = Callable[[int, Array, NDArray[np.intp]], Array]
+"""What no layout is to say, without direction, at positions of an axis and nodes of the others: `Remainder.along`."""
+
+
+def followed(
+    sample: Sample, layouts: Layouts, fine: Sequence[Array], evaluate: Evaluate, left: Left | None = None
+) -> dict[int, list[Layout]]:
     """The same layouts with their functions at the positions `fine` of each axis."""
     curves: dict[tuple[int, int | None], Curves] = {}
     for axis, positions in enumerate(fine):
         concerned = [(output, one) for output, each in layouts.items() for one in each if axis in one.axes]
         for way in dict.fromkeys(layout.way for _, layout in concerned):
             values = evaluate(sample.poses(axis, positions), way).reshape(len(positions), len(sample.places), -1)
+            if left is not None and way is None:
+                values = values - left(axis, positions, sample.places)
             for column, output in enumerate(layouts):
                 for layout in (one for key, one in concerned if key == output and one.way == way):
                     found = sample.curves(layout, axis, values[:, :, column])

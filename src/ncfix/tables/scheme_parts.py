@@ -8,6 +8,10 @@ from dataclasses import dataclass, field
 from ncfix.tables.scheme_layout import Layout, absorbed, arranged, tables_of
 from ncfix.tables.separable import Part, Parts
 
+MANY_MORE = 12
+"""Tables than there are: down to so many, parts are left out by their size alone."""
+TRIED = 12
+"""Of the parts that are left out, how many are tried in place of others."""
 Face = tuple[int, int | None]
 """(output, way): the correction of an axis, and the axis with whose direction it changes sign, or None."""
 Key = tuple[Face, int]
@@ -82,9 +86,10 @@ class Selection:
     def fit_into(self, tables: int) -> None:
         """Keep what takes off most with no more than `tables`.
 
-        Parts are taken away, cheapest first, and put together, most worth first; then each part that is left out is
+        Parts are taken away, cheapest first, and put together, most worth first; then the largest that are left out are
         tried in the better of the two, in place of others.
         """
+        self._leave_smallest(tables + MANY_MORE)
         whole = self.kept
         self._thin(tables)
         best = self.kept, self.silent, self.lost
@@ -92,11 +97,18 @@ class Selection:
             return
         self._grow(whole, tables)
         best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
-        for key in sorted(whole - best[0], key=lambda key: -self.part(key).size):
+        for key in sorted(whole - best[0], key=lambda key: -self.part(key).size)[:TRIED]:
             self.kept, self.silent = best[0] | {key}, best[1]
             self._thin(tables)
             best = min(best, (self.kept, self.silent, self.lost), key=lambda found: found[2])
         self.kept, self.silent, _ = best
+
+    def _leave_smallest(self, tables: int) -> None:
+        """Leave out the smallest parts until no more than `tables` are taken: they will not come back."""
+        for key in sorted(self.kept, key=lambda key: self.part(key).size):
+            if self.total <= tables:
+                return
+            self.kept -= {key}
 
     def _thin(self, tables: int) -> None:
         """Leave out what costs least for the tables that it frees, until no more than `tables` are taken."""

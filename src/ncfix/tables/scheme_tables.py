@@ -51,13 +51,16 @@ class Stage:
     correct: Corrections
     scale: float = 1.0
 
-    def settled(self, target: float, points: int) -> tuple[Compensation, float]:
-        """Tables that miss at most `target` (mm) if that many points allow it, and what they miss."""
+    def settled(self, target: float, points: int, left: float = 0.0) -> tuple[Compensation, float]:
+        """Tables that miss at most `target` (mm) if that many points allow it, and what they miss.
+
+        left  mm that they miss anyway: it need not get better than that
+        """
         parts = sum(len(one.sums) + len(one.stars) for each in self.layouts.values() for one in each)
         limit = target / np.sqrt(max(parts, 1)) / self.scale
         best = self._tried(limit, points)
         for _ in range(ROUNDS):
-            if best[1] <= target:
+            if best[1] <= max(target, left):
                 break
             limit /= 2
             tried = self._tried(limit, points)
