@@ -97,7 +97,9 @@ def _feeds(original: Canon, fixed: Canon, segments: Segments) -> Iterator[tuple[
                 yield int(original.line[k]), f"feed {wanted[k]:g} became {other:g}"
         elif min(wanted[k], *(given[j] for j in pieces)) > 0:
             time, total = old[k] / pace[k], sum(new[j] / paces[j] for j in pieces)
-            if abs(total - time) > time * (FEED_SLACK + sum(PRINTED / given[j] for j in pieces)):
+            allowed = time * (FEED_SLACK + sum(PRINTED / given[j] for j in pieces))
+            detour = abs(sum(new[j] for j in pieces) - old[k]) / pace[k]  # of motions that are hardly any
+            if abs(total - time) > allowed + detour:
                 yield (
                     int(original.line[k]),
                     f"{time * 60:g} s for {'a turn' if turns[k] else 'inverse time'}: {total * 60:g} s",

@@ -99,7 +99,8 @@ class _Matcher:
         for j in range(self.j, min(self.j + LOOKAHEAD, len(self.fixed))):
             if not self.same_kind(k, j):
                 break
-            left = j == self.j and untouched(self.original, self.fixed, k, j)
+            alike = j == self.j and self.original.kind[k] == self.fixed.kind[j]
+            left = bool(alike and untouched(self.original, self.fixed, k, j))
             if self.arrives(k, j) and not (left and self.by_rule[k]) and self.went_round(k, j, progress):
                 return self.take(k, self.nearest(k, j), Fate.COMPENSATED)
             if left:

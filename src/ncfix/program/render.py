@@ -79,6 +79,8 @@ class BlockRenderer:
                 self._absent_axis(position, column, end[column])
             else:
                 self._present_axis(position, column, end[column], word)
+        if np.isfinite(self.target.original_centre).any() and not (self.target.arc or self.layout.axes or self.added):
+            self.added += [self.layout.blank + word for word in self._named(position)]
         self._arc_words(base, position)
         self._level()
         if self.dragged:
@@ -263,6 +265,15 @@ class BlockRenderer:
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + (self.layout.blank).join(words))
         return position
+
+    def _named(self, position: FloatArray) -> list[str]:
+        """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
+        named = [(column, letter) for column, letter in self.columns if np.isfinite(position[column])]
+        return [
+            self._cased(letter)
+            + f"{0.0 if self.target.incremental else position[column]:.{self.target.decimals[column]}f}"
+            for column, letter in named[:1]
+        ]
 
     def _has_words(self, column: int) -> bool:
         """Whether an axis is told where to go by a word of its own."""
