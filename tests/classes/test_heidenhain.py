@@ -60,7 +60,8 @@ ARCS = [
     case("chamfer", "L X+20 F100\nCHF 2\nL Y+20", L4=R, L6=R),
     case("cutter compensation", "L X+5 RL F100\nL X+20\nL Y+20\nL X+30 R0", L4=R, L5=R, L6=R, L7=R),
     case("approach", "APPR LCT X+20 Y+20 R5 RR F100\nL X+30\nDEP LCT X+40 Y+40 R5", L4=R, L5=R, L6=R),
-    case("free contour", "FL X+5 AN+30\nL X+5 Y+5 Z+5 FMAX", L4=N, L5=R),
+    case("free contour", "FL X+5 AN+30\nL X+5 Y+5 Z+5 FMAX", L3=N, L4=N, L5=R),
+    case("an arc to a value of the control", "CC X+11 Y+2\nC X+Q50 Y+12 DR-\nL X+5 Y+5 Z+5 FMAX", L3=N, L5=N, L6=R),
 ]
 FRAMES = [
     case("datum shift", "CYCL DEF 7.0 D\nCYCL DEF 7.1 X+3\nCYCL DEF 7.2 IY+2\nL X+5 F100", L7=R),

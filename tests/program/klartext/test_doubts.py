@@ -10,7 +10,7 @@ from ncfix.program.klartext.poles import is_relied_on
 from ncfix.program.moves import Rule
 from program.klartext.test_following import reasons
 from program.klartext.test_writing import lines
-from program.klartext.tnc import ends, follow
+from program.klartext.tnc import ends, fixed, follow
 
 
 def test_turns_are_taken_off_before_the_motion() -> None:
@@ -97,3 +97,11 @@ def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
 )
 def test_what_relies_on_a_pole(text: str, relied_on: bool) -> None:
     assert is_relied_on(("CR X+1 R5 DR+\n" + text).encode(), 12) == relied_on
+
+
+def test_a_free_contour_begins_where_it_was_meant_to() -> None:
+    body = "L X+100 Y+100 Z+0 FMAX\nL X+50 Y+20 Z+0 RL F500\nFC DR- R18 CLSD+ CCX+20 CCY+30\nFLT\nL X+5 Y+5 Z+0 R0 FMAX"
+    report = fixed(body).report
+    assert [refusal.line for refusal in report.refused] == [3, 4, 5]
+    assert "FK" in report.refused[1].reason
+    assert "starts from its end" in report.refused[0].reason

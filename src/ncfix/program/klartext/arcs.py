@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from ncfix.program.klartext.control import Control
-from ncfix.program.klartext.step import Step, with_increments
+from ncfix.program.klartext.step import Step, somewhere, with_increments
 from ncfix.program.klartext.targets import (
     BAD_POLE,
     PLANE_OF,
@@ -208,5 +208,8 @@ def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
     """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
     axes = step.words.axes or 3
     target, unknown = command_of(control, where, axes)
+    if step.words.runtime and not step.words.incremental:
+        somewhere(control, axes, target, unknown, reason)
+        return
     control.move(Kind.FEED, axes, target, unknown, 10, refusal=reason)
     control.path.tangent = None

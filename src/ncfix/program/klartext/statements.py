@@ -8,11 +8,13 @@ from ncfix.program.klartext.codes import tip_control
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.patterns import pattern_of
+from ncfix.program.klartext.step import somewhere
 from ncfix.program.rs274.faults import Fault
 
 PROBING = "probing"
 AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
-FREE_CONTOUR = "free contour programming (FK)"
+FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
+LOST = "where the axis {} stands after a free contour (FK) the control works out"
 ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control itself leave results."""
@@ -46,7 +48,7 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
     elif found := STOPPING.match(text):
         raise Fault(ERROR, f"the program stops with error {found['number']}", "its own checks refuse its parameters")
     elif FREE.match(text):
-        control.refuse_here(FREE_CONTOUR)
+        free_contour(control)
     elif re.match(r"TCH\s*PROBE", text, re.IGNORECASE):
         probe(control)
     elif TRANSFORMATION.match(text) or CHOSEN.match(text):
@@ -59,6 +61,11 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
         control.cycle.places = pattern_of(text, control.scope.parameters)
     elif READING.match(text):
         read_values(control, text)
+
+
+def free_contour(control: Control) -> None:
+    """An element of a free contour: as for an arc about a centre of its own, it matters where the one before ends."""
+    somewhere(control, 0, control.position[:], dict.fromkeys(control.machine, LOST), FREE_CONTOUR)
 
 
 def read_values(control: Control, text: str) -> None:

@@ -7,6 +7,11 @@ from dataclasses import dataclass
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.targets import Words
 from ncfix.program.moves import Kind
+from ncfix.program.rs274.builder import Arc
+from ncfix.program.rs274.control import Unknown
+from ncfix.program.rs274.coordinates import Vector, X, Y
+
+IN_PLANE = 1 << X | 1 << Y
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +38,15 @@ class Step:
 def with_increments(control: Control, on: bool) -> None:
     """Whether the words of the next motion count from where it begins."""
     control.modal.incremental = on
+
+
+def somewhere(control: Control, axes: int, target: Vector, unknown: Unknown, reason: str) -> None:
+    """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
+    normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
+    control.modal.arc_absolute = True
+    control.move(Kind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0))
+    control.modal.arc_absolute = False
+    control.path.tangent = None
 
 
 def refuse(control: Control, reason: str) -> None:
