@@ -9,6 +9,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import INSTANT
+from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import offsets, owners, places, sums
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
@@ -30,6 +31,7 @@ class Plan:
     deviation  (n,) mm: how far the tip was found to leave the intended path, before rounding; 0 where not looked at
     oriented   (n,) the tool direction is corrected too, without damping or limits
     findings   what is wrong, by motion; `pieces.kept` tells what was left as it was
+    known      what is known of the ends of motions
     """
 
     pieces: Pieces
@@ -37,6 +39,7 @@ class Plan:
     deviation: Array
     oriented: Mask
     findings: tuple[Finding, ...]
+    known: Known | None = None
 
 
 def untouched(moves: Moves, kept: Mask) -> Plan:

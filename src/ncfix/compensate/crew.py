@@ -14,6 +14,7 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.known import Known
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.settle import Agreed, Before, agree
 from ncfix.compensate.verify import PathError, path_error
@@ -39,9 +40,11 @@ class Task:
         """The plan of a part."""
         return agree(moves, self.machine, self.dialect, self.options, before)
 
-    def errors(self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask) -> PathError:
+    def errors(
+        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
+    ) -> PathError:
         """The tip errors of motions `rows` (n,) before and after; without those of each motion."""
-        found = path_error(self.machine, moves, pieces, start, state=state, rows=rows, tilts=False)
+        found = path_error(self.machine, moves, pieces, start, state=state, rows=rows, tilts=False, known=known)
         nothing = np.empty(0)
         return PathError(found.before, found.after, nothing, nothing, found.samples, found.way)
 
@@ -60,9 +63,11 @@ class Crew:
         """Begin the plan of a part."""
         return lambda: self.task.agree(moves, before)
 
-    def errors(self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask) -> Later[PathError]:
+    def errors(
+        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
+    ) -> Later[PathError]:
         """Begin to find out tip errors."""
-        return lambda: self.task.errors(moves, pieces, start, state, rows)
+        return lambda: self.task.errors(moves, pieces, start, state, rows, known)
 
 
 @dataclass(slots=True)
@@ -76,10 +81,12 @@ class Workers(Crew):
         assert self.pool is not None
         return self.pool.submit(_agree, moves, before).result
 
-    def errors(self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask) -> Later[PathError]:
+    def errors(
+        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
+    ) -> Later[PathError]:
         """Begin to find out tip errors."""
         assert self.pool is not None
-        return self.pool.submit(_errors, moves, pieces, start, state, rows).result
+        return self.pool.submit(_errors, moves, pieces, start, state, rows, known).result
 
 
 @contextmanager
@@ -113,6 +120,6 @@ def _agree(moves: Moves, before: Before | None) -> Agreed:
     return _task.agree(moves, before)
 
 
-def _errors(moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask) -> PathError:
+def _errors(moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None) -> PathError:
     assert _task is not None
-    return _task.errors(moves, pieces, start, state, rows)
+    return _task.errors(moves, pieces, start, state, rows, known)

@@ -29,12 +29,14 @@ class Ends:
     failed    (n,) motions that should be corrected and cannot
     oriented  (n,) the tool direction is corrected too, without damping or limits
     findings  why they cannot
+    before    (n,) mm: how far the tip is off without a correction; NaN where that is not known
     """
 
     wanted: Array
     failed: Mask
     oriented: Mask
     findings: tuple[Finding, ...]
+    before: Array
 
 
 def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
@@ -52,6 +54,9 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
     failed, oriented = np.zeros(len(moves), dtype=bool), np.zeros(len(moves), dtype=bool)
     failed[rows[~fit]] = failed[good[~result.converged]] = True
     oriented[good] = result.oriented
+    before = np.full(len(moves), np.nan)
+    if result.before is not None:
+        before[good[result.converged]] = result.before[result.converged]
     wanted[failed] = moves.end[failed]
     troubles = (
         _finding("NCF408", rows[~named], "the end of this motion is not known in all axes"),
@@ -63,7 +68,7 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
         ),
         _finding("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
     )
-    return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)))
+    return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)), before)
 
 
 def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correction:
@@ -77,10 +82,14 @@ def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correc
     parts = []
     for part in slices(len(rows), BATCH):
         parts.append(strategy.solve(intent.machine, q[part], intent.states(rows[part], ones[part])))
+    if len(parts) == 1:
+        return parts[0]
+    before = [part.before for part in parts if part.before is not None]
     return Correction(
         np.concatenate([part.q for part in parts]),
         np.concatenate([part.converged for part in parts]),
         np.concatenate([part.oriented for part in parts]),
+        np.concatenate(before) if len(before) == len(parts) else None,
     )
 
 

@@ -124,7 +124,7 @@ def _errors(machine: Machine, settled: Settled) -> PathError:
     """Tip errors before and after, with the numbers as the control will understand them."""
     emission = settled.emission
     pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
-    return path_error(machine, settled.moves, pieces, emission.start, tilts=False)
+    return path_error(machine, settled.moves, pieces, emission.start, tilts=False, known=settled.plan.known)
 
 
 def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:

@@ -9,8 +9,9 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import largest, owners, slices
-from ncfix.compensate.sampling import interior, merged
+from ncfix.compensate.sampling import interior, merged, passed
 from ncfix.compensate.segments import Segments
+from ncfix.machine.aim import CLOSE
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""
@@ -18,6 +19,8 @@ FIRST = 2
 """Samples for each time that the error may bend, at a first look."""
 LEAST = 9
 """Fewest samples at a second look."""
+CORNER = 3**0.5
+"""How far the linear axes together may take the tip, per mm of their norm: three that are no more than parallel."""
 BATCH = 100_000
 """Samples worked on at a time."""
 
@@ -27,15 +30,50 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
 
     uneasy  (n,) motions that may not begin where they should: they are looked at there too
 
-    Short motions get one sample in the middle at first. Those that are off by over half of the tolerance are looked
-    at again, as closely as the error model may bend.
+    Motions that cannot be off by over half of the tolerance, by a bound, need no look. Short ones of the others get one
+    sample in the middle at first. Those that are off by so much are looked at again, as closely as the error model may
+    bend.
     """
-    worst = _look(intent, real, rows, uneasy, FIRST, 1)
+    worst = bounds(intent, real, rows, uneasy)
+    unknown = np.flatnonzero(~(worst <= SURE * tolerance))
+    worst[unknown] = _look(intent, real, rows[unknown], uneasy, FIRST, 1)
     doubtful = np.flatnonzero(~(worst <= SURE * tolerance))
     if doubtful.size:
         closer = _look(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
         worst[doubtful] = np.maximum(worst[doubtful], closer)
     return worst
+
+
+def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
+    """What the deviation along motions `rows` (k,) does not exceed, mm; inf where that is not known.
+
+    Known it is for straight motions from one corrected end to the next. The tip's error leaves its chord by its bow;
+    what is added to the linear axes goes straight from end to end, but turns with the workpiece meanwhile.
+    """
+    bow = intent.machine.bow
+    most = np.full(len(rows), np.inf)
+    plain = ~(intent.curved[rows] | uneasy[rows] | _passes_kink(intent, real, rows))
+    if bow is None or intent.state.inputs or not plain.any():
+        return most
+    chosen = slice(None) if plain.all() else plain
+    on = rows[chosen]
+    start, end, rotary = real.start[on], real.end[on], intent.machine.rotary
+    farthest = np.maximum(np.abs(start).max(axis=0), np.abs(end).max(axis=0))
+    length = float(np.abs(intent.lengths(on)).max())
+    least, angle = bow.of(np.abs(end - start), farthest, length, rotary)
+    before, after = (start - intent.moves.start[on])[:, ~rotary], (end - intent.moves.end[on])[:, ~rotary]
+    sizes = [np.sqrt(np.einsum("ij,ij->i", each, each)) for each in (before, after, after - before)]
+    turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
+    most[chosen] = least + CORNER * turned / 8 + CLOSE
+    return most
+
+
+def _passes_kink(intent: Intent, real: Segments, rows: Index) -> Mask:
+    """Motions (k,) on the way of which the error has a kink or a jump."""
+    found = np.zeros(len(rows), dtype=bool)
+    if intent.kinks:
+        found[passed(intent, real.start[rows], real.end[rows])[0]] = True
+    return found
 
 
 def _look(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int) -> Array:

@@ -60,7 +60,7 @@ def not_a_number(written: Written) -> Finding:
 def outside_calibrated(written: Written) -> Finding:
     """NCF405: motions that leave the range of an axis as they are programmed."""
     text = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
-    return _of_axes(written, "NCF405", text, _programmed_excess(written))
+    return _of_axes(written, "NCF405", text, programmed_excess(written))
 
 
 def over_travel(written: Written) -> Finding:
@@ -69,19 +69,21 @@ def over_travel(written: Written) -> Finding:
     On the limit is within.
     """
     pieces = written.pieces
-    corrected = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
     each = np.arange(len(pieces))
     curved = written.segments.arc | written.intent.moves.tcp[pieces.move]
-    np.maximum.at(corrected, pieces.move, excess(written.intent.machine, written.joints, each, curved))
-    beyond = np.where(_programmed_excess(written) > FUZZ, -np.inf, corrected)
+    found = excess(written.intent.machine, written.joints, each, curved, written.done)
+    beyond = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
+    if (found > FUZZ).any():
+        np.maximum.at(beyond, pieces.move, found)
+        beyond[programmed_excess(written) > FUZZ] = -np.inf
     return _of_axes(written, "NCF404", "the correction takes axis {axis} {value:.4g} {unit} beyond its range", beyond)
 
 
 def too_large(written: Written) -> Finding:
     """NCF406: corrections above the machine's `max_correction`: the linear axes together, each rotary axis alone."""
     machine = written.intent.machine
-    shift = written.correction()
-    linear = np.linalg.norm(shift[:, ~machine.rotary], axis=1) / machine.max_correction[0]
+    shift = written.correction
+    linear = _norm(shift[:, ~machine.rotary]) / machine.max_correction[0]
     rotary = np.abs(shift[:, machine.rotary]).max(axis=1, initial=0.0) / machine.max_correction[1]
     share = np.maximum(linear, rotary)
     over = (share > 1 + FUZZ) & ~written.pieces.kept
@@ -93,24 +95,24 @@ def too_large(written: Written) -> Finding:
 def too_fast(written: Written) -> Finding:
     """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
     machine, pieces = written.intent.machine, written.pieces
-    shift = written.correction()[:, ~machine.rotary]
-    where = written.intent.joints_at(pieces.move, pieces.fraction)
-    change = np.linalg.norm(np.diff(shift, axis=0), axis=1)
-    way = np.abs(np.diff(where, axis=0))
+    change = _norm(np.diff(written.correction[:, ~machine.rotary], axis=0))
+    over = np.flatnonzero((change > JUMP) & ~pieces.kept[1:] & ~pieces.kept[:-1])
+    way = np.abs(written.programmed[over + 1] - written.programmed[over])
     allowed = JUMP + RATE * way[:, ~machine.rotary].sum(axis=1) + RATE_TURNING * way[:, machine.rotary].sum(axis=1)
-    over = (change > allowed) & ~pieces.kept[1:] & ~pieces.kept[:-1]
-    rows, values = _worst(pieces.move[1:][over], change[over])
+    over = over[change[over] > allowed]
+    rows, values = _worst(pieces.move[over + 1], change[over])
     return Finding("NCF407", rows, values, "the correction changes by {value:.4f} mm at once")
 
 
-def excess(machine: Machine, joints: Joints, each: Index, curved: Mask) -> Array:
+def excess(machine: Machine, joints: Joints, each: Index, curved: Mask, ends: Array | None = None) -> Array:
     """How far axes go beyond their ranges along motions, (k, n_axes) mm and rad; negative while within.
 
     joints  gives axis positions (j, n_axes) at fractions (j,) of motions (j,)
     each    (k,) motions
     curved  (k,) axes do not move linearly along it: looked at inside too, not only at the end
+    ends    (k, n_axes) axis positions where they end, if known
     """
-    result = _beyond(machine, joints(each, np.ones(len(each))))
+    result = _beyond(machine, joints(each, np.ones(len(each))) if ends is None else ends)
     rows = np.flatnonzero(curved)
     if not rows.size:
         return result
@@ -144,16 +146,19 @@ def _beyond(machine: Machine, q: Array) -> Array:
     return result
 
 
-def _programmed_excess(written: Written) -> Array:
+def programmed_excess(written: Written) -> Array:
     """As `excess`, of the program as it is; (n, n_axes)."""
     intent = written.intent
     each = np.arange(len(intent.moves))
-    return excess(intent.machine, intent.joints_at, each, intent.curved)
+    ends = written.programmed if len(each) == len(written.pieces) else None
+    return excess(intent.machine, intent.joints_at, each, intent.curved, ends)
 
 
 def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
     """A finding for each corrected motion with an axis beyond its range; values in mm or degrees."""
     machine, pieces = written.intent.machine, written.pieces
+    if not (beyond > FUZZ).any():
+        return Finding(code, np.zeros(0, dtype=np.intp), np.empty(0), text)
     kept = np.zeros(len(beyond), dtype=bool)
     kept[pieces.move] = pieces.kept
     axis = np.where(np.isnan(beyond), -np.inf, beyond).argmax(axis=1)
@@ -162,6 +167,11 @@ def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
     names = tuple(machine.axis_names[j] for j in axis[rows])
     return Finding(code, rows, most[rows] * units, text, names, turns=tuple(machine.rotary[axis[rows]].tolist()))
+
+
+def _norm(shift: Array) -> Array:
+    size: Array = np.sqrt(np.einsum("ij,ij->i", shift, shift))
+    return size
 
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:

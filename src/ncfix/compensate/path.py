@@ -23,6 +23,7 @@ from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Cutter, Split, joined, split, taken
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import deviations, uneasy_starts
+from ncfix.compensate.known import Known
 from ncfix.compensate.round import may_be_round
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
@@ -99,7 +100,7 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     deviation[over] = parts.worst
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
-    return with_approaches(planned, approaches)
+    return with_approaches(replace(planned, known=Known(ends.before, ends.wanted)), approaches)
 
 
 def _real(

@@ -51,10 +51,14 @@ class Segments:
 
         The end of a motion is known even if its start is not.
         """
-        f = fraction[:, None]
-        command = np.where(f == 1, self.end[rows], (1 - f) * self.start[rows] + f * self.end[rows])
+        command = self.end[rows]
+        inside = np.flatnonzero(fraction != 1)
+        if not inside.size:
+            return command
+        f, on = fraction[inside, None], rows[inside]
+        command[inside] = (1 - f) * self.start[on] + f * self.end[on]
         if self.arc.any():
-            on_arc = np.flatnonzero(self.arc[rows])
+            on_arc = inside[self.arc[on]]
             if on_arc.size:
                 command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
         return command

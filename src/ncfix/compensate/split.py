@@ -6,8 +6,9 @@ exact command, times how the tip follows commands; the error model need not be e
 order of the tolerance, so what is left out is smaller by the gradient of the errors (under a thousandth).
 
 Going as far as possible from each point gives the fewest pieces that can be had with ends on the exact path. All
-motions are worked on at once: a round tries one end for each of them, doubling the reach until it is too far, then
-halving the gap.
+motions are worked on at once: a round tries one end for each of them. The first one tried is as far as the piece before
+went, then ends ever farther on from there, or back, until the farthest is between two that were tried; then the gap is
+halved.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import largest, offsets, owners, places
 
@@ -58,8 +60,8 @@ class Grid:
         a, b = first[piece], last[piece]
         share = (self.fraction[node] - self.fraction[a]) / (self.fraction[b] - self.fraction[a])
         command = self.command[a] + share[:, None] * (self.command[b] - self.command[a])
-        off = np.einsum("kij,kj->ki", self.follow[node], command - self.command[node])
-        return largest(np.sqrt(np.einsum("ki,ki->k", off, off)), inner)
+        off = (self.follow[node] * (command - self.command[node])[:, None]).sum(axis=2)
+        return largest(np.sqrt((off * off).sum(axis=1)), inner)
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
         """No piece is an arc."""
@@ -71,27 +73,44 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
 
     A piece from one node to the next is always allowed: it has no nodes between.
     """
+    if fast.engaged() and isinstance(grid, Grid):
+        from ncfix.compensate import kernels
+
+        found: tuple[Mask, Array] = kernels.fewest(
+            grid.counts, grid.fraction, grid.command, np.ascontiguousarray(grid.follow), tolerance
+        )
+        return found
     first = offsets(grid.counts)
     ends = np.zeros(int(first[-1]), dtype=bool)
     worst = np.zeros(len(grid.counts))
     at, stop = first[:-1].copy(), first[1:] - 1
-    reach, reached_by = at + 1, np.zeros(len(at))
-    beyond = stop + 1
+    near, far, reached = at + 1, stop + 1, np.zeros(len(at))
+    usual = np.ones(len(at), dtype=np.intp)
+    step, fresh = usual.copy(), np.ones(len(at), dtype=bool)
     active = np.arange(len(at))
     while active.size:
-        a, near, far, end = at[active], reach[active], beyond[active], stop[active]
-        unbounded = far > end
-        trial = np.where(unbounded, np.minimum(near + 2 * (near - a), end), (near + far) // 2)
-        settled = (trial <= near) | (near >= end)
-        trying = active[~settled]
-        off = grid.deviations(at[trying], trial[~settled])
+        trial = _next_trial(at[active], near[active], far[active], stop[active], step[active])
+        settled = (trial <= near[active]) | (near[active] >= stop[active])
+        trying, trial = active[~settled], trial[~settled]
+        off = grid.deviations(at[trying], trial)
         good = off <= tolerance
-        reach[trying[good]], reached_by[trying[good]] = trial[~settled][good], off[good]
-        beyond[trying[~good]] = trial[~settled][~good]
+        near[trying[good]], reached[trying[good]] = trial[good], off[good]
+        far[trying[~good]] = trial[~good]
+        step[trying] = np.where(fresh[trying], 1, 2 * step[trying])
+        fresh[trying] = False
         done = active[settled]
-        ends[reach[done]] = True
-        worst[done] = np.maximum(worst[done], reached_by[done])
-        at[done], reached_by[done], beyond[done] = reach[done], 0.0, stop[done] + 1
-        reach[done] = np.minimum(reach[done] + 1, stop[done])
+        ends[near[done]] = True
+        worst[done] = np.maximum(worst[done], reached[done])
+        usual[done] = np.maximum(near[done] - at[done] - 1, 1)
+        at[done], reached[done], far[done], step[done], fresh[done] = near[done], 0.0, stop[done] + 1, usual[done], True
+        near[done] = np.minimum(at[done] + 1, stop[done])
         active = active[at[active] < stop[active]]
     return ends, worst
+
+
+def _next_trial(at: Index, near: Index, far: Index, stop: Index, step: Index) -> Index:
+    """The next end to be tried, where `near` is good and `far` is not, or has not been tried if it is behind `stop`."""
+    half = (near + far) // 2
+    back = np.where(near > at + 1, half, np.maximum(far - step, half))
+    trial: Index = np.where(far > stop, np.minimum(near + step, stop), back)
+    return trial

@@ -18,11 +18,13 @@ class Correction:
     q          (n, n_axes) what to command, mm and rad
     converged  (n,) the tip is where it should be, to 1 nm
     oriented   (n,) the tool orientation is corrected too, without damping or limits
+    before     (n,) mm: how far the tip is off without a correction; None if that was not looked at
     """
 
     q: Array
     converged: Mask
     oriented: Mask
+    before: Array | None = None
 
 
 def rows_of(state: State, rows: Index | slice) -> State:
@@ -52,9 +54,16 @@ def steer(machine: Machine, q: Array, target: Array | None, state: State) -> tup
     See `Machine.aim`. Returns the positions and which of them have arrived: the gap, falling by the ratio that the last
     two passes show, will be under 1 nm.
     """
+    found = steered(machine, q, target, state)
+    return found.q, found.converged
+
+
+def steered(machine: Machine, q: Array, target: Array | None, state: State) -> Correction:
+    """As `steer`; how far off the tip was tells something about the program if that is where it began."""
     columns = linear_columns(machine)
     x, y, z = columns.tolist()
     aim = machine.aim(q, (x, y, z), state, target)
     result = q.copy()
     result[:, columns] = aim.place
-    return result, aim.arrived
+    before: Array = np.sqrt(np.einsum("ij,ij->i", aim.gap, aim.gap))
+    return Correction(result, aim.arrived, np.zeros(len(q), dtype=bool), before)

@@ -14,7 +14,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, pose_error
 from ncfix.compensate.kinematics import affine_tip, linear_columns, regular, solve
 from ncfix.compensate.rates import Path
-from ncfix.compensate.steer import Correction, moved, steer
+from ncfix.compensate.steer import Correction, moved, steered
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine, State
 
@@ -108,8 +108,7 @@ def parted(machine: Machine) -> tuple[Machine, Machine]:
 def _position(machine: Machine, q: Array, state: State) -> Correction:
     if machine.is_perfect:
         return untouched(q)
-    corrected, arrived = steer(machine, q, None, state)
-    return Correction(corrected, arrived, np.zeros(len(q), dtype=bool))
+    return steered(machine, q, None, state)
 
 
 def untouched(q: Array) -> Correction:

@@ -330,7 +330,8 @@ class Stream:
         emission, moves = settled.emission, settled.moves
         pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
         state = State() if self.before is None else State(direction=self.before.direction)
-        found = workers.errors(moves, pieces, emission.start, state, own & ~settled.kept)
+        known = settled.plan.known
+        found = workers.errors(moves, pieces, emission.start, state, own & ~settled.kept, known)
         self.looks.append((found, program.lines(moves.block)))
         self._gather(workers, workers.ahead)
 

@@ -16,6 +16,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
+from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners
 from ncfix.compensate.sampling import MOST, bends, even, merged, passed
 from ncfix.compensate.steer import rows_of
@@ -93,6 +94,7 @@ def path_error(
     density: float = DENSITY,
     least: int = 2,
     tilts: bool = True,
+    known: Known | None = None,
 ) -> PathError:
     """Tip errors of the real machine along the whole path, by simulation.
 
@@ -102,23 +104,36 @@ def path_error(
     density  samples for each time that the error model may bend
     least    fewest samples inside a piece over which the error may bend at all
     tilts    find the tilts of the tool, too; else they are 0
+    known    what has been found out of the ends of motions; they are not looked at again then
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
     tally = _Tally(len(moves))
-    for part in samples(
-        written, np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move]), density, least, tilts
-    ):
+    which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
+    for part in samples(written, which, density, least, tilts, known):
         tally.add(part)
     return tally.result()
 
 
 def samples(
-    written: Written, which: Index, density: float = DENSITY, least: int = 2, tilts: bool = True
+    written: Written,
+    which: Index,
+    density: float = DENSITY,
+    least: int = 2,
+    tilts: bool = True,
+    known: Known | None = None,
 ) -> Iterator[Samples]:
-    """Look at pieces `which`, in batches."""
+    """Look at pieces `which`, in batches; what is known of their ends need not be looked at."""
     counts, along = _counts(written, which, density, least)
     uneasy = uneasy_starts(written.intent, _kept_motions(written))
+    if known is not None and not tilts:
+        here, before, after = known.at(written, which)
+        here &= (counts == 0) & ~(_begins_uneasily(written, which, uneasy) & along) & ~_kinked(written, which, along)
+        on = which[here]
+        move, ones = written.pieces.move[on], np.ones(len(on))
+        if on.size:
+            yield Samples(move, ones, before[here], after[here], _way(written, on), 0.0, 0.0)
+        which, counts, along = which[~here], counts[~here], along[~here]
     for batch in batches(counts + 1, BATCH):
         piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
         yield _looked_at(written, piece, fraction, tilts)
@@ -127,9 +142,11 @@ def samples(
 def _counts(written: Written, which: Index, density: float, least: int) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     move = written.pieces.move[which]
-    motions = np.unique(move)
-    place = np.searchsorted(motions, move)
-    wished = bends(written.intent, motions)[place] * written.span[which]
+    if (np.diff(move) > 0).all():
+        wished = bends(written.intent, move) * written.span[which]
+    else:
+        motions, place = np.unique(move, return_inverse=True)
+        wished = bends(written.intent, motions)[place] * written.span[which]
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
     along &= written.intent.moving[move]
@@ -143,15 +160,33 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     each, inner = np.arange(len(which)), even(counts)
     lists = [(owners(counts), inner), (each, np.ones(len(which)))]
-    begun = np.flatnonzero(written.opens[which] & uneasy[written.pieces.move[which]] & along)
+    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy) & along)
     lists.append((begun, np.full(len(begun), START)))
     if written.intent.kinks:
-        long = np.flatnonzero(along)
-        ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
-        on, share = passed(written.intent, *ends)
-        lists.append((long[on], share))
+        lists.append(_passed(written, which, along))
     many, fraction = merged(len(which), *lists)
     return which[owners(many)], fraction
+
+
+def _begins_uneasily(written: Written, which: Index, uneasy: Mask) -> Mask:
+    begins: Mask = written.opens[which] & uneasy[written.pieces.move[which]]
+    return begins
+
+
+def _passed(written: Written, which: Index, along: Mask) -> tuple[Index, Array]:
+    """Where pieces pass a kink or a jump: which of them, and fraction."""
+    long = np.flatnonzero(along)
+    ends = [written.joints(which[long], np.full(len(long), place)) for place in (0.0, 1.0)]
+    on, share = passed(written.intent, *ends)
+    return long[on], share
+
+
+def _kinked(written: Written, which: Index, along: Mask) -> Mask:
+    """Pieces that pass a kink or a jump, (k,)."""
+    found = np.zeros(len(which), dtype=bool)
+    if written.intent.kinks:
+        found[_passed(written, which, along)[0]] = True
+    return found
 
 
 def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> Samples:

@@ -69,10 +69,18 @@ class Written:
         """Axis positions at fractions of pieces, (k, n_axes)."""
         return self.intent.joints(self.pieces.move[piece], self.segments.at(piece, fraction))
 
+    @cached_property
+    def programmed(self) -> Array:
+        """The axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
+        return self.intent.joints_at(self.pieces.move, self.pieces.fraction)
+
+    @cached_property
+    def done(self) -> Array:
+        """The axis positions at the end of each piece, (m, n_axes) mm and rad."""
+        return self.intent.joints(self.pieces.move, self.pieces.end)
+
+    @cached_property
     def correction(self) -> Array:
         """What is added to the axis positions of the program at the end of each piece, (m, n_axes) mm and rad."""
-        pieces = self.pieces
-        each = np.arange(len(pieces))
-        programmed = self.intent.joints_at(pieces.move, pieces.fraction)
-        result: Array = self.joints(each, np.ones(len(each))) - programmed
-        return result
+        added: Array = self.done - self.programmed
+        return added

@@ -84,6 +84,13 @@ class Basis(ABC):
         """A basis of the same family with the functions of both."""
         return self
 
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        """What the sum with these coefficients, its slope and its curvature do not exceed for u from low to high.
+
+        Kinks and jumps aside. None if that is not known, or not bounded.
+        """
+        return None
+
     def complaints(self) -> list[tuple[str, str]]:
         """What is wrong with the parameters: (key, text)."""
         return []

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ncfix.machine import bending, fingerprint, jacobian, linear, se3
 from ncfix.machine.aim import Aim, aimed, aimed_at_once, at_once, taken
 from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
+from ncfix.machine.bow import Bow, bow_of
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects
 from ncfix.machine.forward import Chain, build_chain, carry
@@ -127,6 +128,10 @@ class Machine:
         Spacing of knots or table entries, an eighth of a period, range / (4 degree) of a polynomial; inf for an axis
         on which nothing depends.
         """
+        return self._feature_lengths.copy()
+
+    @cached_property
+    def _feature_lengths(self) -> Array:
         return bending.feature_lengths(self.axes, self.effects)
 
     def breakpoints(self, axis: str) -> Array:
@@ -134,7 +139,26 @@ class Machine:
 
         Those of an endless axis come again with every turn.
         """
-        return bending.breakpoints(self.axes, self.effects, self.axis_names.index(axis))
+        return self._breakpoints[self.axis_names.index(axis)].copy()
+
+    @cached_property
+    def _breakpoints(self) -> tuple[Array, ...]:
+        return tuple(bending.breakpoints(self.axes, self.effects, index) for index in range(len(self.axes)))
+
+    @cached_property
+    def bow(self) -> Bow | None:
+        """How far the error of the tip may bow on straight motions; None if not known."""
+        return bow_of(self.axes, self.tool, self.effects, self.workpiece_offset)
+
+    @cached_property
+    def linear_ways(self) -> Array | None:
+        """The ways of X, Y and Z as columns, (3, 3): motions of them take the tip so far, to wherever they point.
+
+        None without these axes, or if a rotary axis between them turns some of them only.
+        """
+        names = [self.axis_names.index(name) for name in "XYZ" if name in self.axis_names]
+        assert self._perfect_route is not None
+        return self._perfect_route.ways_together(names) if len(names) == 3 else None
 
     # -- what it does -------------------------------------------------------------------------------------------------
 

@@ -39,6 +39,10 @@ class Table(Basis):
     def feature(self, span: float) -> float:
         return float(np.diff(self.positions).min())
 
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        rates = np.diff(coefficients) / np.diff(self.positions)
+        return float(np.abs(coefficients).max()), float(np.abs(rates).max()), 0.0
+
     def complaints(self) -> list[tuple[str, str]]:
         if len(self.positions) < 2:
             return [("positions", "a table needs at least two positions")]
@@ -94,6 +98,15 @@ class Spline(Basis):
         steps = np.diff(np.clip(self.knots, low, high))
         return float(steps[steps > 0].min())
 
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        """By the coefficients of the spline and of its derivatives, between which their values lie."""
+        found, knots, values = [], np.asarray(self.knots), np.asarray(coefficients)[None]
+        for degree in range(self.degree, self.degree - 3, -1):
+            found.append(float(np.abs(values).max()) if degree >= 0 else 0.0)
+            if degree > 0:
+                values, knots = bspline.rates(knots, degree, values), knots[1:-1]
+        return found[0], found[1], found[2]
+
     def complaints(self) -> list[tuple[str, str]]:
         if self.degree < 1:
             return [("degree", "a spline has degree 1 or more; `step` is piecewise constant")]
@@ -142,6 +155,9 @@ class Step(Basis):
 
     def feature(self, span: float) -> float:
         return float(np.diff(self.positions).min()) if len(self.positions) > 1 else np.inf
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        return float(np.abs(coefficients).max()), 0.0, 0.0
 
     def complaints(self) -> list[tuple[str, str]]:
         wrong = ascending("positions", self.positions)

@@ -68,6 +68,16 @@ class Route:
             out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, *turns)
         return out
 
+    def ways_together(self, axes: Sequence[int]) -> Array | None:
+        """The directions of linear axes as columns; None if they are none, or if others turn some of them only."""
+        legs, found = self.plain[0], []
+        for i, (kind, axis) in enumerate(zip(legs.kind, legs.axis, strict=True)):
+            if kind == SHIFT and axis in axes:
+                found.append((axes.index(axis), legs.direction[3 * i : 3 * i + 3]))
+            elif kind == TURN and 0 < len(found) < len(axes):
+                return None
+        return np.array([direction for _, direction in sorted(found)]).T if len(found) == len(axes) else None
+
     def columns(self, poses: Poses, turns: Turns) -> Columns:
         """What compiled kernels are given."""
         n = poses.positions.shape[1]

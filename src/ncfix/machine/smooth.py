@@ -34,6 +34,9 @@ class Constant(Basis):
     def feature(self, span: float) -> float:
         return np.inf
 
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        return abs(coefficients[0]), 0.0, 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Polynomial(Basis):
@@ -55,6 +58,17 @@ class Polynomial(Basis):
 
     def feature(self, span: float) -> float:
         return span / (4 * max(self.degree)) if max(self.degree) else np.inf
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        most = max(abs(low), abs(high))
+        if not np.isfinite(most) and any(self.degree):
+            return None
+        size, slope, curvature = 0.0, 0.0, 0.0
+        for coefficient, k in zip(coefficients, self.degree, strict=True):
+            size += abs(coefficient) * most**k if k else abs(coefficient)
+            slope += abs(coefficient) * k * most ** max(k - 1, 0)
+            curvature += abs(coefficient) * k * (k - 1) * most ** max(k - 2, 0)
+        return size, slope, curvature
 
     @property
     def family(self) -> tuple[object, ...]:
@@ -116,6 +130,11 @@ class Fourier(Basis):
 
     def feature(self, span: float) -> float:
         return self.turn / (8 * max(self.order))
+
+    def bounds(self, coefficients: tuple[float, ...], low: float, high: float) -> tuple[float, float, float] | None:
+        sizes = np.hypot(coefficients[0::2], coefficients[1::2])
+        rates = 2 * np.pi / self.turn * np.array(self.order)
+        return float(sizes.sum()), float((sizes * rates).sum()), float((sizes * rates**2).sum())
 
     @property
     def family(self) -> tuple[object, ...]:

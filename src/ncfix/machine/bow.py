@@ -1,0 +1,86 @@
+"""How far the error of the tool tip may bow on a straight motion, from above, by bounds on curves and their slopes.
+
+Along a motion the tip's error is the sum over all joints of Q (t + r x a): t and r the joint's small motion, a the arm
+from its reference point to the tip, Q the rotation from there to the workpiece. Of a product the second derivative is
+bounded by those of its factors; so that of the error is, by the ways of the axes. A curve whose second derivative stays
+below b leaves its chord by at most b / 8. Products of errors are parts in ten thousand of errors; `MORE` has room for
+them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.machine.axis import Axis, Tool, Vector
+from ncfix.machine.effect import Effect
+from ncfix.machine.error_model import signals_of, slot_of
+from ncfix.machine.se3 import Array
+
+MORE = 1.1
+"""For products of errors."""
+TWICE = 2.0
+"""A location error acts before the motion of its axis and, the other way, behind it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bow:
+    """Bounds of all small motions of a machine together.
+
+    shift, turn       what translations (mm) and rotations (rad) add up to
+    slopes            (2, n_axes) of translations and rotations per mm or rad of each axis
+    curvatures        (2, n_axes) per mm or rad squared
+    reach             mm from any reference point to the tip with all axes at zero and no tool
+    """
+
+    shift: float
+    turn: float
+    slopes: Array
+    curvatures: Array
+    reach: float
+
+    def of(self, ways: Array, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.
+
+        ways         (k, n_axes) of straight motions, not negative, mm and rad
+        farthest     (n_axes,) from zero that they go
+        tool_length  the largest, mm
+        """
+        arm = self.reach + abs(tool_length) + float(farthest[~rotary].sum())
+        way, angle = ways[:, ~rotary].sum(axis=1), ways[:, rotary].sum(axis=1)
+        shifting, turning = ways @ self.slopes.T[:, 0], ways @ self.slopes.T[:, 1]
+        swing = way + arm * angle
+        first = shifting + arm * turning + self.turn * swing
+        second = (ways * ways) @ (self.curvatures[0] + arm * self.curvatures[1])
+        second += 2 * turning * swing + self.turn * (2 * way * angle + arm * angle * angle)
+        whole = second + 2 * first * angle + (self.shift + arm * self.turn) * angle * angle
+        bow: Array = MORE * whole / 8
+        return bow, angle
+
+
+def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...], offset: Vector) -> Bow | None:
+    """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
+    sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
+    points = [np.asarray(slot_of(axes, tool, effect).reference) for effect in effects if effect.active]
+    for effect in effects:
+        if not effect.active:
+            continue
+        signal, factor = signals_of(axes, effect)
+        span = (0.0, 0.0) if signal is None else (signal.low, signal.high)
+        ends = sorted((x - effect.center) / effect.scale for x in span) if signal is not None else span
+        bounds = effect.basis.bounds(effect.coefficients, *ends)
+        if bounds is None or factor is not None or (signal is not None and signal.constant_s):
+            return None
+        kind, double = int(effect.rotational), TWICE if effect.location else 1.0
+        sizes[kind] += double * bounds[0]
+        if signal is not None and signal.axis is not None:
+            if effect.location:
+                return None
+            rate = 1 / abs(signal.scale * signal.unit)
+            slopes[kind, signal.axis] += bounds[1] * rate
+            curvatures[kind, signal.axis] += bounds[2] * rate * rate
+    places = [*points, np.asarray(tool.point), np.asarray(offset), *(np.asarray(axis.point) for axis in axes)]
+    reach = 2 * sum(float(np.linalg.norm(place)) for place in {tuple(place.tolist()) for place in places})
+    return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, reach)

@@ -1,0 +1,97 @@
+"""Compiled searches do what the plain ones do, and what is known of ends is what a look at them finds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensate.motions import motions
+from ncfix import fast
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.judge import _look, bounds, uneasy_starts
+from ncfix.compensate.path import plan
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.split import Grid, fewest
+from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.verify import path_error
+from ncfix.machine import Machine, State, load
+
+PM = 1e-9
+
+
+@pytest.fixture(autouse=True)
+def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    yield
+    fast.disengage()
+
+
+def grid(rng: np.random.Generator, motions: int) -> Grid:
+    """Motions that bow to and fro, from 1 um to 0.1 mm."""
+    counts = rng.integers(2, 200, motions)
+    fraction = np.concatenate([np.linspace(0, 1, count) for count in counts])
+    phase = np.repeat(rng.uniform(0, 6, motions), counts)
+    size = 10 ** np.repeat(rng.uniform(-3, -1, motions), counts)
+    command = np.stack([size * np.sin(6 * k * fraction + phase) for k in range(1, 6)], axis=1)
+    follow = np.zeros((len(fraction), 3, 5))
+    follow[:, :, 2:] = np.linalg.qr(rng.normal(size=(len(fraction), 3, 3)))[0]
+    return Grid(counts.astype(np.intp), fraction, command, follow)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_fewest_pieces(seed: int) -> None:
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    nodes = grid(np.random.default_rng(seed), 40)
+    plain = fewest(nodes, 0.002)
+    assert fast.engage()
+    for found, expected in zip(fewest(nodes, 0.002), plain, strict=True):
+        assert np.array_equal(found, expected)
+
+
+def winding(machine: Machine, n: int, step: float) -> Intent:
+    """A path that winds about with steps of `step` mm and hundredths of them in rad."""
+    rng = np.random.default_rng(n)
+    ways = np.where(machine.rotary, 0.01, 1.0) * step * rng.uniform(-1, 1, (n, len(machine.axes)))
+    low, high = np.where(np.isfinite(machine.ranges.T), machine.ranges.T, [[-3.0], [3.0]])
+    places = np.clip((low + high) / 2 + np.cumsum(ways, axis=0), low + 1e-3, high - 1e-3)
+    moves = motions(machine, tuple(places[0].tolist()), [tuple(row.tolist()) for row in places[1:]])
+    return Intent(machine, moves, State())
+
+
+@pytest.mark.parametrize(("step", "passing"), [(0.5, 0.95), (20.0, 0.0)])
+def test_no_look_finds_more_than_the_bound(root: Path, step: float, passing: float) -> None:
+    """Motions between exactly corrected ends; short ones are all within the tolerance by the bound alone."""
+    machine = load(root / "benchmarks" / "five_axis.toml")
+    intent = winding(machine, 300, step)
+    moves = intent.moves
+    done = get_strategy("position").solve(machine, moves.end, State(100.0)).q
+    start = np.concatenate([moves.start[:1], done[:-1]])
+    real = replace(Segments.of_moves(moves, intent.columns), start=start, end=done)
+    rows, uneasy = np.arange(1, len(moves)), uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
+    bound, found = bounds(intent, real, rows, uneasy), _look(intent, real, rows, uneasy, 8, 15)
+    assert (found <= bound).all()
+    assert (bound < 2.5e-3).mean() >= passing
+    assert found.max() > 1e-8
+
+
+@pytest.mark.parametrize("name", ["benchmarks/five_axis", "examples/machines/wCAYFXZSt", "examples/machines/dmu50"])
+def test_figures_from_what_is_known(root: Path, name: str) -> None:
+    """What the correction found at ends is what a look at the ends finds, to a hundredth of a nanometre."""
+    machine = load(root / f"{name}.toml")
+    intent = winding(machine, 200, 0.4)
+    planned = plan(machine, intent.moves, get_strategy("rotary-then-linear"), 0.005)
+    assert planned.known is not None
+    pieces = replace(planned.pieces, end=np.round(planned.pieces.end, 4))
+    pieces.end[:, machine.rotary] = planned.pieces.end[:, machine.rotary]
+    given = machine, intent.moves, pieces, planned.start
+    looked, known = (path_error(*given, tilts=False, known=each) for each in (None, planned.known))
+    assert known.before.max == pytest.approx(looked.before.max, abs=10 * PM)
+    assert known.after.max == pytest.approx(looked.after.max, abs=10 * PM)
+    assert known.after.rms == pytest.approx(looked.after.rms, abs=10 * PM)
+    np.testing.assert_allclose(known.move_before, looked.move_before, rtol=0, atol=10 * PM)
+    np.testing.assert_allclose(known.move_after, looked.move_after, rtol=0, atol=10 * PM)
+    assert known.samples == looked.samples
