@@ -79,7 +79,15 @@ def test_what_the_grammar_does_not_take_is_opaque_if_it_has_a_name() -> None:
 
 @pytest.mark.parametrize(
     ("text", "code"),
-    [("X10..5", "NCF115"), ("X1,5", "NCF115"), ("X=", "NCF114"), ("X Y5", "NCF114"), ("X10 )", "NCF110")],
+    [
+        ("X10..5", "NCF115"),
+        ("X1,5", "NCF115"),
+        ("X=", "NCF114"),
+        ("X Y5", "NCF114"),
+        ("X10 )", "NCF110"),
+        ("X1 Y2 X3", "NCF117"),
+        ("X1e3", "NCF116"),
+    ],
 )
 def test_what_is_no_block_is_an_error_with_its_place(text: str, code: str) -> None:
     with pytest.raises(SourceError) as caught:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from math import isfinite
 
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
@@ -12,6 +11,7 @@ from ncfix.program.build import Parsed, TooDeepError
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError
 from ncfix.program.grammar import parse
+from ncfix.program.rs274.blocks import check_exponents, check_numbers, start_of
 from ncfix.program.sinumerik.build import build
 from ncfix.program.tree import END, START, Anchor, Opaque, Span, Template
 
@@ -20,6 +20,9 @@ STATEMENT = "statement"
 
 NAME = re.compile(r"[A-Z_]{2}", re.IGNORECASE)
 QUOTED = re.compile(r'"[^"]*"|;.*', re.DOTALL)
+ONCE = frozenset("XYZABCUVWIJKF") | {"I1", "J1", "K1", "CR", "AR", "AP", "RP", "TURN"}
+"""Addresses that a block may have once."""
+
 WHOLE = Span(Anchor(START, 0), Anchor(END, 0))
 
 
@@ -33,10 +36,19 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
         raise explained(error, text) from None
     except TooDeepError as error:
         raise BlockError("NCF118", "the expression is nested too deep, or too long", error.position) from None
-    for (start, _), value in zip(parsed.spans, parsed.values, strict=True):
-        if not isfinite(value):
-            raise BlockError("NCF115", "the number is too large", start)
+    check_numbers(parsed)
+    check_exponents(parsed, text)
+    check_repeats(parsed)
     return parsed
+
+
+def check_repeats(parsed: Parsed) -> None:
+    """Refuse a word of a motion that stands twice."""
+    seen: set[str] = set()
+    for word in parsed.template.words:
+        if word.address in seen and word.address in ONCE:
+            raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
+        seen.add(word.address)
 
 
 def explained(error: UnexpectedInput, text: str) -> BlockError:
