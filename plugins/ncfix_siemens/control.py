@@ -36,6 +36,8 @@ ROOM = 1.5
 """MD32720 as a multiple of the largest correction."""
 WORTH = 0.9
 """Rotary axes keep their values if less than this share of what correcting them leaves at the worst is left then."""
+WORTHLESS = 0.2
+"""Share of the error without tables that may be left at the worst, within the target, for a better orientation."""
 CHECKS = 1000
 
 
@@ -103,8 +105,16 @@ def _scheme(request: Request, settings: Settings) -> Scheme:
         return automatic(job, settings.rotary != "keep")
     keeping, turning = automatic(job, False), automatic(job, True)
     allowed = _largest(request, turning)[request.machine.rotary].max() <= request.machine.max_correction[1]
-    good = turning.missed <= max(keeping.missed / WORTH, request.target)
-    return turning if allowed and good else keeping
+    enough = min(request.target, WORTHLESS * _wrong(request))
+    return turning if allowed and turning.missed <= max(keeping.missed / WORTH, enough) else keeping
+
+
+def _wrong(request: Request) -> float:
+    """The largest tip error without tables at random poses, mm."""
+    q = random_poses(request.space, CHECKS, seed=9)
+    state = State(request.tool_length)
+    gap = request.machine.actual_tip(q, state) - request.machine.tip(q, request.tool_length)
+    return float(np.linalg.norm(gap, axis=-1).max())
 
 
 def _largest(request: Request, scheme: Scheme) -> Array:

@@ -111,6 +111,14 @@ def test_the_contract_with_encoder_tables_and_few_tables() -> None:
     check_control(CONTROL, {**SETTINGS, "positioning": "eec", "model": "828D"})
 
 
+@pytest.mark.parametrize("name", ["EC0S", "EB0A", "ECC"])
+def test_rotary_axes_turn_for_the_orientation_only_if_the_tip_stays_right(name: str) -> None:
+    """The spin of the tool (EC0S) does not move its tip: turning C for it could only do harm there."""
+    cradle = load(str(MACHINES / "wCAYFXZSt.toml"))
+    left = made(cradle.replace(effects=(Effect(name, (30e-6,)),)), 120.0, 1e-3).left
+    assert left.after.max() <= max(0.2 * left.before.max(), 1e-6)
+
+
 @pytest.mark.parametrize("effect", [f"E{component}{axis}" for axis in "XYZ" for component in "XYZABC"])
 def test_every_single_error_goes_away(effect: str) -> None:
     """Sums and products of pairs say any error of a three-axis machine: what is left is digits and nodes."""
