@@ -121,8 +121,7 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
 
 def _differs(found: Array, meant: Array) -> Mask:
     with np.errstate(invalid="ignore"):
-        same: Mask = np.asarray(np.abs(found - meant) <= SAME)
+        same = np.asarray(np.abs(found - meant) <= SAME)
     if not same.all():
-        same |= (found == meant) | (np.isnan(found) & np.isnan(meant))
-    differs: Mask = ~same.all(axis=1)
-    return differs
+        same = same | (found == meant) | (np.isnan(found) & np.isnan(meant))
+    return np.asarray(~same.all(axis=1))

@@ -139,6 +139,8 @@ def put_line(
 ) -> int:
     """Write a further piece of a motion on a line of its own, and take the axes there; -1 where that is not clear.
 
+    A piece that moves nothing is not: it is for the renderer to say.
+
     heads        (axes, 2) of the shape
     wanted, now  (axes,) numbers at the end of the piece, and at its start; `told` which axes were told to move
     """
@@ -152,7 +154,7 @@ def put_line(
         if at < 0:
             break
         told[axis], begun = True, 0
-    return at
+    return at if begun == 0 else -1
 
 
 @njit(cache=True, nogil=True)

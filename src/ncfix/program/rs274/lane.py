@@ -17,7 +17,7 @@ from ncfix.program.rs274.builder import Stretch
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.coordinates import N_LETTERS
 from ncfix.program.rs274.feeds import INVERSE_TIME, PER_REVOLUTION
-from ncfix.program.rs274.unit import Unit
+from ncfix.program.rs274.unit import LaneTables, Unit
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -79,7 +79,7 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
 
 def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
     """What the blocks of a stretch say, and where they lead."""
-    program, tables = unit.program, tables_of(unit)
+    program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     motion, coded = tables.motion[shapes], tables.motion[shapes] >= 0
     follow = followed_compiled if fast.engaged() else followed
@@ -88,32 +88,8 @@ def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
     return Stage(path, feed, filled(motion.astype(np.float64), coded, before), coded, tables.mask[shapes])
 
 
-@dataclass(frozen=True, slots=True)
-class Tables:
-    """The lanes of all shapes as columns: slots of axis words (s, 9) and F (s,), motion codes, axis masks (s,)."""
-
-    axes: IntArray
-    feed: IntArray
-    motion: IntArray
-    mask: IntArray
-
-
-def tables_of(unit: Unit) -> Tables:
-    """The lanes of a program's shapes; nothing for shapes that have none."""
-    n = len(unit.program.templates)
-    tables = Tables(np.full((n, N_LETTERS), -1), np.full(n, -1), np.full(n, -1), np.zeros(n, np.int64))
-    for shape in range(n):
-        lane = unit.plan_of_shape(shape).lane
-        if lane is not None:
-            for letter, slot in lane.axes:
-                tables.axes[shape, letter] = slot
-            tables.feed[shape], tables.motion[shape] = lane.feed, lane.motion
-            tables.mask[shape] = sum(1 << letter for letter, _ in lane.axes)
-    return tables
-
-
 def followed(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: Tables
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
 ) -> tuple[FloatArray, FloatArray]:
     """The path (n + 1, 9) and the F words (n,) of blocks of some shapes with numbers from `first` on."""
     path = np.empty((len(first) + 1, N_LETTERS))
@@ -143,7 +119,7 @@ def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
 
 
 def followed_compiled(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: Tables
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
 ) -> tuple[FloatArray, FloatArray]:
     """As `followed`."""
     from ncfix.program.rs274 import lane_kernel

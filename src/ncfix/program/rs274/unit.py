@@ -9,14 +9,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.rs274.coordinates import N_LETTERS
 from ncfix.program.rs274.groups import Rules
-from ncfix.program.rs274.plans import Plan, plan_of
+from ncfix.program.rs274.plans import Lane, Plan, plan_of
 from ncfix.program.tree import Flow, Program
 
 
 def view(array: NDArray[Any]) -> Sequence[Any]:
     """An array as a sequence of plain Python numbers, made one at a time."""
     return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class LaneTables:
+    """The lanes of all shapes as columns; -1 for what a shape lacks, and for all of a shape that has no lane.
+
+    axes    (s, 9) which number of a block is the word of an axis
+    feed    (s,) which one is F
+    motion  (s,) motion code in tenths
+    mask    (s,) axis words, as bits
+    """
+
+    axes: NDArray[np.int64]
+    feed: NDArray[np.int64]
+    motion: NDArray[np.int64]
+    mask: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, lanes: Sequence[Lane | None]) -> LaneTables:
+        """The tables of some lanes."""
+        n = len(lanes)
+        tables = cls(np.full((n, N_LETTERS), -1), np.full(n, -1), np.full(n, -1), np.zeros(n, dtype=np.int64))
+        for shape, lane in enumerate(lanes):
+            if lane is not None:
+                for letter, slot in lane.axes:
+                    tables.axes[shape, letter] = slot
+                tables.feed[shape], tables.motion[shape] = lane.feed, lane.motion
+                tables.mask[shape] = sum(1 << letter for letter, _ in lane.axes)
+        return tables
 
 
 @dataclass(slots=True, eq=False)
@@ -41,6 +71,7 @@ class Unit:
     flows: list[int] = field(init=False)
     _plans: list[Plan | None] = field(default_factory=list)
     _lane_stops: NDArray[np.int64] | None = field(init=False, default=None)
+    _lanes: LaneTables | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         program = self.program
@@ -79,6 +110,14 @@ class Unit:
             closed = ~np.array(lanes, dtype=np.bool_)[self.program.template]
             self._lane_stops = np.append(np.flatnonzero(closed), len(self))
         return int(self._lane_stops[np.searchsorted(self._lane_stops, block)])
+
+    @property
+    def lanes(self) -> LaneTables:
+        """The lanes of all shapes as columns."""
+        if self._lanes is None:
+            lanes = [self.plan_of_shape(shape).lane for shape in range(len(self._plans))]
+            self._lanes = LaneTables.of(lanes)
+        return self._lanes
 
     def begins_with_tape(self) -> bool:
         """Whether the first block that is not blank is a `%`."""
