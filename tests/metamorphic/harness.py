@@ -26,9 +26,9 @@ from ncfix.program.trace import trace
 PAIRS = int(os.environ.get("NCFIX_PAIRS", "3"))
 LENGTH = 80.0
 SETUP = Setup(
-    work_offsets={"G54": {"X": 0.0, "Y": 0.0, "Z": 60.0, "A": 0.0, "C": 0.0}},
+    work_offsets={"G54": {"X": 0.0, "Y": 0.0, "Z": 60.0, "A": 0.0, "B": 0.0, "C": 0.0}},
     tools={0: Tool(LENGTH, 3.0), 1: Tool(LENGTH, 3.0)},
-    initial={"X": 0.0, "Y": 0.0, "Z": 290.0, "A": 0.0, "C": 0.0},
+    initial={"X": 0.0, "Y": 0.0, "Z": 290.0, "A": 0.0, "B": 0.0, "C": 0.0},
     no_point="IS-B",
 )
 OPTIONS = FixOptions(tolerance_um=50.0, verify=False)

@@ -102,16 +102,26 @@ def macro(path: Route) -> str:
 
 def positions(path: Route, machine: Machine) -> np.ndarray:
     """Axis positions of a route in machine axes of the machine, mm and rad; offsets and tool length in them."""
-    letters = {name: name.lower() for name in machine.axis_names}
+    letters = {name: "a" if name == tilting(machine) else name.lower() for name in machine.axis_names}
     q = np.array([[getattr(step, letters[name]) for name in machine.axis_names] for step in path])
     q[:, list(machine.axis_names).index("Z")] += 60.0 + LENGTH
     return np.where(machine.rotary, np.radians(q), q)
 
 
-def in_axes(path: Route) -> str:
+def tilting(machine: Machine) -> str:
+    """The rotary axis beside C."""
+    return next(axis.name for axis in machine.axes if axis.rotary and axis.name != "C")
+
+
+def in_axes(machine: Machine):
     """Without tool-centre-point control."""
-    lines = [f"G{min(step.code, 1)} {words(step, step, rotary=True, places=4)} F500." for step in path]
-    return HEAD + "G43 H1\n" + "\n".join(lines) + "\n" + TAIL
+
+    def write(path: Route) -> str:
+        lines = [f"G{min(step.code, 1)} {words(step, step, rotary=True, places=4)} F500." for step in path]
+        text = "\n".join(lines).replace(" A", f" {tilting(machine)}")
+        return HEAD + "G43 H1\n" + text + "\n" + TAIL
+
+    return write
 
 
 def tip_words(path: Route, machine: Machine) -> list[tuple[np.ndarray, Step]]:
@@ -125,10 +135,11 @@ def tip_words(path: Route, machine: Machine) -> list[tuple[np.ndarray, Step]]:
 
 def by_tip(machine: Machine):
     """With tool-centre-point control (G43.4)."""
+    tilt = tilting(machine)
 
     def write(path: Route) -> str:
         lines = [
-            f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} A{step.a:.3f} C{step.c:.3f} F500."
+            f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {tilt}{step.a:.3f} C{step.c:.3f} F500."
             for p, step in tip_words(path, machine)
         ]
         return HEAD + "G43.4 H1\n" + "\n".join(lines) + "\n" + TAIL
@@ -142,13 +153,16 @@ ORIGIN = np.array([12.0, -7.5, 3.0])
 
 def in_plane(machine: Machine):
     """The same in a tilted plane (G68.2)."""
+    tilt = tilting(machine)
 
     def write(path: Route) -> str:
         rotation = turn("z", TURN[0]) @ turn("x", TURN[1]) @ turn("z", TURN[2])
         lines = []
         for point, step in tip_words(path, machine):
             p = rotation.T @ (point - ORIGIN)
-            lines.append(f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} A{step.a:.3f} C{step.c:.3f} F500.")
+            lines.append(
+                f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {tilt}{step.a:.3f} C{step.c:.3f} F500."
+            )
         frame = "G68.2 X{:.3f} Y{:.3f} Z{:.3f} I{:.3f} J{:.3f} K{:.3f}\n".format(*ORIGIN, *TURN)
         return HEAD + "G43 H1\n" + frame + "\n".join(lines) + "\nG69\n" + TAIL
 
