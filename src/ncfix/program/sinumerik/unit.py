@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.unit import view
+from ncfix.program.rs274.unit import LaneTables, view
 from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
 from ncfix.program.tree import Constant, Literal, Program, Word
 from ncfix.program.tree import Text as Label
@@ -83,6 +83,7 @@ class Unit:
     parameters: tuple[Parameter, ...] = ()
     saves: bool = False
     _lane_stops: NDArray[np.int64] | None = None
+    _lanes: LaneTables | None = None
 
     def __post_init__(self) -> None:
         self._match_structures()
@@ -110,6 +111,13 @@ class Unit:
             blocked = np.flatnonzero(closed[self.program.template[self.begin : self.stop]]) + self.begin
             self._lane_stops = np.append(blocked, self.stop)
         return int(self._lane_stops[np.searchsorted(self._lane_stops, block)])
+
+    @property
+    def lanes(self) -> LaneTables:
+        """The lanes of all shapes as columns."""
+        if self._lanes is None:
+            self._lanes = LaneTables.of([plan.lane for plan in self.text.plans])
+        return self._lanes
 
     # -- control structures -------------------------------------------------------------------------------------------
 
