@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.compensate.following import follow
-from ncfix.machine import load
+from ncfix.compensate.following import follow, placed
+from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.machine import State, load
 from ncfix.program.dialects import detect
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.reader import read
@@ -146,3 +147,23 @@ def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
 def test_an_axis_that_is_free_to_turn_stands_where_nobody_knows(root: Path, way: str, known: bool) -> None:
     moves = moves_of(root, program(way, "L X+5 Y+6 Z+7 FMAX"))
     assert bool(moves.rule[-1] == 0) is known
+
+
+def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: Path) -> None:
+    machine = load(str(root / "examples/machines/dmu50.toml"))
+    setup = load_setup(str(root / "examples/programs/klartext.setup.toml"))
+    source = (root / "examples/programs/klartext_tilted.h").read_bytes()
+    fixed = fix_program(read(source, "k.h"), machine, setup, FixOptions())
+
+    def bottoms(text: bytes) -> tuple[np.ndarray, np.ndarray]:
+        moves = follow(read(text, "k.h"), machine, setup).trace.moves
+        holes = moves.kind == Kind.CYCLE
+        lengths = moves.tool_length[holes]
+        return joints_from_commands(placed(machine, setup), moves.end[holes], moves.tcp[holes], lengths), lengths
+
+    meant, lengths = bottoms(source)
+    done, _ = bottoms(fixed.text)
+    real = placed(machine, setup).actual_tip(done, State(tool_length=lengths))
+    wanted = placed(machine, setup).tip(meant, lengths)
+    assert len(meant) == 4
+    assert np.linalg.norm(real - wanted, axis=1).max() < 0.5e-3
