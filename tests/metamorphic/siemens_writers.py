@@ -87,6 +87,45 @@ def centres(path: Route) -> str:
     return "\n".join(lines) + "\n"
 
 
+def tangents(path: Route) -> str:
+    """A line, and arcs that each go on where the one before ended (CT), through the points of the route."""
+    points = flat(path)
+    lines = [f"CT X{x:.3f} Y{y:.3f}" for x, y in points[2:]]
+    return HEAD + "\n".join(begun(points, path[0].z) + lines) + "\n" + TAIL
+
+
+def tangents_by_centre(path: Route) -> str:
+    """The same arcs by their centres."""
+    points = flat(path)
+    lines, ahead = [], points[1] - points[0]
+    for here, there in itertools.pairwise(points[1:]):
+        chord, left = there - here, np.array([-ahead[1], ahead[0]])
+        away = chord @ chord / (2 * (left @ chord))
+        code, (i, j) = 3 if away > 0 else 2, left * away
+        lines.append(f"G{code} X{there[0]:.3f} Y{there[1]:.3f} I{i:.6f} J{j:.6f}")
+        ahead = 2 * (ahead @ chord) * chord - (chord @ chord) * ahead
+    return HEAD + "\n".join(begun(points, path[0].z) + lines) + "\n" + TAIL
+
+
+def flat(path: Route) -> list[np.ndarray]:
+    """The points of a route in XY, the first few of them, and none that makes a very large arc."""
+    points = [np.array([step.x, step.y]) for step in path[:2]]
+    ahead = points[1] - points[0]
+    for step in path[2:7]:
+        chord = np.array([step.x, step.y]) - points[-1]
+        turn = abs(ahead[0] * chord[1] - ahead[1] * chord[0]) / max(np.hypot(*ahead) * np.hypot(*chord), 1e-9)
+        if turn * 60 > np.hypot(*chord):
+            points.append(points[-1] + chord)
+            ahead = 2 * (ahead @ chord) * chord - (chord @ chord) * ahead
+    return points
+
+
+def begun(points: list[np.ndarray], height: float) -> list[str]:
+    """The rapid to the first point, and the line to the second."""
+    (x, y), (u, v) = points[:2]
+    return [f"G0 X{x:.3f} Y{y:.3f} Z{height:.3f}", f"G1 X{u:.3f} Y{v:.3f} F500"]
+
+
 def inches(path: Route) -> str:
     """G700."""
     text = re.sub(r"([XYZIJF])(-?[\d.]+)", lambda m: f"{m[1]}{float(m[2]) / 25.4:.8f}", full(path))
@@ -164,6 +203,20 @@ def by_vector(machine: Machine) -> Callable[[Route], str]:
             vector = f"A3={a:.9f} B3={b:.9f} C3={c:.9f}"
             lines.append(f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {vector} F500")
         return HEAD + "TRAORI\nORIAXES\n" + "\n".join(lines) + "\n" + TAIL
+
+    return write
+
+
+def by_angles(machine: Machine) -> Callable[[Route], str]:
+    """With TRAORI and the direction of the tool as roll-pitch-yaw angles."""
+
+    def write(path: Route) -> str:
+        lines = []
+        for p, step in tip_words(path, machine):
+            a, b, c = direction(machine, step)
+            angles = f"A2={-np.degrees(np.arcsin(b)):.9f} B2={np.degrees(np.arctan2(a, c)):.9f}"
+            lines.append(f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {angles} F500")
+        return HEAD + "TRAORI\nORIAXES\nORIRPY\n" + "\n".join(lines) + "\n" + TAIL
 
     return write
 

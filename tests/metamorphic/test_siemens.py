@@ -29,6 +29,7 @@ RELATIONS = [
     Relation("CR and I J", write.radii, write.full, TWICE),
     Relation("I=AC and I", write.centres, write.full, TWICE),
     Relation("TRANS and none", write.shifted, write.full, ONCE),
+    Relation("CT and I J", write.tangents, write.tangents_by_centre, TWICE),
 ]
 
 
@@ -62,6 +63,18 @@ def test_vectors_and_rotary_words(machine: Machine, figures: Callable[[str], Non
         return by_words(write.calm(path))
 
     check(Relation("A3 B3 C3 and A C", left, right, 3 * STEP, rotary=True), machine, figures)
+
+
+def test_angles_and_vectors(machine: Machine, figures: Callable[[str], None]) -> None:
+    by_angles, by_vector = write.by_angles(machine), write.by_vector(machine)
+
+    def left(path: Route) -> str:
+        return by_angles(write.calm(path))
+
+    def right(path: Route) -> str:
+        return by_vector(write.calm(path))
+
+    check(Relation("A2 B2 C2 and A3 B3 C3", left, right, 3 * STEP, rotary=True), machine, figures)
 
 
 def test_turned_frames_on_and_off(machine: Machine, figures: Callable[[str], None]) -> None:
