@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ from ncfix.tables.residual import POSES, Residual, residual
 from ncfix.tables.sheet import as_html, as_markdown
 
 SHEET = "hand-over"
+WORTH = 0.95
+"""Share of the error (rms) from which on what is left is as good as all of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     messages = control.lint(written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
+    written = replace(written, notes=(*written.notes, *_remarks(control, request, left)))
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
     more = {
@@ -98,6 +101,15 @@ def emulate(
     left = residual(machine, tables, space, made.tool_length, poses)
     messages = (*made.changed(native, folder), *control.lint(native))
     return Exported(native, files, tables, left, (), messages)
+
+
+def _remarks(control: Control, request: Request, left: Residual) -> Iterator[str]:
+    """What holds for tables of any control: whether they do anything, and for which tool."""
+    before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
+    if after > WORTH * before and before > request.target:
+        yield "These tables take off next to nothing: the format does not reach the errors of this machine."
+    if not control.any_tool and not request.tool_length and request.machine.depends_on_tool_length:
+        yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
 
 
 def _internal(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

@@ -7,7 +7,21 @@ from html import escape
 
 from ncfix.tables.control import Control, Request, Written
 from ncfix.tables.neutral import Tables
-from ncfix.tables.residual import Residual
+from ncfix.tables.residual import Residual, residual
+
+CLASSES = {
+    "L-POS": "how far each linear axis goes, along itself.",
+    "L-STR": "straightness of the linear axes.",
+    "L-SQR": "squareness of the linear axes.",
+    "L-ANG": "what the angular errors of linear axes do to the tip.",
+    "L-VOL": "the position of the tip over all linear axes together.",
+    "L-VOL+": "the same, and the direction of the tool.",
+    "R-VOL": "the position of the tip over linear and rotary axes together.",
+    "R-VOL+": "the same, and the direction of the tool.",
+}
+"""What ISO/TR 16907 means by them: what of the machine's errors is corrected."""
+LONGER = 50.0
+"""mm: the tool with which it is shown what another length leaves."""
 
 
 def as_markdown(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> str:
@@ -24,14 +38,18 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     yield f"- Tip error: max {before['max']:.2f} um, rms {before['rms']:.2f} um without the tables;"
     yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {_pose(after['at'])}."
     yield f"- Class (ISO/TR 16907): {control.reaches}. Tables: {len(tables.grids)}, points: {tables.points}."
+    yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in _words(control.reaches))
     if control.any_tool:
         yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
     else:
-        yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request)}."
+        yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request, tables)}."
+    if not control.rewrites:
+        yield "- Programs that ncfix fix has corrected must not run with them: they would be corrected twice."
     yield "- Not checked: collisions, and whether the control has the options that the tables need."
     yield from _list("Largest corrections", _corrections(left))
     yield from _list("Range covered; beyond it: " + control.properties.extrapolation, _ranges(request))
-    yield from _list("What to do", control.steps, numbered=True)
+    yield from _list("Settings", (f"{name} = {value}" for name, value in request.settings.items() if value))
+    yield from _list("What to do, in this order", control.steps, numbered=True)
     yield from _list("How to switch it off", [control.switch_off])
     yield from _list("Files", sorted(written.files))
     yield from _list("Remarks", written.notes)
@@ -50,9 +68,15 @@ def _pose(at: dict[str, float]) -> str:
     return " ".join(f"{name}{value:g}" for name, value in at.items())
 
 
-def _length_note(request: Request) -> str:
+def _words(reaches: str) -> list[str]:
+    return reaches.replace(",", " ").split()
+
+
+def _length_note(request: Request, tables: Tables) -> str:
     if request.machine.depends_on_tool_length:
-        return "; the error of this machine depends on that length, and with another tool more is left"
+        other = residual(request.machine, tables, request.space, request.tool_length + LONGER).figures()["after"]
+        left = f"max {other['max']:.2f} um, rms {other['rms']:.2f} um"
+        return f"; the error depends on that length: with a tool {LONGER:g} mm longer {left} are left"
     return "; the error of this machine does not depend on that length"
 
 
