@@ -18,7 +18,8 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Backlash
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.synthetic import Faults, simulate
-from ncfix.report.diagnosis import page
+from ncfix.report import html, markdown
+from ncfix.report.diagnosis import document
 
 NOISE_UM = 2.0
 
@@ -65,9 +66,11 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
 
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
     assert "backlash X" in words.text(backlash)
-    html = page(backlash)
-    assert "backlash X" in html
-    assert html.count("<svg") >= 5
+    page, text = (form.rendered(document(backlash)).decode() for form in (html, markdown))
+    assert "backlash X" in page
+    assert page.count("<svg") >= 5
+    assert page.count("<circle") > 100
+    assert "## backlash X" in text
 
 
 def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:

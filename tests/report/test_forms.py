@@ -10,7 +10,7 @@ import pytest
 
 from ncfix.diagnostics import UsageError
 from ncfix.report import html, markdown
-from ncfix.report.document import Document, Line, Plot, Section, Table, Text
+from ncfix.report.document import Document, Dots, Line, Plot, Section, Table, Text
 from ncfix.report.forms import form_of
 
 X = np.linspace(-10.0, 10.0, 5)
@@ -20,7 +20,7 @@ DOCUMENT = Document(
     [
         Section("Errors", [Text(NASTY), Table(("name", NASTY), [("EXX", "1"), (NASTY, "2")]), Table((), [("a", "b")])]),
         Section("Curves", [Plot("um over X", [Line(X, X**2, 0.5 * abs(X), "up"), Line(X, -(X**2), label="down")])]),
-        Section("Flat", [Plot("um over Y", [Line(X, 0 * X)])]),
+        Section("Flat", [Plot("um over Y", [Line(X, 0 * X), Dots(X, X - 3.0, "residual")])]),
     ],
 )
 
@@ -53,7 +53,7 @@ def test_a_page_is_well_formed_and_stands_alone() -> None:
     page.feed(text)
     assert (page.open, page.wrong) == ([], [])
     assert "script" not in page.seen
-    assert {"table", "svg", "polyline", "polygon", "figure"} <= page.seen
+    assert {"table", "svg", "polyline", "polygon", "circle", "figure"} <= page.seen
     assert not re.search(r"(src|href)=", text)
 
 
@@ -72,6 +72,7 @@ def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
         assert len(re.findall(r"(?<!\\)\|", row)) == 3
     assert "<script>" not in text
     assert "up +0 to +100; down -100 to -0" in text
+    assert "residual -13 to +7" in text
 
 
 def test_the_suffix_says_the_form() -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import Outputs, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", metavar="FILE", help="Where to write the machine with the effects added (TOML).")
 @click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered; repeatable.")
 @click.option("--next", "next_path", metavar="FILE", help="Write the poses to be measured next: CSV, else a program.")
-@click.option("--report", metavar="FILE", help="Write a report with figures (HTML).")
+@click.option("--report", metavar="FILE", help="Write a report with figures (HTML or Markdown).")
 @click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
 @force_option
 @json_option
@@ -38,14 +40,19 @@ def diagnose(
     as_json: bool,
 ) -> int:
     """Say where machine and model disagree, name the effect that is missing, and add it to the model."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     from ncfix.diagnose import result, words
     from ncfix.diagnose.checks import remarks
     from ncfix.diagnose.diagnosis import NOTHING
     from ncfix.diagnose.diagnosis import diagnose as diagnosed
     from ncfix.machine import dumps
     from ncfix.measure.reader import reads
+    from ncfix.report.diagnosis import document
+    from ncfix.report.forms import form_of
 
-    target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0] if output else None
+    inputs = (*measured, machine_path)
+    machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
+    form = form_of(report) if report is not None else None
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     for each in data:
@@ -54,10 +61,13 @@ def diagnose(
         found = diagnosed(data, machine, without)
     console.tell(*remarks(found.view, found.unheard_of))
     written = None
-    if target is not None and found.machine is not None:
-        target.write(dumps(result.with_provenance(found)).encode())
-        written = target.path
-    _extras(found, next_path, report, measured, machine_path, force)
+    if machine_target is not None and found.machine is not None:
+        machine_target.write(dumps(result.with_provenance(found)).encode())
+        written = machine_target.path
+    if next_target is not None:
+        _write_next(found, next_target)
+    if page_target is not None and form is not None:
+        page_target.write(form(document(found)))
     if as_json:
         console.put_json(**result.as_dict(found, written))
     else:
@@ -66,22 +76,9 @@ def diagnose(
     return ExitCode.FINDINGS if check and found.verdict != NOTHING else ExitCode.DONE
 
 
-def _extras(
-    found: Diagnosis,
-    next_path: str | None,
-    report: str | None,
-    measured: tuple[str, ...],
-    machine_path: str,
-    force: bool,
-) -> None:
-    """The plan of the next measurement and the report, where they were asked for."""
-    inputs = (machine_path, *measured[1:])
-    if next_path is not None:
-        _write_next(found, targets([measured[0]], Outputs(next_path, force=force), inputs)[0])
-    if report is not None:
-        from ncfix.report.diagnosis import page
-
-        targets([measured[0]], Outputs(report, force=force), inputs)[0].write(page(found).encode())
+def _target(path: str | None, force: bool, inputs: Sequence[str]) -> Target | None:
+    """Where an output goes that was asked for; none of the inputs."""
+    return targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
 
 
 def _write_next(found: Diagnosis, target: Target) -> None:

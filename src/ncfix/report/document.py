@@ -39,11 +39,20 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
+class Dots:
+    """Single values in a plot: (n,) where, (n,) how much, and what they are."""
+
+    x: Array
+    y: Array
+    label: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Plot:
-    """Curves over one axis; the caption says what is up and what is across, with the units."""
+    """Curves and single values over one axis; the caption says what is up and what is across, with the units."""
 
     caption: str
-    lines: Sequence[Line]
+    drawn: Sequence[Line | Dots]
 
 
 Part = Text | Table | Plot

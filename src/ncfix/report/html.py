@@ -9,7 +9,7 @@ from itertools import cycle
 import numpy as np
 
 from ncfix.machine.se3 import Array
-from ncfix.report.document import Document, Line, Part, Plot, Section, Table, Text
+from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
 WIDTH, HEIGHT, EDGE = 560, 170, 34
 COLOURS = ("#2c6fb5", "#b5452c", "#3f8f3f", "#7a4fa0")
@@ -53,24 +53,28 @@ def _table(table: Table) -> str:
 
 
 def _plot(plot: Plot) -> str:
-    frame = Frame.around(plot.lines)
-    drawn = "".join(_line(frame, line, colour) for line, colour in zip(plot.lines, cycle(COLOURS), strict=False))
-    return f"<figure>{frame.drawn(drawn)}<figcaption>{escape(plot.caption)}{_legend(plot.lines)}</figcaption></figure>"
+    frame = Frame.around(plot.drawn)
+    inside = "".join(_drawn(frame, each, colour) for each, colour in zip(plot.drawn, cycle(COLOURS), strict=False))
+    caption = f"<figcaption>{escape(plot.caption)}{_legend(plot.drawn)}</figcaption>"
+    return f"<figure>{frame.around_it(inside)}{caption}</figure>"
 
 
-def _line(frame: Frame, line: Line, colour: str) -> str:
-    curve = f'<polyline points="{frame.points(line.x, line.y)}" fill="none" stroke="{colour}"/>'
-    if line.spread is None:
+def _drawn(frame: Frame, what: Line | Dots, colour: str) -> str:
+    if isinstance(what, Dots):
+        places = (place.split(",") for place in frame.points(what.x, what.y).split())
+        return "".join(f'<circle cx="{a}" cy="{b}" r="1.5" fill="{colour}" opacity=".5"/>' for a, b in places)
+    curve = f'<polyline points="{frame.points(what.x, what.y)}" fill="none" stroke="{colour}"/>'
+    if what.spread is None:
         return curve
-    upper, lower = frame.points(line.x, line.y + line.spread), frame.points(line.x[::-1], (line.y - line.spread)[::-1])
+    upper, lower = frame.points(what.x, what.y + what.spread), frame.points(what.x[::-1], (what.y - what.spread)[::-1])
     return f'<polygon points="{upper} {lower}" fill="{colour}" opacity=".2"/>{curve}'
 
 
-def _legend(lines: Sequence[Line]) -> str:
+def _legend(drawn: Sequence[Line | Dots]) -> str:
     named = [
-        f'<span style="color:{colour}">{escape(line.label)}</span>'
-        for line, colour in zip(lines, cycle(COLOURS), strict=False)
-        if line.label
+        f'<span style="color:{colour}">{escape(each.label)}</span>'
+        for each, colour in zip(drawn, cycle(COLOURS), strict=False)
+        if each.label
     ]
     return f" ({', '.join(named)})" if named else ""
 
@@ -82,12 +86,11 @@ class Frame:
         self.across, self.up = across, up
 
     @classmethod
-    def around(cls, lines: Sequence[Line]) -> Frame:
-        """Axes that hold all lines with their bands, and zero."""
-        x = np.concatenate([line.x for line in lines])
-        low = [line.y - (0 if line.spread is None else line.spread) for line in lines]
-        high = [line.y + (0 if line.spread is None else line.spread) for line in lines]
-        up = min(0.0, float(np.min(np.concatenate(low)))), max(0.0, float(np.max(np.concatenate(high))))
+    def around(cls, drawn: Sequence[Line | Dots]) -> Frame:
+        """Axes that hold everything, lines with their bands, and zero."""
+        x = np.concatenate([each.x for each in drawn])
+        edges = np.concatenate([edge for each in drawn for edge in _edges(each)])
+        up = min(0.0, float(edges.min())), max(0.0, float(edges.max()))
         return cls((float(x.min()), float(x.max())), up)
 
     def points(self, x: Array, y: Array) -> str:
@@ -97,7 +100,7 @@ class Frame:
         py = HEIGHT - EDGE - (HEIGHT - 2 * EDGE) * (y - low) / max(high - low, 1e-12)
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(px.tolist(), py.tolist(), strict=True))
 
-    def drawn(self, inside: str) -> str:
+    def around_it(self, inside: str) -> str:
         """The figure with its scale and its zero line."""
         zero = self.points(np.array(self.across), np.zeros(2))
         labels = (
@@ -110,3 +113,9 @@ class Frame:
         line = f'<polyline points="{zero}" stroke="#999" stroke-dasharray="3"/>'
         box = f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
         return f'<svg {box} role="img">{line}{inside}{texts}</svg>'
+
+
+def _edges(what: Line | Dots) -> tuple[Array, ...]:
+    if isinstance(what, Dots) or what.spread is None:
+        return (what.y,)
+    return what.y - what.spread, what.y + what.spread

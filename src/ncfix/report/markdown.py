@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.report.document import Document, Line, Part, Plot, Section, Table, Text
+from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
 
 def rendered(document: Document) -> bytes:
@@ -22,13 +22,13 @@ def _part(part: Part) -> str:
             width = max([len(header), *map(len, rows)])
             cells = [list(header) or [""] * width, ["---"] * width, *rows]
             return "\n".join(f"| {' | '.join(map(_plain, row))} |" for row in cells)
-        case Plot(caption, lines):
-            return f"{_plain(caption)}: {'; '.join(map(_extremes, lines))}"
+        case Plot(caption, drawn):
+            return f"{_plain(caption)}: {'; '.join(map(_extremes, drawn))}"
 
 
-def _extremes(line: Line) -> str:
-    label = f"{_plain(line.label)} " if line.label else ""
-    return f"{label}{line.y.min():+.3g} to {line.y.max():+.3g}"
+def _extremes(what: Line | Dots) -> str:
+    label = f"{_plain(what.label)} " if what.label else ""
+    return f"{label}{what.y.min():+.3g} to {what.y.max():+.3g}"
 
 
 def _plain(text: str) -> str:
