@@ -34,11 +34,12 @@ HEIDENHAIN = Dialect(
         "rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
     ),
     refuses=(
-        "free contours (FK), patterns, cycles with a path of their own, called programs (they are not rewritten)",
+        "free contours (FK), cycles with a path of their own, called programs (they are not rewritten)",
+        "patterns (PATTERN DEF with CYCL CALL PAT, cycles 220, 221) without --flatten, which writes their holes out",
         "tables of datums, TCPM with spatial angles or another point than the tip, M114, M144, TRANS ROTATION",
         "a shift in a rotated frame, mirror with rotation, a scale of single axes: how they add up is not sure",
         "what depends on Q parameters that the control sets, blocks executed from several states",
-        "a line that is no Klartext: the control stops there",
+        "a line that is no Klartext: the control stops there; one that is not understood, by what may be in it",
     ),
     language="ncfix.program.klartext.language:KLARTEXT",
 )
