@@ -52,6 +52,7 @@ def test_outputs_and_messages_do_not_depend_on_the_jobs(ncfix: Any, shop: Any, p
         assert result.code == ExitCode.UNREADABLE
         said[jobs] = (contents(out), (result.err + result.out.decode()).replace(str(out), "OUT"))
     assert said[1] == said[2]
+    assert f"{COUNT + 1} programs: {COUNT} written, 1 not\n" in said[1][1]
 
 
 def test_a_batch_that_is_over_leaves_no_journal(ncfix: Any, shop: Any, parts: Path) -> None:

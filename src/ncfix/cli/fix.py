@@ -83,6 +83,9 @@ def fix(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     job = _job(machine_path, dialect, given, {**choices, "force": force})
     outcomes = list(Batch(job, found, outputs.folder(programs), resume).run(jobs, staff(executor)))
+    if len(outcomes) > 1:
+        written = sum(outcome.entry["output"] is not None for outcome in outcomes)
+        console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")
     if as_json:
         console.put_json(files=[outcome.entry for outcome in outcomes])
     return max(outcome.code for outcome in outcomes)
