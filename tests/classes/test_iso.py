@@ -66,6 +66,8 @@ FANUC = [
     case("tilted plane", "G68.2 X1. Y1. Z0. I0. J30. K0.\nG1 X5. Y6. Z47. F100.\nG69\nG0 X1. Y1. Z50.", L4=R, L6=R),
     case("tool tip control", "G43.4 H1\nG1 X5. Y6. Z47. F100.\nG49\nG0 X1. Y1. Z50.", L4=R, L6=R),
     case("scaling", "G51 X0 Y0 Z0 P2.\nG1 X5. F100.\nG50\nG0 X5. Y5. Z20.", L2=R, L4=N, L6=R),
+    case("mirror", "G51.1 X3.\nG1 X5. Y2. F100.\nG2 X15. Y12. I10. J0\nG50.1 X0\nG0 X5.", L2=R, L4=R, L5=R, L7=R),
+    case("turned mirror", "G51.1 X3.\nG68 X0 Y0 R9.\nG1 X5. F100.\nG69\nG50.1 X0\nG0 X5. Y5. Z20.", L2=R, L5=N, L8=R),
     case("probing", "G31 Z0. F100.\nG0 X5. Y5. Z20.", L3=P, L4=R),
     case("corner rounding", "G1 X5. F100. ,R2.\nY20.", L3=R, L4=R),
     case("corner of an arc", "G1 X5. F100. ,C2.\nG2 X15. Y12. I10. J0 ,R1.\nG1 Y0", L3=R, L4=R, L5=R),

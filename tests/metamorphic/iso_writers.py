@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -95,6 +96,12 @@ def pointless(path: Route) -> str:
 def macro(path: Route) -> str:
     """Coordinates through variables and expressions."""
     return re.sub(r"([XYZ])(-?[\d.]+)", lambda m: f"{m[1]}[{float(m[2]) - 1:.3f}+1.]", full(path))
+
+
+def mirrored(path: Route) -> str:
+    """In coordinates that are mirrored at X = 10 (G51.1)."""
+    image = [replace(s, x=20 - s.x, centre=(20 - s.centre[0], s.centre[1]), code=(0, 1, 3, 2)[s.code]) for s in path]
+    return full(image).replace(HEAD, HEAD + "G51.1 X10.\n").replace(TAIL, "G50.1 X0\n" + TAIL)
 
 
 # -- five axes --------------------------------------------------------------------------------------------------------

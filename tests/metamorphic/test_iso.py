@@ -28,6 +28,7 @@ COMMON = [
 MACRO = [
     Relation("least increments and decimal points", write.pointless, write.full, 5.01 * STEP),
     Relation("expressions and numbers", write.macro, write.full, ONCE),
+    Relation("G51.1 and mirrored words", write.mirrored, write.full, ONCE),
 ]
 
 

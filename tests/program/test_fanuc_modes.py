@@ -40,6 +40,9 @@ def motions(text: str) -> list[list[float]]:
         ("G0X5.Y1.\nG98G87X1.R-9.Z-5.F50.\nG80\nG0X0.", [[5, 1, 0], [1, 1, -5], [0, 1, 0]]),
         ("G81X1.Z-5.R2.F50.\nR4.\nG99X2.\nG80\nY1.G0", [[1, 0, -5], [1, 0, -5], [2, 0, -5], [2, 1, 4]]),
         ("M98P7Q20\nM30\nO7\nG0X1.\nN20G0Y2.\nM99", [[0, 2, 0]]),
+        ("G51.1X10.\nG0X12.Y1.\nG91X1.\nG90G50.1X0\nX3.", [[8, 1, 0], [7, 1, 0], [3, 1, 0]]),
+        ("G51.1X10.Y0\nG0X12.Y1.\nG50.1X0\nX3.Y2.\nG50.1\nX4.Y5.", [[8, -1, 0], [3, -2, 0], [4, 5, 0]]),
+        ("G51.1X0\nG0X1.\nG69\nX2.\nG81Y3.Z-5.R2.F50.\nG50.1X0", [[-1, 0, 0], [-2, 0, 0], [-2, 3, -5]]),
         ("G1X1.F50.\nG31Z-5.\nG0Z9.\nX2.", [[1, 0, 0], [1, 0, np.nan], [1, 0, 9], [2, 0, 9]]),
     ],
 )
@@ -71,6 +74,19 @@ def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
 )
 def test_what_differs_from_control_to_control_is_refused(text: str, reason: str) -> None:
     assert reason in reasons(follow(text, setup=SETUP, dialect="fanuc"))[-1]
+
+
+@pytest.mark.parametrize("mirror", ["", "X0", "Y0", "Z0", "X0Y0"])
+def test_mirrored_arcs_turn_the_other_way(mirror: str) -> None:
+    text = f"G51.1{mirror}\n" if mirror else ""
+    moves = follow(f"{text}G0X5.Y0.Z0.\nG3X0.Y5.Z1.I-5.J0.F50.", setup=SETUP, dialect="fanuc").moves
+    signs = np.array([-1.0 if axis in mirror else 1.0 for axis in "XYZ"])
+    np.testing.assert_allclose(moves.end, signs * [[5, 0, 0], [0, 5, 1]], atol=1e-12)
+    np.testing.assert_allclose(moves.centre[1], 0.0, atol=1e-12)
+    spoke = moves.start[1] * [1, 1, 0]
+    angle = moves.sweep[1]
+    turned = np.cos(angle) * spoke + np.sin(angle) * np.cross(moves.normal[1], spoke)
+    np.testing.assert_allclose(turned, moves.end[1] * [1, 1, 0], atol=1e-12)
 
 
 def test_heights_do_not_depend_on_a_rotation_in_the_plane() -> None:

@@ -19,6 +19,7 @@ class MacroControl(Control):
     """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
     polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
     length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
     length_number  the last H; None if the program has named none
     """
@@ -34,6 +35,7 @@ class MacroControl(Control):
         super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
+        self.mirrored: dict[int, float] = {}
         self.length_code = 0
         self.length_number: int | None = None
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix.program.fanuc import data, lengths, polar, references, tilt
+from ncfix.program.fanuc import data, lengths, mirror, polar, references, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
 from ncfix.program.fanuc.variables import is_system
@@ -70,6 +70,8 @@ FANUC = Rules(
         300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: unfollowed,
+        501: mirror.mirror,
+        511: mirror.mirror,
         531: tilt.align,
         680: tilt.rotate,
         682: tilt.tilt,

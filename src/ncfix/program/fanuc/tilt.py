@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 TILT, CANCEL = 682, 690
 EULER, ROLL_PITCH_YAW = 0, 1
+ORDER = 123
+"""X, Y, Z: the order of the turns of G68.2 P1 that is followed."""
 ALIGNMENT = "tool axis alignment (G53.1)"
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane (G53.1) is not known"
 TURNED_TO = "NCF243"
@@ -42,7 +44,8 @@ TURNED_TO = "NCF243"
 def tilt(control: MacroControl, block: Block, code: int) -> None:
     """G68.2 X Y Z I J K: the frame at X Y Z, turned by I J K; forms that are not followed are refused."""
     form = whole(block.get("P", EULER), "P of G68.2")
-    if code != TILT or form not in (EULER, ROLL_PITCH_YAW) or ("Q" in block.values and block.get("Q") != 123):
+    known = code == TILT and form in (EULER, ROLL_PITCH_YAW) and block.get("Q", ORDER) == ORDER
+    if control.mirrored or not known:
         unfollowed(control, block, code)
         return
     if block.runtime:
@@ -70,7 +73,10 @@ def roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Rotation:
 
 
 def rotate(control: MacroControl, block: Block, code: int) -> None:
-    """G68 and G69; G68 with I J K turns in space and is not followed."""
+    """G68 and G69; G68 with I J K turns in space and is not followed, nor is any in mirrored coordinates."""
+    if control.mirrored:
+        unfollowed(control, block, CANCEL if code == CANCEL else TILT)
+        return
     if code == CANCEL:
         end(control)
     elif block.values.keys() & {"I", "J", "K"}:

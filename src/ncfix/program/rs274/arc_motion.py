@@ -36,7 +36,7 @@ def arc(control: Control, block: Block, code: int) -> None:
             raise
         centre = (1.0, 0.0)
     turns = turns_of(block) if control.rules.strict else 1
-    sweep = sweep_angle(centre, end, turns, clockwise=clockwise)
+    sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
     refusal = refusal_of(block, plane)
     control.move(
         Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep)

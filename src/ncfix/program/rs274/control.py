@@ -86,6 +86,7 @@ class Control:
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
+    handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     whole      the motions of the block must not be split, as under cutter compensation
     saved      the modal states that M70 saved, one place for each call level
     """
@@ -123,6 +124,7 @@ class Control:
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
         self.whole = False
+        self.handedness = 1.0
         self.ends: list[Vector] | None = None
         self.external = ""
         self.tcp = setup.tcp
