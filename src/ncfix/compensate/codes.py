@@ -128,7 +128,7 @@ CODES = {
     "NCF433": Code(
         "a block that cannot be written once for all",
         "The block is executed several times from different places and needs another correction each time, or it has "
-        "to stay as it is because a refused block depends on it.",
+        "to stay as it is because a refused arc, whose line is named, begins where it ends: only so does the arc close.",
         "Write the loop out, or accept it with `--allow-refused`.",
     ),
     "NCF437": Code(
