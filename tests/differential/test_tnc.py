@@ -120,6 +120,11 @@ def test_generated_programs_do_what_was_meant(seed: int, figures: Callable[[str]
     assert max(worst.values()) <= ENDS
 
 
+def test_a_generated_program_in_inches_does_what_was_meant() -> None:
+    text = Maker(200, control(), "INCH").program(5)
+    assert max(judged(text, fix(text), errors.load(FILE)).values()) <= ALONG
+
+
 def test_the_judge_sees_what_was_not_corrected() -> None:
     text = Maker(SEEDS[0], control()).program(8)
     untouched = replace(fix(text), text=text.encode())

@@ -265,7 +265,7 @@ class Tnc:
         sweep = (2 * math.pi if sweep < 1e-6 or sweep > 2 * math.pi - 1e-6 else sweep) * sense
         if name == "CP" and "IPA" in words:
             sweep = math.radians(words["IPA"])
-        shares = np.linspace(0, 1, max(8, int(abs(sweep) * math.sqrt(abs(a - centre) / (8 * SAGITTA))) + 2))
+        shares = np.linspace(0, 1, max(8, int(abs(sweep) * math.sqrt(abs(a - centre) * self.unit / (8 * SAGITTA))) + 2))
         spokes = (a - centre) * np.exp(1j * sweep * shares)
         spokes *= 1 + shares * (abs(b - centre) / abs(a - centre) - 1)
         points = start + shares[:, None] * (end - start)

@@ -32,7 +32,8 @@ SECTIONS = [
 class Maker:
     """Makes one program; `control` stands where the program so far has led."""
 
-    def __init__(self, seed: int, control: Tnc) -> None:
+    def __init__(self, seed: int, control: Tnc, unit: str = "MM") -> None:
+        self.unit = unit
         self.dice = random.Random(seed)
         self.control = control
         self.lines: list[str] = []
@@ -41,7 +42,7 @@ class Maker:
 
     def program(self, elements: int) -> str:
         """A program of so many elements."""
-        self.emit("BEGIN PGM G MM", "TOOL CALL 1 Z S1000", "L X+10 Y+5 Z+20 FMAX", "L Z-1 F500")
+        self.emit(f"BEGIN PGM G {self.unit}", "TOOL CALL 1 Z S1000", "L X+10 Y+5 Z+20 FMAX", "L Z-1 F500")
         kinds: list[Callable[[], None]] = [self.straight, self.arc, self.polar, self.tangent, self.elsewhere]
         kinds += [self.frame, self.holes, self.flow, self.values]
         for _ in range(elements):
@@ -49,7 +50,7 @@ class Maker:
         self.emit("L Z+60 FMAX M30")
         for name in sorted(self.called):
             self.lines += [f"LBL {name}", *SUBPROGRAMS[name], "LBL 0"]
-        return "\n".join([*self.lines, "END PGM G MM", ""])
+        return "\n".join([*self.lines, f"END PGM G {self.unit}", ""])
 
     def emit(self, *lines: str) -> None:
         """Blocks that are executed where they stand."""

@@ -105,3 +105,16 @@ def test_a_free_contour_begins_where_it_was_meant_to() -> None:
     assert [refusal.line for refusal in report.refused] == [3, 4, 5]
     assert "FK" in report.refused[1].reason
     assert "starts from its end" in report.refused[0].reason
+
+
+@pytest.mark.parametrize("frame", ["CYCL DEF 7.0 D\nCYCL DEF 7.1 X+3", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+30"])
+@pytest.mark.parametrize("use", ["LP PR+10 PA+0 Z+0", "C X+0 Y+10 DR+", "CP IPA+90 DR+"])
+def test_a_pole_of_another_datum(frame: str, use: str) -> None:
+    body = f"L X+10 Y+0 Z+0 F100\nCC X+0 Y+0\n{frame}\nL X+10 Y+0 Z+0\n{use}"
+    assert "before the datum was moved" in reasons(body)[0]
+    assert reasons(body.replace("CC X+0 Y+0\n", "").replace(use, f"CC X+0 Y+0\n{use}")) == []
+
+
+@pytest.mark.parametrize(("number", "reason"), [(800, "for turning"), (331, "machine builder's")])
+def test_cycles_that_act_where_they_are_defined(number: int, reason: str) -> None:
+    assert reason in reasons(f"L X+1 F100\nCYCL DEF {number} NAME\nL X+5")[0]

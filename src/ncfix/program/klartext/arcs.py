@@ -18,6 +18,7 @@ from ncfix.program.klartext.targets import (
     here,
     led,
     polar,
+    pole_frame,
     starts_unknown,
 )
 from ncfix.program.moves import Kind
@@ -30,6 +31,7 @@ BAD_ARC = "NCF220"
 
 CLOCKWISE, COUNTER = 20, 30
 NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
+AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
 FLAT = 1e-9
 
 
@@ -49,6 +51,9 @@ def circular(control: Control, step: Step) -> None:
     control.use()
     where = led(control, step.words)
     if give_up(control, step, where):
+        return
+    if control.path.pole_in != pole_frame(control):
+        do_without(control, step, where, AROUND)
         return
     start, end = points(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]

@@ -35,6 +35,7 @@ class Path:
     """What the next path function may need of the ones before.
 
     pole     the pole, mm along the axes of its plane in the program's frame; None where not known
+    pole_in  the frame in which it was set: datum along its axes, rotation, unit
     plane    the plane of the pole
     tangent  the direction in which the last path element ended, commands; None where there is none
     corner   the block before was a corner (RND, CHF)
@@ -43,6 +44,7 @@ class Path:
     """
 
     pole: tuple[float, float] | None = None
+    pole_in: object = None
     plane: Plane = PLANES[170]
     tangent: tuple[float, float, float] | None = None
     corner: bool = False

@@ -24,6 +24,10 @@ DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 OLD_DRILLING = frozenset({1, 2, 17, 18})
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
 DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
+ADJUSTING = frozenset({800, 801, 880})
+ADJUSTED = "cycle {} changes coordinates for turning, which is not followed"
+BUILDERS = range(300, 400)
+OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
 CALLING = 12
 CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
@@ -57,6 +61,10 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
         return
     if cycle in HARMLESS:
         return
+    if cycle in ADJUSTING:
+        control.refusal = control.refusal or ADJUSTED.format(cycle)
+    if cycle in BUILDERS:
+        control.refuse_here(OF_BUILDER.format(cycle))
     if cycle in (ON_CIRCLE, ON_LINES):
         pattern(control, pattern_of_cycle(cycle, control.scope.parameters), f"cycle {cycle}")
         return

@@ -16,6 +16,7 @@ from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Vector, X, Y,
 from ncfix.program.rs274.faults import Fault
 
 BAD_POLE = "NCF271"
+POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"
 COUNTED_FROM = "where the axis {} stands after incremental words with M91 depends on what the control counts from"
 RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
 PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
@@ -160,6 +161,13 @@ def set_pole(control: Control, words: Words) -> None:
     values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
     lost = [i for i in (plane.first, plane.second) if i in where.unknown and (i in named or i not in keep)]
     path.plane, path.pole = plane, None if lost else (values[0], values[1])
+    path.pole_in = pole_frame(control)
+
+
+def pole_frame(control: Control) -> object:
+    """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
+    plane = control.path.plane
+    return control.offset[plane.first], control.offset[plane.second], control.rotation, control.modal.unit
 
 
 def polar(control: Control, words: Words) -> tuple[Where, float | None]:
@@ -187,6 +195,8 @@ def polar(control: Control, words: Words) -> tuple[Where, float | None]:
     reasons = [start.unknown[i] for i in (plane.first, plane.second) if relative and i in start.unknown]
     if words.runtime & {"PR", "PA", "IPR", "IPA"}:
         reasons.append(RUNTIME)
+    if path.pole_in != pole_frame(control):
+        reasons.append(POLE_MOVED)
     for index in (plane.first, plane.second):
         where.unknown.pop(index, None)
         if reasons:
