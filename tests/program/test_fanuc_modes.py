@@ -100,6 +100,11 @@ def test_haas_adds_rotations() -> None:
     assert last(found) == pytest.approx([0, 1, 0])
 
 
+def test_k_is_the_smallest_peck_of_haas() -> None:
+    found = follow("G83X1.Z-5.R2.I.5J.1K.2F50.\nX3.L2", setup=SETUP, dialect="haas")
+    assert ends(found) == [[1, 0, -5], [3, 0, -5], [3, 0, -5]]
+
+
 def test_a_stretch_after_a_rotation_is_taken_block_by_block() -> None:
     lines = "\n".join(f"X{n}." for n in range(1, 31))
     found = follow(f"G0X1.Y1.\nG68X0Y0R30.\nX2.Y2.\nG69\n{lines}", setup=SETUP, dialect="fanuc")

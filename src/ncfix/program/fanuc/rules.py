@@ -94,9 +94,10 @@ HAAS = replace(
     g_groups=FANUC_G | {470: groups.NON_MODAL} | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
     steps={**FANUC.steps, 470: data.engrave, **dict.fromkeys(HAAS_OFFSETS, data.extended)},
     takes=FANUC.takes | {470},
+    repeats="L",
     adds_rotations=True,
 )
-"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), and engraves texts."""
+"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), engraves texts, and pecks by I J K."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS}
 """By `Dialect.semantics`."""

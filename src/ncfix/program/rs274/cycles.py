@@ -87,8 +87,8 @@ def levels(control: Control, initial: float) -> tuple[float, float]:
 
 
 def repeats(control: Control, block: Block) -> int:
-    """How many times the block drills: L, or K of ISO controls."""
-    letter = "L" if control.rules.strict or "L" in block.values else "K"
+    """How many times the block drills: L, or K of most ISO controls."""
+    letter = next((each for each in control.rules.repeats if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
     if count < 1 and control.rules.strict:
         raise Fault(BAD_CYCLE, "L, the number of repeats, must be 1 or more")

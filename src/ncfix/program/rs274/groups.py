@@ -101,6 +101,7 @@ class Rules:
     m_groups    the group of every M code that is followed
     steps       G code -> what is done for it instead of what `order` says
     cycles      G codes of canned cycles
+    repeats     addresses that say how often a canned cycle drills
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
     adds_rotations  in G91 the angle of G68 is added to that in force
     system      whether a numbered parameter is one of the control's own, so that setting it does something
@@ -113,11 +114,12 @@ class Rules:
     m_groups: Mapping[int, str] = field(default_factory=lambda: LINUXCNC_M)
     steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
     cycles: frozenset[int] = frozenset(CYCLES)
+    repeats: str = "LK"
     takes: frozenset[int] = frozenset()
     adds_rotations: bool = False
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
 
 
-LINUXCNC = Rules(True, LINUXCNC_G, frozenset())
+LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
 ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))

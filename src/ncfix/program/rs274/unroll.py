@@ -310,7 +310,7 @@ def is_place(word: Word, control: Control) -> bool:
     """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
     if word.address in "GM":
         return is_distance(word)
-    return word.address in INDEX or word.address in ("R", "L") or (word.address == "K" and not control.rules.strict)
+    return word.address in INDEX or word.address == "R" or word.address in control.rules.repeats
 
 
 def inside(change: Change, spans: set[tuple[int, int]]) -> bool:
