@@ -167,3 +167,11 @@ def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: P
     wanted = placed(machine, setup).tip(meant, lengths)
     assert len(meant) == 4
     assert np.linalg.norm(real - wanted, axis=1).max() < 0.5e-3
+
+
+@pytest.mark.parametrize("words", ["MB50 F1000", "MB MAX FMAX"])
+def test_after_a_retract_of_plane_the_position_has_to_be_said(root: Path, words: str) -> None:
+    moves = moves_of(
+        root, program(f"PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN {words} SEQ+", "L X+5 F500", "L X+5 Y+6 Z+7 FMAX")
+    )
+    assert moves.rule[-2:].tolist() == [2, 0]

@@ -20,6 +20,9 @@ from ncfix.program.rs274.coordinates import DEGREE, IDENTITY, INDEX, Rotation, p
 from ncfix.program.rs274.faults import Fault
 
 BAD_PLANE = "NCF273"
+RETRACTING = "mb max"
+"""The tool is drawn back before the axes turn."""
+
 NONE = 1e-9
 """rad; an axis that is said to stand at zero."""
 
@@ -67,6 +70,8 @@ def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> N
     """A PLANE block."""
     control.use()
     values = words.values
+    if "MB" in values:
+        flags |= {RETRACTING}
     if form == "reset":
         tilt_to(control, None, flags)
         return
@@ -110,8 +115,8 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
         control.scope.parameters.assign(name, angle / DEGREE, runtime=not known)
     if flags & {"turn", "move"}:
         turn_axes(control, way)
-    if "move" in flags:
-        control.lose(range(3), "where the axis {} stands after PLANE ... MOVE is not followed")
+    if flags & {"move", RETRACTING}:
+        control.lose(range(3), "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed")
     control.recompose()
     control.switch_tip()
     control.path.tangent = None
