@@ -199,3 +199,19 @@ class Author:
         """G91 or G90."""
         self.incremental = not self.incremental
         self.lines.append("G91" if self.incremental else "G90")
+
+
+def looped(seed: int) -> str:
+    """A program with two loops, in which frames, ends and values change from turn to turn."""
+    author = Author(seed)
+    kinds = (author.straight, author.straight, author.arc, author.tangential, author.polar, author.values)
+
+    def body() -> list[str]:
+        author.lines = []
+        for _ in range(author.chance.randint(2, 4)):
+            author.chance.choice(kinds)()
+        return author.lines
+
+    first = ["FOR R9=1 TO 3", "TRANS X=R9*4 Y=-R9", "G0 X=AC(R9*2) Y=AC(3) Z=AC(20+R9)", *body(), "ENDFOR", "TRANS"]
+    second = ["FOR R8=1 TO 2", "G1 X=AC(10*R8) Y=AC(5-R8*2) Z=AC(20)", *body(), "ENDFOR", "G0 Z60", "M30"]
+    return "\n".join([*HEAD, *first, "G0 X=AC(1) Y=AC(2) Z=AC(30)", *second]) + "\n"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,9 @@ import pytest
 from differential import errors, sinumerik
 from differential.sinumerik_frames import Floats
 from differential.sinumerik_motions import Path as Way
-from differential.sinumerik_programs import Author
+from differential.sinumerik_programs import Author, looped
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.flat import fix_flat
 from ncfix.machine import load
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
@@ -39,11 +41,12 @@ TURNED = 0.2
 """Degrees that a rotary axis may be corrected by."""
 
 
-def judged(text: str, root: Path, strategy: str) -> tuple[float, float, int]:
+def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[float, float, int]:
     """The worst distance of ends and of ways from where they should be, mm, and how many lines were judged."""
     text = sinumerik.marked(text)
     program = read(text.encode(), "part.mpf", "siemens")
-    fixed = fix_program(program, load(str(root / MACHINE)), SETUP, FixOptions(strategy=strategy, verify=False))
+    options = FixOptions(strategy=strategy, verify=False, flatten=flat)
+    fixed = (fix_flat if flat else fix_program)(program, load(str(root / MACHINE)), SETUP, options)
     left = {refusal.line for refusal in fixed.report.refused}
     left |= {note.place.line for note in fixed.report.warnings if note.place and "must not be split" in note.text}
     model = errors.load(root / MACHINE)
@@ -66,13 +69,13 @@ def judged(text: str, root: Path, strategy: str) -> tuple[float, float, int]:
 
 
 def by_mark(model: errors.Machine, text: str, actual: bool) -> dict[tuple[int, int], tuple[list[Way], Floats]]:
-    """The motions of a program and the way of the tip (n, 3), by the mark that they belong to."""
+    """The motions of a program and the way of the tip (n, 3), by the mark they belong to, in order of execution."""
     ways = sinumerik.control_of(model, START, offsets=OFFSETS, tools=LENGTHS).run(text)
-    found: dict[tuple[int, int], list[tuple[Way, Floats]]] = {}
-    for way, tip in zip(ways, sinumerik.tips(model, ways, actual), strict=True):
-        found.setdefault(way.mark, []).append((way, tip))
+    pairs = zip(ways, sinumerik.tips(model, ways, actual), strict=True)
+    groups = [list(group) for _, group in groupby(pairs, key=lambda pair: pair[0].mark)]
     return {
-        mark: ([way for way, _ in pairs], np.concatenate([tip for _, tip in pairs])) for mark, pairs in found.items()
+        (place, group[0][0].mark[0]): ([way for way, _ in group], np.concatenate([tip for _, tip in group]))
+        for place, group in enumerate(groups)
     }
 
 
@@ -98,6 +101,18 @@ def test_corrected_programs_do_what_was_meant(strategy: str, root: Path, figures
     figures(
         f"siemens judged, {strategy}: {PROGRAMS} programs, {lines} lines with motions, "
         f"worst end {ends * 1e3:.3f} um, worst on the way {ways * 1e3:.3f} um"
+    )
+
+
+def test_flat_programs_do_what_was_meant(root: Path, figures: Callable[[str], None]) -> None:
+    ends, ways, lines = 0.0, 0.0, 0
+    for seed in range(PROGRAMS // 4):
+        at_end, on_way, count = judged(looped(seed), root, "rotary-then-linear", flat=True)
+        assert at_end < AT_ENDS, f"program {seed}"
+        assert on_way < ON_THE_WAY, f"program {seed}"
+        ends, ways, lines = max(ends, at_end), max(ways, on_way), lines + count
+    figures(
+        f"siemens judged, --flatten: {lines} motions, worst end {ends * 1e3:.3f} um, on the way {ways * 1e3:.3f} um"
     )
 
 
