@@ -9,6 +9,8 @@ holds the two together.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,16 +18,28 @@ from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from ncfix.machine import loops, steps
+from ncfix.machine import aim_loops, loops, steps
 
 Array = NDArray[np.float64]
 
-for function in (*steps.FORMULAS, *loops.HELPERS):
+for function in (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS):
     register_jitable(function)
 # Without the runtime that keeps account of arrays, which would take most of the time: loops make none.
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
-tips = njit(**OPTIONS)(loops.tips)
-aim = njit(**OPTIONS)(loops.aim)
+
+
+def kept(loop: Callable[..., None]) -> Any:
+    """A loop compiled, and kept on the disk until a file that it is made of changes: numba looks at its own only."""
+    kernel = njit(**OPTIONS)(loop)
+    file = getattr(kernel._cache, "_cache_file", None)
+    if file is not None:
+        states = (Path(str(module.__file__)).stat() for module in (steps, loops, aim_loops))
+        file._source_stamp = tuple((state.st_mtime, state.st_size) for state in states)
+    return kernel
+
+
+tips = kept(loops.tips)
+aim = kept(aim_loops.aim)
 
 
 @njit(inline="always")

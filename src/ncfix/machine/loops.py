@@ -14,18 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.machine.steps import (
+    FORTH,
     GIVEN,
     PARTS,
     POWERS,
+    SHIFT,
+    TURN,
     Functions,
     Steps,
-    carried,
     dot,
-    follows,
-    has_arrived,
     held_signal,
+    moved_back,
+    moved_forth,
     next_wave,
-    volume,
+    screwed,
+    turned,
 )
 
 Array = NDArray[np.float64]
@@ -34,6 +37,8 @@ Ints = NDArray[np.int64]
 Packed = tuple[Ints, Array]
 
 HANDFUL = 64
+SPARE = 14
+"""Rows for those who do more with a handful of poses."""
 
 
 class Columns(NamedTuple):
@@ -52,37 +57,19 @@ class Hand(NamedTuple):
     q              (n_axes, .) positions
     sine, versine  (k, .) of rotary axes
     others         functions that come from elsewhere
+    length         (.,) of the tool, mm
     found, values  the functions, and the numbers of the small motions
+    tip            (4, .) x, y, z in mm, and the largest squared angle of a small motion
     """
 
     q: Array
     sine: Array
     versine: Array
     others: Array
+    length: Array
     found: Array
     values: Array
-
-
-class Pose(NamedTuple):
-    """One pose of them."""
-
-    q: Array
-    sine: Array
-    versine: Array
-    values: Array
-
-
-class Goal(NamedTuple):
-    """Where a handful of tips shall be.
-
-    point   (3, .) mm
-    back    (9, .) what takes a gap of the tip to positions of the axes, row after row
-    before  (.,) the size of the gap before, mm; -1 if the axes cannot bring the tip there
-    """
-
-    point: Array
-    back: Array
-    before: Array
+    tip: Array
 
 
 def packed(steps: Steps, functions: Functions) -> Packed:
@@ -124,27 +111,22 @@ def unpacked(ints: Ints, reals: Array) -> tuple[Steps, Functions]:
 
 
 def room(route: Packed, columns: Columns) -> Array:
-    """Room for a handful of poses, and for where their tips shall be, as `laid_out` divides it."""
+    """Room for a handful of poses, and `SPARE` rows more, as `laid_out` divides it."""
     m, f = int(route[0][0]), int(route[0][2])
     rows = len(columns.q) + 2 * len(columns.sine) + len(columns.others) + f + PARTS * m
-    return np.zeros((rows + 13, HANDFUL))
+    return np.zeros((rows + 5 + SPARE, HANDFUL))
 
 
-def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Goal]:
-    """The parts of the room."""
+def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Array]:
+    """The parts of the room, and the rows to spare."""
     axes, sines, others = len(columns.q), len(columns.sine), len(columns.others)
     a = axes + 2 * sines
     b = a + others + f
     c = b + PARTS * m
-    hand = Hand(
-        work[:axes],
-        work[axes : axes + sines],
-        work[axes + sines : a],
-        work[a : a + others],
-        work[a + others : b],
-        work[b:c],
-    )
-    return hand, Goal(work[c : c + 3], work[c + 3 : c + 12], work[c + 12])
+    turns = work[axes : axes + sines], work[axes + sines : a]
+    results = work[a + others : b], work[b:c], work[c : c + 4]
+    hand = Hand(work[:axes], turns[0], turns[1], work[a : a + others], work[c + 4], results[0], results[1], results[2])
+    return hand, work[c + 5 :]
 
 
 def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) -> None:
@@ -157,100 +139,57 @@ def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) ->
         take_up(columns, begin, count, hand)
         work_out(functions, hand, count)
         add_up(functions, hand, count)
-        for k in range(count):
-            at, length = begin + k, tool(columns, begin + k)
-            turns = hand.sine[:, k], hand.versine[:, k]
-            x, y, z, most = carried(steps, hand.values[:, k], length, hand.q[:, k], turns[0], turns[1], 0.0)
-            out[0, at], out[1, at], out[2, at], out[3, at] = x, y, z, most
-
-
-def aim(
-    perfect: Packed,
-    route: Packed,
-    columns: Columns,
-    axes: Ints,
-    target: Array,
-    limits: Array,
-    work: Array,
-    out: Array,
-) -> None:
-    """Newton's method for all poses: as `aim.aimed`, by whole steps.
-
-    axes    the columns of X, Y and Z
-    target  (3, n) mm; (3, 0): where a perfect machine has the tip
-    limits  when a tip has arrived, mm, which volume of its motions is none, and how many steps there are
-    out     (8, n): positions of the axes, gaps at the beginning, mm, largest squared angles of small motions, and
-            whether the tip has arrived
-    """
-    nominal, _ = unpacked(perfect[0], perfect[1])
-    steps, functions = unpacked(route[0], route[1])
-    hand, goal = laid_out(work, columns, len(functions.order), len(steps.kind))
-    close, flat, passes = limits[0], limits[1], limits[2]
-    n = columns.q.shape[1]
-    for begin in range(0, n, HANDFUL):
-        count = min(HANDFUL, n - begin)
-        take_up(columns, begin, count, hand)
-        left = 0
-        for k in range(count):
-            pose = Pose(hand.q[:, k], hand.sine[:, k], hand.versine[:, k], hand.values[:, k])
-            out[6, begin + k], out[7, begin + k] = 0.0, 0.0
-            left += set_out(nominal, axes, pose, tool(columns, begin + k), target, begin + k, flat, goal, k)
-            if goal.before[k] < 0:
-                out[3, begin + k], out[4, begin + k], out[5, begin + k] = 0.0, 0.0, 0.0
-        number = 0
-        while left and number < passes:
-            work_out(functions, hand, count)
-            add_up(functions, hand, count)
+        carry(steps, hand, count, hand.tip)
+        for i in range(4):
             for k in range(count):
-                at, length = begin + k, tool(columns, begin + k)
-                if goal.before[k] >= 0 and out[7, at] == 0.0:
-                    turns = hand.sine[:, k], hand.versine[:, k]
-                    x, y, z, most = carried(steps, hand.values[:, k], length, hand.q[:, k], turns[0], turns[1], 0.0)
-                    gap = x - goal.point[0, k], y - goal.point[1, k], z - goal.point[2, k]
-                    if number == 0:
-                        out[3, at], out[4, at], out[5, at] = gap
-                    out[6, at] = max(out[6, at], most)
-                    out[7, at] = step_closer(axes, gap, close, goal, k, hand)
-                    left -= out[7, at] > 0
-            number += 1
-        for i in range(3):
+                out[i, begin + k] = hand.tip[i, k]
+
+
+def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
+    """Where the tips of a handful of poses go, (4, .): as `steps.carried`."""
+    start, d, p, center = steps.start, steps.direction, steps.point, steps.center
+    for k in range(count):
+        length = hand.length[k]
+        tip[0, k], tip[1, k] = start[0] + start[3] * length, start[1] + start[4] * length
+        tip[2, k], tip[3, k] = start[2] + start[5] * length, 0.0
+    for i in range(len(steps.kind)):
+        kind, axis, j = steps.kind[i], steps.axis[i], 3 * i
+        dx, dy, dz, px, py, pz = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
+        if kind == SHIFT:
             for k in range(count):
-                out[i, begin + k] = hand.q[axes[i], k]
-
-
-def set_out(
-    perfect: Steps, axes: Ints, pose: Pose, length: float, target: Array, at: int, flat: float, goal: Goal, k: int
-) -> bool:
-    """Put down where the tip shall be and how it follows the axes; whether it can be brought there at all."""
-    if target.shape[1]:
-        x, y, z = target[0, at], target[1, at], target[2, at]
-    else:
-        x, y, z, _ = carried(perfect, pose.values, length, pose.q, pose.sine, pose.versine, 0.0)
-    goal.point[0, k], goal.point[1, k], goal.point[2, k] = x, y, z
-    a = follows(perfect, axes[0], pose.sine, pose.versine)
-    b = follows(perfect, axes[1], pose.sine, pose.versine)
-    c = follows(perfect, axes[2], pose.sine, pose.versine)
-    whole, p, q, r = volume(a, b, c)
-    share = 1 / whole
-    for i in range(3):
-        goal.back[i, k], goal.back[3 + i, k], goal.back[6 + i, k] = p[i] * share, q[i] * share, r[i] * share
-    total = x + y + z
-    for i in range(len(pose.q)):
-        total += pose.q[i]
-    possible = np.isfinite(total) and not abs(whole) < flat
-    goal.before[k] = 0.0 if possible else -1.0
-    return possible
-
-
-def step_closer(axes: Ints, gap: tuple[float, float, float], close: float, goal: Goal, k: int, hand: Hand) -> bool:
-    """Move the axes against a gap; whether the tip has arrived with that."""
-    for i in range(3):
-        j = 3 * i
-        hand.q[axes[i], k] -= dot((goal.back[j, k], goal.back[j + 1, k], goal.back[j + 2, k]), gap)
-    size = np.sqrt(dot(gap, gap))
-    there: bool = has_arrived(size, goal.before[k], close)
-    goal.before[k] = size
-    return there
+                way = hand.q[axis, k]
+                tip[0, k], tip[1, k], tip[2, k] = tip[0, k] + dx * way, tip[1, k] + dy * way, tip[2, k] + dz * way
+        elif kind == TURN:
+            for k in range(count):
+                turn = hand.sine[axis, k], hand.versine[axis, k]
+                tip[0, k], tip[1, k], tip[2, k] = turned(
+                    tip[0, k], tip[1, k], tip[2, k], dx, dy, dz, px, py, pz, turn[0], turn[1]
+                )
+        elif not steps.rotates[i]:
+            sign, at = 1.0 if kind == FORTH else -1.0, PARTS * steps.small[i]
+            for part in range(3):
+                for k in range(count):
+                    tip[part, k] = tip[part, k] + sign * hand.values[at + part, k]
+        else:
+            at, a, b, c = PARTS * steps.small[i], center[j], center[j + 1], center[j + 2]
+            for k in range(count):
+                t = hand.values[at, k], hand.values[at + 1, k], hand.values[at + 2, k]
+                r = hand.values[at + 3, k], hand.values[at + 4, k], hand.values[at + 5, k]
+                s, middle = dot(r, r), (a, b, c)
+                tip[3, k] = max(tip[3, k], s)
+                if steps.screws[i]:
+                    x, y, z = hand.values[at + 6, k], hand.values[at + 7, k], hand.values[at + 8, k]
+                    more = screwed(s, r[0], r[1], r[2], x, y, z)
+                    t = t[0] + more[0], t[1] + more[1], t[2] + more[2]
+                if axis >= 0:
+                    turn = hand.sine[axis, k], hand.versine[axis, k]
+                    middle = turned(a, b, c, dx, dy, dz, px, py, pz, turn[0], turn[1])
+                here = tip[0, k], tip[1, k], tip[2, k]
+                if kind == FORTH:
+                    found = moved_forth(here[0], here[1], here[2], s, t, r, middle[0], middle[1], middle[2])
+                else:
+                    found = moved_back(here[0], here[1], here[2], s, t, r, middle[0], middle[1], middle[2])
+                tip[0, k], tip[1, k], tip[2, k] = found
 
 
 def take_up(columns: Columns, begin: int, count: int, hand: Hand) -> None:
@@ -259,6 +198,8 @@ def take_up(columns: Columns, begin: int, count: int, hand: Hand) -> None:
     copy(columns.sine, begin, count, hand.sine)
     copy(columns.versine, begin, count, hand.versine)
     copy(columns.others, begin, count, hand.others)
+    for k in range(count):
+        hand.length[k] = columns.length[begin + k] if len(columns.length) > 1 else columns.length[0]
 
 
 def copy(rows: Array, begin: int, count: int, into: Array) -> None:
@@ -266,12 +207,6 @@ def copy(rows: Array, begin: int, count: int, into: Array) -> None:
     for i in range(len(rows)):
         for k in range(count):
             into[i, k] = rows[i, begin + k]
-
-
-def tool(columns: Columns, k: int) -> float:
-    """The tool length at a pose."""
-    length: float = columns.length[k] if len(columns.length) > 1 else columns.length[0]
-    return length
 
 
 def work_out(functions: Functions, hand: Hand, count: int) -> None:
@@ -331,5 +266,15 @@ def add_up(functions: Functions, hand: Hand, count: int) -> None:
         last = part
 
 
-HELPERS = (unpacked, laid_out, set_out, step_closer, take_up, copy, tool, work_out, powers, waves, add_up)
+HELPERS = (
+    unpacked,
+    laid_out,
+    carry,
+    take_up,
+    copy,
+    work_out,
+    powers,
+    waves,
+    add_up,
+)
 """Loops and steps that others are made of."""

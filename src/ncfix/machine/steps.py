@@ -76,10 +76,21 @@ class Functions(NamedTuple):
     gain: Sequence
 
 
-def turned(x: Number, y: Number, z: Number, d: Numbers, p: Numbers, at: int, sine: Number, versine: Number) -> Any:
-    """A point turned about an axis whose direction and point stand in d and p from `at`; versine is 1 - cosine."""
-    dx, dy, dz = d[at], d[at + 1], d[at + 2]
-    ex, ey, ez = twice_crossed(dx, dy, dz, sine, versine, x - p[at], y - p[at + 1], z - p[at + 2])
+def turned(
+    x: Number,
+    y: Number,
+    z: Number,
+    dx: Number,
+    dy: Number,
+    dz: Number,
+    px: Number,
+    py: Number,
+    pz: Number,
+    sine: Number,
+    versine: Number,
+) -> Any:
+    """A point turned about an axis with direction d through p; versine is 1 - cosine."""
+    ex, ey, ez = twice_crossed(dx, dy, dz, sine, versine, x - px, y - py, z - pz)
     return x + ex, y + ey, z + ez
 
 
@@ -100,6 +111,47 @@ def twice_crossed(u: Number, v: Number, w: Number, a: Number, b: Number, x: Numb
     ox, oy, oz = v * z - w * y, w * x - u * z, u * y - v * x
     tx, ty, tz = v * oz - w * oy, w * ox - u * oz, u * oy - v * ox
     return a * ox + b * tx, a * oy + b * ty, a * oz + b * tz
+
+
+def screwed(s: Number, u: Number, v: Number, w: Number, a: Number, b: Number, c: Number) -> Any:
+    """The translation of a screw: rotation vector u v w of squared size s, velocity a b c of the center."""
+    ex, ey, ez = twice_crossed(u, v, w, factors(s)[1], screw_factor(s), a, b, c)
+    return a + ex, b + ey, c + ez
+
+
+def moved_forth(
+    x: Number,
+    y: Number,
+    z: Number,
+    s: Number,
+    t: Any,
+    r: Any,
+    a: Number,
+    b: Number,
+    c: Number,
+) -> Any:
+    """A point after a rotation r of squared size s about a b c, and a translation t."""
+    first, second = factors(s)
+    ex, ey, ez = twice_crossed(r[0], r[1], r[2], first, second, x - a, y - b, z - c)
+    return x + ex + t[0], y + ey + t[1], z + ez + t[2]
+
+
+def moved_back(
+    x: Number,
+    y: Number,
+    z: Number,
+    s: Number,
+    t: Any,
+    r: Any,
+    a: Number,
+    b: Number,
+    c: Number,
+) -> Any:
+    """The point that `moved_forth` takes to x y z."""
+    first, second = factors(s)
+    x, y, z = x - t[0], y - t[1], z - t[2]
+    ex, ey, ez = twice_crossed(-r[0], -r[1], -r[2], first, second, x - a, y - b, z - c)
+    return x + ex, y + ey, z + ez
 
 
 def held_signal(position: Number, unit: float, low: float, high: float, center: float, scale: float) -> Number:
@@ -162,40 +214,33 @@ def carried(
     sine, versine  of the rotary ones
     largest        zero
     """
-    start, d, center = steps.start, steps.direction, steps.center
+    start, d, p, center = steps.start, steps.direction, steps.point, steps.center
     x, y, z = start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
     for i in range(len(steps.kind)):
         kind, axis, j = steps.kind[i], steps.axis[i], 3 * i
+        line = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
         if kind == SHIFT:
-            way = q[axis]
-            x, y, z = x + d[j] * way, y + d[j + 1] * way, z + d[j + 2] * way
-        elif kind == TURN:
-            x, y, z = turned(x, y, z, d, steps.point, j, sine[axis], versine[axis])
-        else:
-            at = PARTS * steps.small[i]
-            tx, ty, tz = values[at], values[at + 1], values[at + 2]
-            if not steps.rotates[i]:
-                sign = 1.0 if kind == FORTH else -1.0
-                x, y, z = x + sign * tx, y + sign * ty, z + sign * tz
-            else:
-                u, v, w = values[at + 3], values[at + 4], values[at + 5]
-                s = u * u + v * v + w * w
-                largest = np.maximum(largest, s)
-                first, second = factors(s)
-                if steps.screws[i]:
-                    a, b, c = values[at + 6], values[at + 7], values[at + 8]
-                    ex, ey, ez = twice_crossed(u, v, w, second, screw_factor(s), a, b, c)
-                    tx, ty, tz = tx + (a + ex), ty + (b + ey), tz + (c + ez)
-                a, b, c = center[j], center[j + 1], center[j + 2]
-                if axis >= 0:
-                    a, b, c = turned(a, b, c, d, steps.point, j, sine[axis], versine[axis])
-                if kind == FORTH:
-                    ex, ey, ez = twice_crossed(u, v, w, first, second, x - a, y - b, z - c)
-                    x, y, z = x + ex + tx, y + ey + ty, z + ez + tz
-                else:
-                    x, y, z = x - tx, y - ty, z - tz
-                    ex, ey, ez = twice_crossed(-u, -v, -w, first, second, x - a, y - b, z - c)
-                    x, y, z = x + ex, y + ey, z + ez
+            x, y, z = x + line[0] * q[axis], y + line[1] * q[axis], z + line[2] * q[axis]
+            continue
+        if kind == TURN:
+            x, y, z = turned(x, y, z, *line, sine[axis], versine[axis])
+            continue
+        at = PARTS * steps.small[i]
+        t, r = tuple(values[at : at + 3]), tuple(values[at + 3 : at + 6])
+        if not steps.rotates[i]:
+            sign = 1.0 if kind == FORTH else -1.0
+            x, y, z = x + sign * t[0], y + sign * t[1], z + sign * t[2]
+            continue
+        s = dot(r, r)
+        largest = np.maximum(largest, s)
+        if steps.screws[i]:
+            more = screwed(s, *r, *values[at + 6 : at + 9])
+            t = t[0] + more[0], t[1] + more[1], t[2] + more[2]
+        middle = center[j], center[j + 1], center[j + 2]
+        if axis >= 0:
+            middle = turned(*middle, *line, sine[axis], versine[axis])
+        move = moved_forth if kind == FORTH else moved_back
+        x, y, z = move(x, y, z, s, t, r, *middle)
     return x, y, z, largest
 
 
@@ -235,10 +280,11 @@ FORMULAS = (
     factors,
     screw_factor,
     twice_crossed,
+    screwed,
+    moved_forth,
+    moved_back,
     held_signal,
     next_wave,
-    carried,
-    follows,
     volume,
     dot,
     has_arrived,
