@@ -28,6 +28,7 @@ UNFOLLOWED = {
     50: "parameters of the control (G10 L50)",
     52: "parameters of the control (G10 L52)",
 }
+CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
 HARMLESS = frozenset({3, 12, 13})
 """Tool life, and tool radii, which only the control's cutter compensation uses."""
 
@@ -101,6 +102,13 @@ def set_length(control: Control, block: Block) -> None:
     length = control.modal.unit * block.values["R"]
     if control.modal.incremental:
         length += control.tools.lengths.get(number, control.knowledge.tool_length(number))
+    keep_length(control, number, length, runtime="R" in block.runtime)
+
+
+def keep_length(control: Control, number: int, length: float, *, runtime: bool) -> None:
+    """The program sets the length of a tool, mm; `runtime`: it is known at run time only."""
+    if control.tools.offset == number and (runtime or length != control.offsets.tool[Z]):
+        control.suspended[CHANGED] = CHANGED
     control.tools.lengths[number] = length
-    if "R" in block.runtime:
+    if runtime:
         control.tools.measured.add(number)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ncfix.program.fanuc.data import CHANGED
 from ncfix.program.rs274 import lengths
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.coordinates import Z
@@ -35,6 +36,7 @@ CANCEL = (PLAIN_CANCEL, 491)
 def tool_offset(control: MacroControl, block: Block, code: int) -> None:
     """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
     before = control.offsets.tool[Z]
+    control.suspended.pop(CHANGED, None)
     if code in CANCEL:
         control.length_code = 0
     else:

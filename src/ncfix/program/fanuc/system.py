@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
+from ncfix.program.fanuc.data import keep_length
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.systems import activate, before_persistent
 
@@ -106,7 +107,4 @@ def was_set(control: MacroControl, number: int, value: float, runtime: bool) -> 
 
 def set_length(control: MacroControl, number: int, value: float, runtime: bool) -> None:
     """A tool length is set."""
-    tool = number - LENGTHS.start + 1
-    control.tools.lengths[tool] = control.modal.unit * value
-    if runtime:
-        control.tools.measured.add(tool)
+    keep_length(control, number - LENGTHS.start + 1, control.modal.unit * value, runtime=runtime)
