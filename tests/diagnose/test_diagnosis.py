@@ -61,6 +61,8 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert set(found["gap_um"]) == {"before", "after", "floor", "holdout_before", "holdout_after"}
     wanted = {"name", "title", "axis", "why", "coefficients", "sigma", "p_value", "aliases"}
     assert wanted <= set(found["effects"][0])
+    assert found["effects"][0]["plausible"]["is"]
+    assert found["effects"][0]["targets"] == ["fix", "export linuxcnc", "export fanuc-pitch", "export siemens"]
     assert result.with_provenance(backlash).provenance["added"] == "backlash X"
 
 

@@ -8,6 +8,7 @@ is diagonal for every share of that background: sigma^2 (1 + share^2 `spectrum`)
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -122,9 +123,8 @@ def _everything(view: View, named: Sequence[Group], relative: Array) -> Array:
     But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
     """
     groups = [group for group in named if not group.owner.constant]
-    names = {group.owner.name for group in groups}
-    forms = {name: sum(group.owner.name == name for group in groups) for name in names}
-    parts = [group.columns / np.sqrt(forms[group.owner.name] * len(names)) for group in groups]
+    forms = Counter(group.owner.name for group in groups)
+    parts = [group.columns / np.sqrt(forms[group.owner.name] * len(forms)) for group in groups]
     return apart(view, np.concatenate([np.zeros((len(relative), 0)), *parts], axis=1), named) / relative[:, None]
 
 

@@ -8,10 +8,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.diagnose import addition, checks, constants, gapmap, holdout, mistakes, next_poses, noise, outliers, rest
+from ncfix.diagnose import (
+    addition,
+    checks,
+    constants,
+    gapmap,
+    holdout,
+    mistakes,
+    next_poses,
+    noise,
+    outliers,
+    plausible,
+    rest,
+)
 from ncfix.diagnose.background import Background, background
 from ncfix.diagnose.catalogue import Candidate, catalogue, without
-from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.evidence import Court, Evidence, Member
 from ncfix.diagnose.groups import Gathered, gather
 from ncfix.diagnose.rivals import rivals, scaled
 from ncfix.diagnose.selection import Selected, aliases, select
@@ -49,6 +61,7 @@ class Finding:
     size_um     rms of what it shows
     effects     as they stand in the machine file; empty for what belongs to the measurement
     shown       (m,) what it shows, um
+    judgement   whether its constants are such as machines have; None where there are none
     """
 
     candidate: Candidate
@@ -58,6 +71,7 @@ class Finding:
     size_um: float
     effects: tuple[Effect, ...]
     shown: Array
+    judgement: plausible.Judgement | None = None
 
 
 @dataclass(frozen=True)
@@ -198,6 +212,7 @@ def _concluded(
         Finding(
             court.groups[member.group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
             tuple(aliases(selected, name, ALIKE)), seen.rms(shown, keep), effects, shown,
+            plausible.judged(seen, court.groups[member.group].owner, effects),
         )
         for name, member, effects, shown in zip(selected.named, told, added, joint.shown, strict=True)
     )  # fmt: skip
@@ -231,11 +246,11 @@ def _concluded(
         p_left=p_left,
         view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
         before=joint.before, after=joint.after, court=court,
-        proposal=_proposal(court, selected, joint, sigma) if told else None,
+        proposal=_proposal(court, selected, sigma) if told else None,
     )  # fmt: skip
 
 
-def _proposal(court: Court, selected: Selected, joint: addition.Joint, sigma: float) -> next_poses.Proposal | None:
+def _proposal(court: Court, selected: Selected, sigma: float) -> next_poses.Proposal | None:
     """Poses that tell the first name from those that come near it."""
     name = selected.named[0]
     runners = selected.runners[name]
@@ -247,10 +262,16 @@ def _proposal(court: Court, selected: Selected, joint: addition.Joint, sigma: fl
         return None
     others = [member for key, member in selected.members.items() if key != name]
     evidence = court.heard(others)
-    rivals = [evidence.best(court.forms[n]) for n in near]
-    chosen = court.groups[selected.members[name].group]
-    pairs = [(court.groups[r.group], r.size) for r in rivals]
-    return next_poses.propose(court, chosen, joint.numbers[0], pairs, sigma)
+    sides = [_side(court, evidence, others, each) for each in (name, *near)]
+    return next_poses.propose(court, sides[0], sides[1:], sigma)
+
+
+def _side(court: Court, evidence: Evidence, others: Sequence[Member], name: str) -> next_poses.Side:
+    """A name as it would be beside the others."""
+    members = evidence.likeliest(court.forms[name], next_poses.FORMS)
+    numbers = court.numbers([*others, members[0]], addition.likeliest_share(evidence.null))[-1]
+    forms = tuple((court.groups[member.group], member.size) for member in members)
+    return next_poses.Side(forms[0][0], numbers, forms)
 
 
 def _nameless(court: Court, selected: Selected, keep: NDArray[np.bool_] | None = None) -> float:

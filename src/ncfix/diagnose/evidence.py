@@ -69,9 +69,13 @@ class Evidence:
 
     def best(self, groups: Sequence[int]) -> Member:
         """Its likeliest form and size."""
+        return self.likeliest(groups, 1)[0]
+
+    def likeliest(self, groups: Sequence[int], count: int) -> list[Member]:
+        """Its likeliest forms, each with its likeliest size."""
         weight = logsumexp(self.odds[self._places(groups)] + self.null[None, :, None], axis=1)
-        form, size = np.unravel_index(int(weight.argmax()), weight.shape)
-        return Member(groups[int(form)], SIZES[int(size)])
+        order = np.argsort(-weight.max(axis=1))[:count]
+        return [Member(groups[int(form)], SIZES[int(weight[form].argmax())]) for form in order]
 
 
 @dataclass(frozen=True, repr=False)
@@ -214,20 +218,22 @@ class Court:
         chosen = [len(self.forms[self.groups[m.group].owner.name]) * len(SIZES) for m in members]
         return null - float(np.log(chosen).sum())
 
-    def shown(self, members: Sequence[Member], share: float) -> list[Array]:
-        """What each member shows when all are fitted, (m,) um."""
+    def numbers(self, members: Sequence[Member], share: float) -> list[Array]:
+        """The most probable numbers behind each member when all are fitted, per um."""
         if not members:
             return []
         variance = self.background.variance(share)
-        columns = np.concatenate([self.columns[:, self.part(m.group)] * m.size for m in members], axis=1)
-        weighed = columns / variance[:, None]
-        numbers = np.linalg.solve(columns.T @ weighed + np.eye(columns.shape[1]), weighed.T @ self.y)
-        found, at = [], 0
-        for m in members:
-            own = self.groups[m.group].columns
-            found.append(m.size * own @ numbers[at : at + own.shape[1]])
-            at += own.shape[1]
-        return found
+        known = self._known(members, None)
+        weighed = known / variance[:, None]
+        found = np.linalg.solve(known.T @ weighed + np.eye(known.shape[1]), weighed.T @ self.y)
+        widths = [self.groups[m.group].columns.shape[1] for m in members]
+        parts = np.split(found, np.cumsum(widths)[:-1])
+        return [m.size * part for m, part in zip(members, parts, strict=True)]
+
+    def shown(self, members: Sequence[Member], share: float) -> list[Array]:
+        """What each member shows when all are fitted, (m,) um."""
+        numbers = self.numbers(members, share)
+        return [self.groups[m.group].columns @ own for m, own in zip(members, numbers, strict=True)]
 
     def _by_width(self) -> dict[int, list[int]]:
         widths: dict[int, list[int]] = {}

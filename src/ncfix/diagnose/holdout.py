@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from ncfix.diagnose.addition import WIDE
 from ncfix.diagnose.background import Background
@@ -58,7 +59,7 @@ def _predicted(ground: Background, signal: Array, cover: Array, test: NDArray[np
     train, y = ~test, ground.view.y
     both = signal[np.ix_(train, train)] + cover[np.ix_(train, train)]
     cross = signal[np.ix_(test, train)]
-    weights = np.linalg.solve(both, np.column_stack([y[train], cross.T]))
+    weights = cho_solve(cho_factor(both), np.column_stack([y[train], cross.T]))
     error: Array = y[test] - cross @ weights[:, 0]
     variance = np.diag(signal)[test] - np.einsum("ij,ji->i", cross, weights[:, 1:])
     error[variance > (BLIND * ground.sigma) ** 2] = np.nan

@@ -21,10 +21,13 @@ from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 
 COUNT = 12
-OFFERED = 160
-PASSES = 2
+OFFERED = 320
+PASSES = 4
 STARTS = 60
-TRIED = 50
+CLIMBED = 3
+"""Of so many random dozens, so many are improved."""
+FORMS = 3
+"""Forms of a name that may imitate."""
 LONGER = 1.8
 """A second tool, where only one was used, is so much longer."""
 TOLD = 6.0
@@ -32,6 +35,15 @@ TOLD = 6.0
 BETTER = 1.2
 WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
+
+
+@dataclass(frozen=True, repr=False)
+class Side:
+    """A name with what it would be: its likeliest form, the numbers behind it, and all forms with their sizes in um."""
+
+    group: Group
+    numbers: Array
+    forms: tuple[tuple[Group, float], ...]
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +65,7 @@ class Proposal:
 
 @dataclass(frozen=True, repr=False)
 class Contest:
-    """One rival against the effect: information of the old rows, and the blocks of every pose on offer.
+    """One name against another that imitates it: information of the old rows, and the blocks of every pose on offer.
 
     matrix, vector, square  inner products of what may be refitted, of that with the signal, of the signal
     columns (n, r, k), signal (n, r)  of the poses on offer
@@ -67,26 +79,40 @@ class Contest:
 
     def told(self, rows: Sequence[int]) -> float:
         """What of the signal the refitted rival cannot imitate with these poses too, squared noise units."""
+        matrix, vector, square = self.summed(rows)
+        return square - float(vector @ np.linalg.solve(matrix, vector))
+
+    def summed(self, rows: Sequence[int]) -> tuple[Array, Array, float]:
+        """Inner products of old rows and these."""
         own = self.columns[list(rows)].reshape(-1, self.columns.shape[2])
         seen = self.signal[list(rows)].ravel()
-        matrix, vector = self.matrix + own.T @ own, self.vector + own.T @ seen
-        return self.square + float(seen @ seen) - float(vector @ np.linalg.solve(matrix, vector))
+        return self.matrix + own.T @ own, self.vector + own.T @ seen, self.square + float(seen @ seen)
+
+    def told_with(self, rows: Sequence[int]) -> Array:
+        """The same with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
+        matrix, vector, square = self.summed(rows)
+        count, height, width = self.columns.shape
+        solved = np.linalg.solve(matrix, np.column_stack([vector, self.columns.reshape(-1, width).T]))
+        missed = self.signal - self.columns @ solved[:, 0]
+        spread = np.eye(height) + self.columns @ solved[:, 1:].reshape(width, count, height).transpose(1, 0, 2)
+        gain = np.einsum("nr,nr->n", missed, np.linalg.solve(spread, missed[:, :, None])[:, :, 0])
+        found: Array = square - float(vector @ solved[:, 0]) + gain
+        return found
 
 
-def propose(
-    court: Court, chosen: Group, numbers: Array, rivals: Sequence[tuple[Group, float]], sigma: float
-) -> Proposal:
-    """The poses that tell `chosen`, with these numbers, from the rivals, each with its size in um."""
+def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) -> Proposal:
+    """The poses that tell `chosen` from the rivals, whichever of them is true."""
     offered = _offered(court)
     new = observe(offered, court.background.view.machine)
-    contests = [_contest(court, new, chosen, numbers, rival, size, sigma) for rival, size in rivals]
-    names = tuple(dict.fromkeys(rival.owner.name for rival, _ in rivals))
+    pairs = [pair for rival in rivals for pair in ((chosen, rival), (rival, chosen))]
+    contests = [_contest(court, new, true, other, sigma) for true, other in pairs]
+    names = tuple(dict.fromkeys(rival.group.owner.name for rival in rivals))
     every = list(range(len(offered)))
     useful = [each for each in contests if each.told(every) > TOLD]
     index, after = _exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
     before = min(each.told([]) for each in useful or contests)
     plan = offered.rows(index) if useful and after > BETTER * before else None
-    return Proposal(plan, before, after, _reason(court, chosen, [rival for rival, _ in rivals]), names)
+    return Proposal(plan, before, after, _reason(court, chosen.group, [rival.group for rival in rivals]), names)
 
 
 def _offered(court: Court) -> Measurement:
@@ -95,65 +121,70 @@ def _offered(court: Court) -> Measurement:
     lengths = sorted(set(np.round(view.column("tool_length"), 4).tolist()))
     if len(lengths) == 1:
         lengths = [lengths[0], round(LONGER * lengths[0], 1) if lengths[0] > 0 else 100.0]
-    room = Room(ranges=view.reach.spans, tool_lengths=lengths)
+    loads = view.column("load_kg")
+    inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
+    room = Room(ranges=view.reach.spans, tool_lengths=lengths, inputs=inputs)
     plan = candidates(view.machine, "tcp", OFFERED, room)
-    inputs = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}
-    held = {name: np.full(len(plan), view.column(name)[-1]) for name in inputs if name not in plan.columns}
-    if "load_kg" in held:
-        held["load_kg"] = np.full(len(plan), view.column("load_kg")[0])
+    known = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}
+    held = {name: np.full(len(plan), view.column(name)[-1]) for name in known if name not in plan.columns}
     sets = tuple(f"tool {length:g}" for length in plan.column("tool_length"))
     return replace(plan, columns={**plan.columns, **held}, labels={"set": sets})
 
 
-def _contest(
-    court: Court, new: Observation, chosen: Group, numbers: Array, rival: Group, size: float, sigma: float
-) -> Contest:
-    """Columns: set-up of the old rows, of the new ones, constants of the machine, the rival in units of its size."""
+def _contest(court: Court, new: Observation, true: Side, other: Side, sigma: float) -> Contest:
+    """Columns: set-up of the old rows, of the new ones, constants of the machine, the forms of the other."""
     view = court.background.view
     constants = view.problem.design.shape[1]
     used = view.base.shape[1] - constants
     setup = 1e3 * new.unknown_design(new.unknowns.start)
     fresh, weight = setup.shape[1], 1 / (sigma * view.relative)
-    old = np.concatenate(
-        [view.base[:, :used], np.zeros((len(view.y), fresh)), view.base[:, used:], size * rival.columns], axis=1
-    )
-    shown = [1e3 * new.design(group.owner.effects) @ group.loading for group in (chosen, rival)]
+    imitating = [size * group.columns for group, size in other.forms]
+    old = np.concatenate([view.base[:, :used], np.zeros((len(view.y), fresh)), view.base[:, used:], *imitating], axis=1)
+    imitating = [size * _shown(new, group) for group, size in other.forms]
     kinematic = 1e3 * new.design(view.problem.selection.estimated)
-    rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic, size * shown[1]], axis=1)
+    rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic, *imitating], axis=1)
     free = used + fresh + constants
     scale = np.ones(old.shape[1])
     scale[:free] = np.sqrt((old[:, :free] ** 2).mean(axis=0) + (rows[:, :free] ** 2).mean(axis=0))
     scale = np.where(scale > 0, scale, 1.0)
     prior = np.concatenate([np.full(free, WEAK), np.ones(old.shape[1] - free)])
     old, rows = old / scale * weight[:, None], rows / scale / sigma
-    signal = (chosen.columns @ numbers) * weight
+    signal = (true.group.columns @ true.numbers) * weight
     count = len(new.measurement)
     return Contest(
         old.T @ old + np.diag(prior), old.T @ signal, float(signal @ signal),
-        rows.reshape(count, -1, rows.shape[1]), (shown[0] @ numbers / sigma).reshape(count, -1),
+        rows.reshape(count, -1, rows.shape[1]), (_shown(new, true.group) @ true.numbers / sigma).reshape(count, -1),
     )  # fmt: skip
+
+
+def _shown(new: Observation, group: Group) -> Array:
+    """What the numbers of a form show in the poses on offer, um."""
+    used = group.loading.any(axis=1)
+    shown: Array = 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
+    return shown
 
 
 def _exchanged(contests: Sequence[Contest], count: int) -> tuple[list[int], float]:
     """Start with many random dozens, keep the best, and exchange one pose after another as long as that helps."""
     random = np.random.default_rng(0)
-
-    def worst(rows: list[int]) -> float:
-        return min(each.told(rows) for each in contests)
-
     starts = [random.permutation(count)[:COUNT].tolist() for _ in range(STARTS)]
-    chosen = max(starts, key=worst)
-    value = worst(chosen)
+    starts.sort(key=lambda rows: -min(each.told(rows) for each in contests))
+    climbed = [_climbed(contests, rows) for rows in starts[:CLIMBED]]
+    return max(climbed, key=lambda found: found[1])
+
+
+def _climbed(contests: Sequence[Contest], chosen: list[int]) -> tuple[list[int], float]:
+    """Every pose in turn replaced by the one on offer that helps most in the worst contest."""
+    value = min(each.told(chosen) for each in contests)
     for _ in range(PASSES):
         before = value
-        for place in range(COUNT):
-            for other in random.permutation(count)[:TRIED].tolist():
-                if other in chosen:
-                    continue
-                tried = [*chosen[:place], other, *chosen[place + 1 :]]
-                better = worst(tried)
-                if better > value:
-                    chosen, value = tried, better
+        for place in range(len(chosen)):
+            rest = [*chosen[:place], *chosen[place + 1 :]]
+            told = np.min([each.told_with(rest) for each in contests], axis=0)
+            told[rest] = -np.inf
+            best = int(told.argmax())
+            if told[best] > value:
+                chosen, value = [*chosen[:place], best, *chosen[place + 1 :]], float(told[best])
         if value < 1.02 * before:
             break
     return chosen, value

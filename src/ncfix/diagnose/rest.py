@@ -22,7 +22,7 @@ MISSHAPEN = 0.15
 """How much the shape of an effect may differ from that of the catalogue, as a share of its size."""
 SLOWLY = 1.0
 """Over which length of the axes, of half their travel."""
-STARTS = 3
+STARTS = 2
 """Rivals from which names are looked for anew."""
 
 

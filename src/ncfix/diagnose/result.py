@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.diagnosis import Diagnosis, Finding
 from ncfix.diagnose.next_poses import as_objects
 from ncfix.diagnose.words import why
@@ -51,6 +52,22 @@ def _effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
         "p_value": finding.p_value,
         "aliases": list(finding.aliases),
         "remedy": finding.candidate.remedy,
+        "plausible": _plausible(finding),
+        "targets": list(carriers(found.view.machine, finding.effects)),
+        "conditions": list(conditions(found.view.machine, finding.effects)),
+    }
+
+
+def _plausible(finding: Finding) -> dict[str, Any] | None:
+    if finding.judgement is None:
+        return None
+    names, judged = ("um", "urad"), finding.judgement
+    bounds = dict(zip(names, judged.bounds, strict=True)) if judged.bounds else None
+    return {
+        "is": judged.plausible,
+        "largest": dict(zip(names, judged.largest, strict=True)),
+        "bounds": bounds,
+        "remarks": list(judged.remarks),
     }
 
 

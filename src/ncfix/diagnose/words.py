@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, Finding
 
 SAID = {
-    NOTHING: "nothing is missing: model and measurement agree within the noise",
+    NOTHING: "nothing is missing that stands out of the noise",
     FOUND: "the model lacks something that has a name",
     AMBIGUOUS: "the model lacks something, and these data leave more than one name for it",
     UNKNOWN: "the model lacks something that is not in the catalogue",
@@ -24,14 +25,52 @@ def text(found: Diagnosis) -> str:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(found, finding)}"]
         if finding.aliases:
             lines.append(f"  as likely: {', '.join(finding.aliases)}")
+        lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(found, finding)) if said]
     if found.unknown_um:
-        lines += ["", f"unknown: {found.unknown_um:.1f} um of {found.unknown_kind}"]
+        lines += ["", rest(found)]
     if found.patterns:
         lines += ["", "where:", *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns)]
     lines += _next(found)
     if found.outlying.any():
         lines += ["", f"{int(found.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
+
+
+def constants(finding: Finding) -> str:
+    """The largest error of the joint beside what machines have."""
+    judged = finding.judgement
+    if judged is None:
+        return ""
+    size, bounds = judged.largest, judged.bounds
+    usual = [f"{bound:g} {unit}" for bound, unit in zip(bounds or (), ("um", "urad"), strict=False) if bound]
+    limit = f" (machines have up to {', '.join(usual)})" if usual else ""
+    return f"the joint's own error reaches {size[0]:.1f} um and {size[1]:.1f} urad where it was measured{limit}"
+
+
+def odd(finding: Finding) -> str:
+    """What is odd about the constants."""
+    return (
+        f"hardly plausible: {'; '.join(finding.judgement.remarks)}"
+        if finding.judgement and finding.judgement.remarks
+        else ""
+    )
+
+
+def carried(found: Diagnosis, finding: Finding) -> str:
+    """Which targets can carry the effect."""
+    machine = found.view.machine
+    named = ", ".join(carriers(machine, finding.effects))
+    given = ", ".join(conditions(machine, finding.effects))
+    return f"can be carried by {named}" + (f", with {given} stated" if given else "") if named else ""
+
+
+def rest(found: Diagnosis) -> str:
+    """What has no name; and that it decides nothing, where it does not."""
+    said = f"without a name: {found.unknown_um:.1f} um rms of {found.unknown_kind}"
+    if found.verdict == UNKNOWN:
+        return said
+    why = "no more than one value's noise, and without repeats it may be the part's or the instrument's"
+    return f"{said} ({why if found.floor.source == 'neighbours' else 'too little to decide'})"
 
 
 def _next(found: Diagnosis) -> list[str]:

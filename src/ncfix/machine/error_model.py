@@ -115,8 +115,9 @@ def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> Group:
         basis = basis.merged(effect.basis)
     slots = tuple(dict.fromkeys(slot_of(axes, tool, effect) for effect in members))
     gains = np.zeros((len(slots), 6, basis.size))
+    places = {label: index for index, label in enumerate(basis.labels)}
     for effect in members:
-        columns = [basis.labels.index(label) for label in effect.basis.labels]
+        columns = [places[label] for label in effect.basis.labels]
         unit = unit_motion(axes, effect)
         gains[slots.index(slot_of(axes, tool, effect))][:, columns] += np.outer(unit, effect.coefficients)
     signal, factor = signals_of(axes, members[0])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnose.diagnosis import Diagnosis, Finding
-from ncfix.diagnose.words import SAID, why
+from ncfix.diagnose.words import SAID, carried, constants, odd, rest, why
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
 RUNNERS = 6
@@ -38,7 +38,7 @@ def _verdict(found: Diagnosis) -> Section:
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
     if found.unknown_um:
-        parts.append(Text(f"Without a name: {found.unknown_um:.1f} um rms, {found.unknown_kind}."))
+        parts.append(Text(f"{rest(found).capitalize()}."))
     return Section("Verdict", parts)
 
 
@@ -49,6 +49,9 @@ def _finding(found: Diagnosis, finding: Finding) -> Section:
         parts.append(Text(f"As likely with these data: {', '.join(finding.aliases)}."))
     if candidate.remedy:
         parts.append(Text(f"Remedy: {candidate.remedy}."))
+    parts += [
+        Text(f"{said.capitalize()}.") for said in (constants(finding), odd(finding), carried(found, finding)) if said
+    ]
     return Section(candidate.name, [*parts, *_curve(found, finding), *_runners(found, finding)])
 
 

@@ -1,0 +1,108 @@
+"""Are the fitted constants such as machines have? The bounds of every row of the catalogue, and the signs that mean
+something.
+
+The bounds are wide: what a machine that still cuts parts may have, not what it should have. Beyond them a name is not
+taken back, but it is said: a collision, a wrong unit, or another effect that this one only imitates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.diagnose.catalogue import Candidate
+from ncfix.diagnose.view import View
+from ncfix.machine import Effect
+from ncfix.machine.smooth import Backlash
+
+BOUNDS: dict[str, tuple[float, float]] = {
+    "curve": (100.0, 100.0),
+    "scale": (300.0, 0.0),
+    "line": (500.0, 500.0),
+    "pitch": (30.0, 0.0),
+    "backlash": (100.0, 300.0),
+    "lateral play": (30.0, 0.0),
+    "angular play": (30.0, 100.0),
+    "radial": (60.0, 0.0),
+    "axial": (60.0, 0.0),
+    "wobble": (0.0, 150.0),
+    "encoder": (0.0, 300.0),
+    "worm": (0.0, 150.0),
+    "rotary seat": (60.0, 0.0),
+    "bed sag": (200.0, 300.0),
+    "ram droop": (200.0, 300.0),
+    "column nod": (100.0, 200.0),
+    "foundation tilt": (0.0, 100.0),
+    "table stiffness": (0.0, 100.0),
+    "unbalanced load": (0.0, 150.0),
+    "gravity sag": (150.0, 300.0),
+    "trunnion twist": (0.0, 300.0),
+    "tool droop": (0.0, 150.0),
+    "spindle growth": (200.0, 0.0),
+    "drift": (200.0, 0.0),
+    "ambient swing": (100.0, 0.0),
+    "thermal scale": (150.0, 0.0),
+    "thermal bend": (0.0, 150.0),
+    "rotary centre drift": (150.0, 0.0),
+    "slip": (1000.0, 0.0),
+}
+"""kind -> (um, urad) that the error of the joint reaches at most where it was measured."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the fitted constants amount to.
+
+    largest  the error of the joint, largest where it was measured: um, and urad
+    bounds   the same, of the catalogue's row; None for a row of a plugin
+    remarks  what is odd about size or sign, in words
+    """
+
+    largest: tuple[float, float]
+    bounds: tuple[float, float] | None
+    remarks: tuple[str, ...]
+
+    @property
+    def plausible(self) -> bool:
+        """Whether nothing is odd."""
+        return not self.remarks
+
+
+def kind(candidate: Candidate) -> str:
+    """The row of the catalogue, without the axis."""
+    name = candidate.name
+    if len(name) == 3 and name.startswith("E"):
+        return "curve"
+    if len(name) == 4 and name.startswith("E"):
+        return "line"
+    return name.rsplit(" ", 1)[0] if name.rsplit(" ", 1)[0] in BOUNDS else name
+
+
+def judged(view: View, candidate: Candidate, effects: Sequence[Effect]) -> Judgement | None:
+    """The constants of one finding; None where nothing is added to the machine."""
+    if not effects:
+        return None
+    machine = view.machine.replace(effects=tuple(effects))
+    errors = np.concatenate([machine.joint_errors(each.q, each.state) for each in view.problem.observations])
+    shifts, tilts = 1e3 * np.abs(errors[..., :3]).max(), 1e6 * np.abs(errors[..., 3:]).max()
+    largest, bounds = (float(shifts), float(tilts)), BOUNDS.get(kind(candidate))
+    return Judgement(largest, bounds, (*_size(largest, bounds), *_sign(effects)))
+
+
+def _size(largest: tuple[float, float], bounds: tuple[float, float] | None) -> list[str]:
+    if bounds is None:
+        return []
+    named = zip(largest, bounds, ("um", "urad"), strict=True)
+    return [f"{size:.0f} {unit} is more than {bound:g} {unit}" for size, bound, unit in named if 0 < bound < size]
+
+
+def _sign(effects: Sequence[Effect]) -> list[str]:
+    """Play that is negative: the control takes out more than there is."""
+    first = effects[0]
+    if isinstance(first.basis, Backlash) and 0 in first.basis.degree and first.name[1] == first.joint:
+        lost = first.coefficients[first.basis.degree.index(0)]
+        if lost < 0:
+            return ["negative lost motion: the control's own backlash compensation takes out more than there is"]
+    return []

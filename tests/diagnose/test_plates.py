@@ -1,0 +1,42 @@
+"""Real plates, drilled by a mill and measured on a CMM: what is named, what is not, and that it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from diagnose.plates import PLATES, mill, plain, plate
+from ncfix.diagnose import words
+from ncfix.diagnose.diagnosis import NOTHING, UNKNOWN, diagnose
+
+README = {
+    "D2130A1": (5.4, 4.3, 4.1),
+    "D1396A1": (4.5, 4.5, 4.5),
+    "D1597A, 2003": (6.4, 6.2, 5.7),
+    "D8131": (5.8, 5.8, 5.0),
+}
+"""What the data's own page says that least squares leave: set-up, one scale, scales and shear; um."""
+EXPECTED = {"D2130A1": {"scale X", "scale Y"}, "D1597A, 2003": {"scale Y"}, "D8131": {"EC0Y", "scale Y"}}
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_least_squares_are_those_of_the_page(name: str, shared: Callable[[str], Path]) -> None:
+    found = plain(plate(shared("measurements"), name))
+    assert found == pytest.approx(README[name], abs=0.11)  # printed to 0.1; D8131 is 5.84 there
+
+
+def test_nothing_is_named_on_the_plate_where_there_is_nothing(shared: Callable[[str], Path]) -> None:
+    found = diagnose([plate(shared("measurements"), "D1396A1")], mill())
+    assert (found.verdict, found.findings) == (NOTHING, ())
+    assert "without repeats" in words.text(found)
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_scales_and_squareness_are_named(name: str, shared: Callable[[str], Path]) -> None:
+    found = diagnose([plate(shared("measurements"), name)], mill())
+    names = {each.candidate.name for each in found.findings}
+    assert found.verdict != UNKNOWN
+    assert names >= EXPECTED[name] or ("EC0X" in names and "EC0Y" in EXPECTED[name])
+    assert found.gap.holdout_after < found.gap.holdout_before

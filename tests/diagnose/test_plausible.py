@@ -1,0 +1,57 @@
+"""Sizes and signs of constants that no machine has are said; who can carry an effect."""
+
+from __future__ import annotations
+
+import pytest
+
+from measure.poses import machine, plan
+from ncfix.diagnose import plausible
+from ncfix.diagnose.carriers import carriers, conditions
+from ncfix.diagnose.catalogue import Candidate, catalogue
+from ncfix.diagnose.view import View, view
+from ncfix.machine import Effect
+from ncfix.machine.smooth import Backlash, Fourier, Polynomial
+from ncfix.measure.synthetic import Faults, simulate
+
+
+@pytest.fixture(scope="module")
+def seen() -> View:
+    known = machine("wCBXFZYSt")
+    return view([simulate(plan(known, "tcp", 40), known, Faults(2.0), 1)], known)
+
+
+def play(lost: float) -> tuple[Effect, ...]:
+    return (Effect("EXX", (lost,), Backlash()),)
+
+
+BACKLASH = Candidate("backlash X", "lost motion", "X", "X reversal", (), ())
+
+
+def test_usual_play_is_plausible(seen: View) -> None:
+    judged = plausible.judged(seen, BACKLASH, play(0.016))
+    assert judged is not None
+    assert judged.plausible
+    assert judged.largest == (pytest.approx(8.0), 0.0)  # half of 16 um either way
+
+
+def test_too_large_and_negative_play_is_not(seen: View) -> None:
+    judged = plausible.judged(seen, BACKLASH, play(-0.5))
+    assert judged is not None
+    assert len(judged.remarks) == 2
+
+
+def test_every_row_of_the_catalogue_has_bounds(seen: View) -> None:
+    kinds = {plausible.kind(each) for each in catalogue(seen.reach) if not each.grows}
+    assert kinds <= set(plausible.BOUNDS)
+
+
+def test_who_can_carry(seen: View) -> None:
+    known = seen.machine
+    bow = Effect("EXX", (0.01,), Polynomial(degree=(2,)))
+    assert "export heidenhain" in carriers(known, [bow])
+    assert "export linuxcnc" not in carriers(known, [Effect("EYX", (0.01,), Polynomial(degree=(2,)))])
+    turning = carriers(known, [Effect("EXC", (0.01, 0.0), Fourier(order=(1,)))])
+    assert turning == ("fix", "export siemens", "export isg", "export heidenhain-kinematics", "export fanuc-rotary")
+    warm = Effect("EZS", (0.001,), Polynomial(degree=(1,)), input="temp_spindle")
+    assert (carriers(known, [warm]), conditions(known, [warm])) == (("fix",), ("temp_spindle",))
+    assert carriers(known, []) == ()
