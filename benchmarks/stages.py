@@ -1,7 +1,10 @@
-"""The share of time that each stage of `fix` takes on one long program, as a table: `FILE`."""
+"""Where the time of `fix` goes on one long program, from inside: `FILE`. Prints tables for docs/performance.md."""
 
 from __future__ import annotations
 
+import cProfile
+import io
+import pstats
 import sys
 from collections import defaultdict
 from collections.abc import Callable
@@ -18,6 +21,11 @@ from ncfix.program.rs274.following import RS274Follower
 from ncfix.program.setup import Setup
 
 SETUP = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True)
+MACHINE = Path(__file__).with_name("five_axis.toml")
+WARM = 1 << 20
+"""Bytes of the program that are corrected once before anything is timed: imports and compiled code are loaded."""
+SHOWN = 16
+"""Functions of the profile that are shown."""
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
     ("read the text (twice: the original, and for the proof)", parts.PartReader, "read"),
@@ -33,33 +41,38 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
 
 
 def main() -> None:
-    """Time each stage in both ways."""
-    columns = [timed(compiled) for compiled in (False, True)]
-    print("| stage | plain | `fast` |\n|---|---|---|")
-    for name in [name for name, _, _ in STAGES] + ["the rest"]:
-        print(f"| {name} | " + " | ".join(f"{100 * column[name] / column['all']:.0f} %" for column in columns) + " |")
+    """Time each stage in both ways, and show the functions that take most."""
+    source = Path(sys.argv[1]).read_bytes()
+    blocks = source.count(b"\n")
+    ways = {}
+    for name, switch in (("plain", fast.disengage), ("`fast`", fast.engage)):
+        switch()
+        corrected(source[:WARM])
+        ways[name] = timed(source)
+    print("\n".join(table(ways, blocks)))
+    print("\n".join(["", "### Functions that take most, `fast`", "", *profile(source)]))
 
 
-def timed(compiled: bool) -> dict[str, float]:
+def corrected(source: bytes) -> None:
+    """Correct a program, part by part."""
+    given = (load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
+    stream.Stream(*given, io.BytesIO(source).read, lambda data: None).run()
+
+
+def timed(source: bytes) -> dict[str, float]:
     """CPU seconds of each stage."""
-    fast.disengage()
-    if compiled:
-        fast.engage()
-    program, machine = Path(sys.argv[1]), load(Path(__file__).with_name("five_axis.toml"))
     times: dict[str, float] = defaultdict(float)
     originals = [(owner, attribute, getattr(owner, attribute)) for _, owner, attribute in STAGES]
     for name, owner, attribute in STAGES:
         setattr(owner, attribute, watched(getattr(owner, attribute), name, times))
     try:
-        with program.open("rb") as file:
-            given = (machine, SETUP, FixOptions(), None, str(program), dialects.get("linuxcnc"))
-            begin = process_time()
-            stream.Stream(*given, file.read, lambda data: None).run()
-            times["all"] = process_time() - begin
+        begin = process_time()
+        corrected(source)
+        times["all"] = process_time() - begin
     finally:
         for owner, attribute, original in originals:
             setattr(owner, attribute, original)
-    times["the rest"] = times["all"] - sum(times[name] for name, _, _ in STAGES)
+    times["the rest: joins parts, compares, counts, reports"] = times["all"] - sum(times[name] for name, _, _ in STAGES)
     return times
 
 
@@ -74,6 +87,35 @@ def watched(function: Callable[..., Any], name: str, times: dict[str, float]) ->
             times[name] += process_time() - begin
 
     return call
+
+
+def table(ways: dict[str, dict[str, float]], blocks: int) -> list[str]:
+    """Share and seconds per million blocks of each stage, and how much faster all would be if it took nothing."""
+    rows = ["| stage | " + " | ".join(f"{way} | s per million blocks | without it" for way in ways) + " |"]
+    rows.append("|---|" + "---|" * 3 * len(ways))
+    names = [name for name in next(iter(ways.values())) if name != "all"]
+    for name in [*names, "all"]:
+        cells = []
+        for times in ways.values():
+            share = times[name] / times["all"]
+            gain = f"{1 / (1 - share):.2f} times" if name != "all" else ""
+            cells += [f"{100 * share:.0f} %", f"{1e6 * times[name] / blocks:.2f}", gain]
+        rows.append(f"| {name} | " + " | ".join(cells) + " |")
+    return rows
+
+
+def profile(source: bytes) -> list[str]:
+    """The functions in which most CPU time is spent themselves."""
+    profiler = cProfile.Profile(process_time)
+    profiler.runcall(corrected, source)
+    stats = pstats.Stats(profiler).stats  # type: ignore[attr-defined]
+    whole = sum(each[2] for each in stats.values())
+    rows = ["| function | share | calls |", "|---|---|---|"]
+    for (file, _, function), (_, calls, own, _, _) in sorted(stats.items(), key=lambda each: -each[1][2])[:SHOWN]:
+        place = Path(file)
+        where = f"{place.parent.name}/{place.name}: " if place.suffix == ".py" else ""
+        rows.append(f"| {where}{function.strip('<>')} | {100 * own / whole:.0f} % | {calls} |")
+    return rows
 
 
 if __name__ == "__main__":

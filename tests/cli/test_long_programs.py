@@ -85,8 +85,8 @@ def test_a_refusal_writes_nothing(long_program: Path, fix: Any, tmp_path: Path) 
 
 
 def test_a_pipe_cannot_be_taken_back(long_program: Path, fix: Any) -> None:
-    lines = b"".join(b"X%d.\n" % (10 + k % 50) for k in range(900))
-    source = long_program.read_bytes().replace(b"M2\n", lines + b"G91 G1 X9000.\nG90\nM2\n")
+    lines = b"".join(b"Z%d.\n" % (5 + k % 3) for k in range(900))  # the arc, out of travel, needs X and Y from before
+    source = long_program.read_bytes().replace(b"M2\n", lines + b"G2 X9059. Y23. I4500. J0.\nM2\n")
     result = fix(PART, "-", "--allow-refused", stdin=source)
     assert result.code != ExitCode.DONE
     assert "NCF013" in result.err

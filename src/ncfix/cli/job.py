@@ -12,7 +12,7 @@ from ncfix.batch.journal import Find, Noted, digest_of, text_digest
 from ncfix.cli import console
 from ncfix.cli.faults import fault
 from ncfix.cli.options import dialect_of, subprograms
-from ncfix.cli.parts import Fixed, Outlet, Source, outlet_for, part_bytes, source_of
+from ncfix.cli.parts import Fixed, Outlet, Source, compiled_from, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
 from ncfix.diagnostics import ExitCode, Message, NcfixError, Place
 
@@ -103,7 +103,8 @@ class Job:
     ) -> Iterator[tuple[Stream, Outlet]]:
         from ncfix.compensate.stream import Stream
 
-        fast.engage()
+        if source.size is None or source.size >= compiled_from():
+            fast.engage()
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
             stream = Stream(

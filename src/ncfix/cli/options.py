@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix import fast
-from ncfix.cli.parts import long_from
+from ncfix.cli.parts import compiled_from
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None)
     from ncfix.program.reader import read as read_source
 
     source = read(path)
-    if len(source) >= long_from():
+    if len(source) >= compiled_from():
         fast.engage()
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
 

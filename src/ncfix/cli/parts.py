@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 LONG = 4
 """Parts from which on a program is long; a shorter one is read as a whole."""
+COMPILED = 12
+"""Parts from which on compiled kernels save more time than it takes to load them."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""
 
@@ -34,8 +36,13 @@ def part_bytes() -> int:
 
 
 def long_from() -> int:
-    """Bytes from which on a program is long, and compiled kernels pay."""
+    """Bytes from which on a program is long."""
     return LONG * part_bytes()
+
+
+def compiled_from() -> int:
+    """Bytes from which on compiled kernels pay: loading them takes most of a second."""
+    return COMPILED * part_bytes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +83,11 @@ class Source:
         many = long_from()
         self.head = self._read(many)
         return self.head, len(self.head) == many
+
+    @property
+    def size(self) -> int | None:
+        """The bytes of the whole text; None where that is not known yet."""
+        return os.fstat(self.handle.fileno()).st_size if self.kept is None else None
 
     def read(self, size: int) -> bytes:
         """The next bytes, up to `size`; none at the end."""

@@ -76,8 +76,8 @@ class Tally:
         account = Account.of(moves, settled.kept, settled.reasons)
         theirs = set(moves.block[~own].tolist())
         self.moves += int(own.sum())
-        self.compensated += len(account.compensated - theirs)
-        self.passed += len(account.passed.keys() - theirs)
+        self.compensated += len(account.compensated) - len(theirs & account.compensated)
+        self.passed += len(account.passed) - len(theirs & account.passed.keys())
         self.inserted += settled.emission.added_blocks
         self.changed |= len(settled.emission.splices) > 0
         self.largest = max(self.largest, largest_correction(moves, settled, own))
