@@ -112,7 +112,7 @@ class Renderer(HoleWriter):
             bare = letter not in self.layout.axes and self._left_alone(column)
             if column in self._turning() or bare or not abs(end[column] - position[column]) >= self.half[column]:
                 continue
-            text = self._number(float(end[column]), column)
+            text = self._number(self._turned(column, float(end[column])), column)
             words.append(letter + text)
             position[column] = value_of(text)
         if self.layout.vector:

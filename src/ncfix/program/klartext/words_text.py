@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.klartext.layout import Layout, tilts
 from ncfix.program.klartext.number_text import Style, value_of
+from ncfix.program.klartext.turns import on_its_side
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Literal, Program, Span, Word
@@ -71,10 +72,18 @@ class WordWriter:
             return not turned and (bare or tilts(self.program.source))
         return (layout.corner or layout.name.startswith("dep")) and column == target.spatial[2]
 
+    def _turned(self, column: int, end: float) -> float:
+        """An end, of a rotary axis on its side of zero and of a full turn."""
+        target = self.target
+        if not target.rotary or not target.rotary[column] or not np.isfinite(end):
+            return end
+        step = 10.0 ** -float(target.decimals[column])
+        return on_its_side(self.program.source, target.letters[column], float(target.nominal[column]), end, step)
+
     def _present(self, position: FloatArray, column: int, end: float, word: Word) -> None:
         base = float(position[column]) if word.address[0] == "I" else 0.0
         original = self._said(column, word)
-        value = end - base
+        value = (end if base else self._turned(column, end)) - base
         whole = len(self.target.ends) == 1
         if np.isfinite(value) and not (whole and abs(value - original) < self.half[column]):
             original = self._rewrite(word, value, int(self.target.decimals[column]))
@@ -93,6 +102,7 @@ class WordWriter:
         return float(target.nominal[column] - began)
 
     def _absent(self, position: FloatArray, column: int, end: float, always: bool) -> None:
+        end = self._turned(column, end)
         if not np.isfinite(end) or (not always and abs(end - position[column]) < self.half[column]):
             return
         text = self._number(end, column)

@@ -1,0 +1,32 @@
+"""Rotary words on their side of zero and of a full turn.
+
+A table that counts below 360 degrees takes -0.001 for 359.999, and the next word may then lead it the long way round.
+So a program that never writes such an angle does not get one from a correction either: the word stays at the limit, and
+what that leaves at the tip is part of the figures. Under `--strategy full` only are rotary words corrected at all.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+FULL = 360.0
+
+
+@lru_cache(maxsize=16)
+def extremes(source: bytes, letter: str) -> tuple[float, float]:
+    """The smallest and largest angle that a program writes for a rotary axis, degrees; 0 at least is among them."""
+    code = re.sub(rb";[^\r\n]*", b"", source)
+    found = re.findall(rb"(?i)(?<![A-Z0-9])" + letter.encode() + rb"[ \t]*([+-]?[ \t]*[\d.,]*\d)", code)
+    angles = [float(b"".join(number.split()).replace(b",", b".")) for number in found if number.count(b".") < 2]
+    return min(angles, default=0.0), max(angles, default=0.0)
+
+
+def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: float) -> float:
+    """A corrected angle, degrees; not below zero or past a full turn where the program never is. `step`: one digit."""
+    lowest, highest = extremes(source, letter)
+    if nominal >= 0.0 > angle and lowest >= 0.0:
+        return 0.0
+    if nominal < FULL <= angle and highest < FULL:
+        return FULL - step
+    return angle
