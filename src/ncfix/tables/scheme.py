@@ -31,8 +31,9 @@ NODES = 8
 GRID = 8**5
 LEVER = 200.0
 """mm: an angle of a rotary axis is judged by what it does to the tip at that distance."""
-ROTARY_SHARE = 3
-"""Rotary axes get one table in so many, if tables are few."""
+ROTARY_SHARE = 8
+"""Rotary axes get one table in so many, if tables are few: they do little for the tip, and their parts that follow the
+linear axes leave it with more that takes three axes at once."""
 SMALL = 0.1
 """Parts that are below this share of the target (rms) together are left out."""
 AGAINST_REST = 0.15
