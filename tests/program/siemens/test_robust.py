@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,3 +75,30 @@ def test_what_is_written_is_read_as_meant(machine: Machine, strategy: str) -> No
             continue
         fixed += 1
     assert fixed > 10
+
+
+ODD = {
+    "no length under TRAORI": (
+        "G54\nT1 D1 M6\nTRAORI\nG0 X1 Y2 Z30\nD0\nSUPA G0 A0 C0\nHEAD_CLEAN\nSUPA G0 A0 C0\nCYCLE81(50,0,2,2)"
+    ),
+    "rotary axes that nobody knows": (
+        "G54\nTRAORI\nG0 X1 Y2 Z30\nD0\nX=$AA_IM[X]\nORIMKS\nC=ACN(200)\nTRAFOOF\nCT X5 Y5\nG3 I5 J0"
+    ),
+    "an axis that is known at run time only": (
+        "G54\nT1\nTRAORI\nG0 X0 Y0 Z40\nG1 X10 A20 C30 F100\nX20 A=$AA_IM[A]\nG1 X5\nTRAFOOF\nX1"
+    ),
+    "a circle after a hole": (
+        "G54\nT1 D1 M6\nTRAORI\nG0 X1 Y2 Z30 A5 C6\nMCALL CYCLE81(50,0,2,-20)\nCYCLE81(50,0,2,2)\nG3 I5 J0 F100"
+    ),
+    "inverse time without F": ("G54\nT1 D1 M6\nG0 X0 Y0 Z80 A0 C0\nG93 F5\nG1 X90 A20 C30\nX1 Y1 Z1 A1 C1"),
+    "expressions that stay": ("G54\nT1 D1 M6\nG0 X0 Y0 Z80 A0 C0\nG1 X=AC(0.001*3) Y=AC(1/3) C=AC(3*5) F100"),
+}
+"""Programs after whose correction the control once would not have stood where the book said."""
+
+
+@pytest.mark.parametrize("strategy", ["position", "rotary-then-linear", "full"])
+@pytest.mark.parametrize("name", ODD)
+def test_odd_programs_are_followed_to_their_end(name: str, strategy: str, machine: Machine) -> None:
+    program = read(f"{ODD[name]}\nM30\n".encode(), "part.mpf", "siemens")
+    setup = replace(SETUP, initial={}, assume_zero=True)
+    assert fix_program(program, machine, setup, FixOptions(strategy=strategy, verify=False)).changed
