@@ -32,6 +32,7 @@ FANUC = Dialect(
         rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?GOTO[ \t]*[\d#]",
         rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:6[56][ \t]*P|5\.1[ \t]*Q|(?:66\.1|68\.2|43\.[45]|54\.1|53\.1)(?!\d))",
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*98[ \t]*<",
+        rb"(?im)^[^(;\n]*,[ \t]*[RCA][ \t]*[-+]?[\d.#\[]",
     ),
     foreign=(*FOREIGN, VERICUT, OKUMA, O_WORDS),
     upper_case=True,

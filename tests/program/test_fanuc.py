@@ -94,6 +94,8 @@ def test_numbers_with_and_without_a_point_have_templates_of_their_own() -> None:
         (b"N5G65P9010A1.\n", "fanuc"),
         (b"G43.4H1X0.\n", "fanuc"),
         (b"G68.2X0Y0Z0I0J0K0\n", "fanuc"),
+        (b"G1X5.,R2.\nY3.\n", "fanuc"),
+        (b"(X5,R2)\nG1X5.\n", "iso"),
         (b"G187P1\n", "haas"),
         (b"G154 P3\nG0X1.\n", "haas"),
         (b"O100 IF [#1 GT 2]\nO100 ENDIF\n", "linuxcnc"),
