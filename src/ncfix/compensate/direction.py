@@ -20,7 +20,7 @@ REST = 1e-9
 
 def matters(machine: Machine) -> bool:
     """Whether any error depends on the direction of motion."""
-    return any(effect.active and effect.basis.needs_direction for effect in machine.effects)
+    return machine.depends_on_direction
 
 
 def signs(motion: Array, rest: float = REST) -> Signs:

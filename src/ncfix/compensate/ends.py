@@ -13,6 +13,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.ragged import slices
 from ncfix.compensate.rates import Path
+from ncfix.compensate.rows import finite
 from ncfix.compensate.standing import standing
 from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
@@ -45,8 +46,8 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
     ones = np.ones(len(rows))
     q = intent.joints_at(rows, ones)
     lengths = np.broadcast_to(intent.lengths(rows), len(rows))
-    named = np.isfinite(moves.end[rows]).all(axis=1)
-    fit = np.isfinite(q).all(axis=1) & np.isfinite(lengths)
+    named = finite(moves.end[rows])
+    fit = finite(q) & np.isfinite(lengths)
     good = rows[fit]
     result = _solved(intent, strategy, good, q[fit])
     wanted = moves.end.copy()

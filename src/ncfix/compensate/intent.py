@@ -27,6 +27,7 @@ from ncfix.compensate.kinematics import (
     regular,
     solve,
 )
+from ncfix.compensate.rows import some
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.steer import rows_of
 from ncfix.machine import Machine, State
@@ -74,20 +75,13 @@ class Intent:
     @cached_property
     def moving(self) -> Mask:
         """Motions that are to move anything, (n,); others only take up what the machine is off where they begin."""
-        way = signs(self.moves.end - self.moves.start).any(axis=1)
+        way = some(signs(self.moves.end - self.moves.start) != 0)
         return np.asarray(way | (self.moves.kind == Kind.ARC), dtype=bool)
 
     @cached_property
     def kinks(self) -> list[tuple[int, Array]]:
         """The axes (columns) with kinks or jumps of the error model, and where these are, ascending, mm and rad."""
-        machine = self.machine
-        places = {name: set(machine.breakpoints(name).tolist()) for name in machine.axis_names}
-        for effect in machine.effects:
-            if effect.active and effect.signal in places:
-                unit = machine.axes[machine.axis_names.index(effect.signal)].unit
-                ends = [end for end in effect.basis.domain if np.isfinite(end)]
-                places[effect.signal].update((effect.center + effect.scale * end) * unit for end in ends)
-        return [(j, np.array(sorted(places[name]))) for j, name in enumerate(machine.axis_names) if places[name]]
+        return list(self.machine.kinks)
 
     def joints(self, rows: Index, commands: Array) -> Array:
         """Axis positions of commands (k, n_axes) of motions `rows` (k,); NaN where they cannot be reached."""

@@ -9,6 +9,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import largest, owners, slices
+from ncfix.compensate.rows import every, lengths, some
 from ncfix.compensate.sampling import interior, merged, passed
 from ncfix.compensate.segments import Segments
 from ncfix.machine.aim import CLOSE
@@ -62,7 +63,7 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
     length = float(np.abs(intent.lengths(on)).max())
     least, angle = bow.of(np.abs(end - start), farthest, length, rotary)
     before, after = (start - intent.moves.start[on])[:, ~rotary], (end - intent.moves.end[on])[:, ~rotary]
-    sizes = [np.sqrt(np.einsum("ij,ij->i", each, each)) for each in (before, after, after - before)]
+    sizes = [lengths(each) for each in (before, after, after - before)]
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
     most[chosen] = least + CORNER * turned / 8 + CLOSE
     return most
@@ -103,13 +104,13 @@ def uneasy_starts(intent: Intent, kept: Mask) -> Mask:
     """
     moves = intent.moves
     uneasy = np.ones(len(moves), dtype=bool)
-    joined = (moves.start[1:] == moves.end[:-1]).all(axis=1)
+    joined = every(moves.start[1:] == moves.end[:-1])
     same = moves.tool_length[1:] == moves.tool_length[:-1]
     uneasy[1:] = kept[:-1] | ~joined | ~same
     if intent.arrival is not None:
         rows = np.arange(1, len(moves))
         now = intent.direction(rows, np.full(len(rows), INSTANT))
-        uneasy[1:] |= (now != intent.arrival[:-1]).any(axis=1)
+        uneasy[1:] |= some(now != intent.arrival[:-1])
     if any(np.ndim(values) for values in intent.state.inputs.values()):
         uneasy[:] = True
     return uneasy

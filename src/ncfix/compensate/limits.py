@@ -8,6 +8,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rows import finite, lengths
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
@@ -52,7 +53,8 @@ def findings(
 def not_a_number(written: Written) -> Finding:
     """NCF408: motions with a corrected end that is not finite."""
     pieces = written.pieces
-    bad = ~np.isfinite(pieces.end).all(axis=1) | (pieces.arc & ~np.isfinite(pieces.centre).all(axis=1))
+    bad = ~finite(pieces.end)
+    bad[pieces.arc] |= ~finite(pieces.centre[pieces.arc])
     rows = np.unique(pieces.move[bad & ~pieces.kept])
     return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
 
@@ -83,7 +85,7 @@ def too_large(written: Written) -> Finding:
     """NCF406: corrections above the machine's `max_correction`: the linear axes together, each rotary axis alone."""
     machine = written.intent.machine
     shift = written.correction
-    linear = _norm(shift[:, ~machine.rotary]) / machine.max_correction[0]
+    linear = lengths(shift[:, ~machine.rotary]) / machine.max_correction[0]
     rotary = np.abs(shift[:, machine.rotary]).max(axis=1, initial=0.0) / machine.max_correction[1]
     share = np.maximum(linear, rotary)
     over = (share > 1 + FUZZ) & ~written.pieces.kept
@@ -95,7 +97,7 @@ def too_large(written: Written) -> Finding:
 def too_fast(written: Written) -> Finding:
     """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
     machine, pieces = written.intent.machine, written.pieces
-    change = _norm(np.diff(written.correction[:, ~machine.rotary], axis=0))
+    change = lengths(np.diff(written.correction[:, ~machine.rotary], axis=0))
     over = np.flatnonzero((change > JUMP) & ~pieces.kept[1:] & ~pieces.kept[:-1])
     way = np.abs(written.programmed[over + 1] - written.programmed[over])
     allowed = JUMP + RATE * way[:, ~machine.rotary].sum(axis=1) + RATE_TURNING * way[:, machine.rotary].sum(axis=1)
@@ -167,11 +169,6 @@ def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
     units = np.where(machine.rotary, 180 / np.pi, 1.0)[axis[rows]]
     names = tuple(machine.axis_names[j] for j in axis[rows])
     return Finding(code, rows, most[rows] * units, text, names, turns=tuple(machine.rotary[axis[rows]].tolist()))
-
-
-def _norm(shift: Array) -> Array:
-    size: Array = np.sqrt(np.einsum("ij,ij->i", shift, shift))
-    return size
 
 
 def _worst(moves: Index, values: Array) -> tuple[Index, Array]:

@@ -25,6 +25,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import deviations, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.round import may_be_round
+from ncfix.compensate.rows import finite
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
 from ncfix.compensate.strategies import Strategy
@@ -129,7 +130,7 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, strategy: 
         return deviation
     kind = intent.moves.kind
     followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
-    followed &= ~kept & intent.moving & np.isfinite(real.start).all(axis=1)
+    followed &= ~kept & intent.moving & finite(real.start)
     rows = np.flatnonzero(followed & ~broken)
     deviation[rows] = deviations(intent, real, rows, uneasy_starts(intent, kept), demands.budget.path)
     deviation[followed & broken] = np.inf

@@ -39,6 +39,9 @@ def standing(
     approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
     """
     shift = np.where(kept[:, None], 0.0, _known(wanted - moves.end))
+    if not kept.any() and _goes_on(moves):
+        first = np.zeros((1, shift.shape[1])) if before is None else before[None]
+        return Standing(moves.start + np.concatenate([first, shift[:-1]]), moves.end + shift)
     decides = ~kept[:, None] | (moves.moved & ~moves.incremental[:, None])
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
@@ -54,6 +57,12 @@ def standing(
         part = shift[run], decides[run], back[run], jumps[run], restarts[run]
         at_start[run], at_end[run], carried = _filled(*part, carried)
     return Standing(moves.start + at_start, moves.end + at_end)
+
+
+def _goes_on(moves: Moves) -> bool:
+    """Whether every motion begins where the one before ended, and commands mean the same all along."""
+    joined = bool((moves.start[1:] == moves.end[:-1]).all()) and not (moves.kind == Kind.CYCLE).any()
+    return joined and len(_runs(moves)) == 1
 
 
 def _filled(

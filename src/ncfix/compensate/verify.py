@@ -18,6 +18,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners
+from ncfix.compensate.rows import finite, lengths
 from ncfix.compensate.sampling import MOST, bends, even, merged, passed
 from ncfix.compensate.steer import rows_of
 from ncfix.compensate.written import Written
@@ -150,8 +151,8 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
     along &= written.intent.moving[move]
-    along &= np.isfinite(written.segments.start[which]).all(axis=1) & np.isfinite(written.start[move]).all(axis=1)
-    along &= np.isfinite(written.intent.moves.start[move]).all(axis=1)
+    along &= finite(written.segments.start[which]) & finite(written.start[move])
+    along &= finite(written.intent.moves.start[move])
     counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
@@ -219,7 +220,7 @@ def _way(written: Written, piece: Index) -> Array:
     first = np.flatnonzero(np.diff(piece, prepend=-1))
     counts = np.diff(first, append=len(piece))
     chord = (segments.end - segments.start)[piece][:, ~written.intent.machine.rotary]
-    way = np.linalg.norm(np.nan_to_num(chord), axis=1)
+    way = lengths(np.nan_to_num(chord))
     on_arc = np.flatnonzero(segments.arc[piece])
     if on_arc.size:
         arc = piece[on_arc]

@@ -9,6 +9,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rows import finite
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.program.pieces import Pieces
 
@@ -52,7 +53,8 @@ class Written:
         start[1:] = pieces.end[:-1]
         start[self.opens] = self.start[pieces.move[self.opens]]
         normal, sweep = moves.normal[pieces.move], moves.sweep[pieces.move] * self.span
-        arc = pieces.arc & np.isfinite(pieces.centre).all(axis=1)
+        arc = pieces.arc.copy()
+        arc[arc] = finite(pieces.centre[arc])
         columns = self.intent.columns
         found = sweep.copy()
         found[arc] = sweep_between(

@@ -146,6 +146,25 @@ class Machine:
         return tuple(bending.breakpoints(self.axes, self.effects, index) for index in range(len(self.axes)))
 
     @cached_property
+    def kinks(self) -> tuple[tuple[int, Array], ...]:
+        """The axes (columns) with kinks or jumps of their errors, and where these are, ascending, mm and rad.
+
+        With those at the ends of what a basis is given for, where its end values begin to hold.
+        """
+        places = {name: set(self.breakpoints(name).tolist()) for name in self.axis_names}
+        for effect in self.effects:
+            if effect.active and effect.signal in places:
+                unit = self.axes[self.axis_names.index(effect.signal)].unit
+                ends = [end for end in effect.basis.domain if np.isfinite(end)]
+                places[effect.signal].update((effect.center + effect.scale * end) * unit for end in ends)
+        return tuple((j, np.array(sorted(places[name]))) for j, name in enumerate(self.axis_names) if places[name])
+
+    @cached_property
+    def depends_on_direction(self) -> bool:
+        """Whether any error depends on the way in which an axis came to its position."""
+        return any(effect.active and effect.basis.needs_direction for effect in self.effects)
+
+    @cached_property
     def bow(self) -> Bow | None:
         """How far the error of the tip may bow on straight motions; None if not known."""
         return bow_of(self.axes, self.tool, self.effects, self.workpiece_offset)
