@@ -107,6 +107,17 @@ def test_a_free_contour_begins_where_it_was_meant_to() -> None:
     assert "starts from its end" in report.refused[0].reason
 
 
+def test_what_a_line_that_is_not_understood_names_may_have_changed() -> None:
+    assert "Q parameter" in reasons("Q1 = 5\nTABDATA READ Q1 = CORR COLUMN 3\nL X+Q1 Y+5 Z+5 FMAX")[-1]
+
+
+@pytest.mark.parametrize(
+    "line", ['DECLARE STRING QS2 = "X"', "GLOBAL DEF 100 GENERAL Q200=+2", "BLK FORM CYLINDER Z D9"]
+)
+def test_statements_that_move_nothing(line: str) -> None:
+    assert reasons(f"L X+1 F100\n{line}\nL Y+5") == []
+
+
 @pytest.mark.parametrize("frame", ["CYCL DEF 7.0 D\nCYCL DEF 7.1 X+3", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+30"])
 @pytest.mark.parametrize("use", ["LP PR+10 PA+0 Z+0", "C X+0 Y+10 DR+", "CP IPA+90 DR+"])
 def test_a_pole_of_another_datum(frame: str, use: str) -> None:

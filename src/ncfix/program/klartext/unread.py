@@ -19,7 +19,8 @@ HINT = "correct the line, or name the dialect with --dialect"
 
 NUMBER = r"\A\s*/?\s*\d*\s*"
 FLOW = re.compile(NUMBER + r"(LBL|CALL|FN\s*(9|1[0-2])\s*:|IF\b|.*\bGOTO\b)", re.IGNORECASE | re.DOTALL)
-ASSIGNED = re.compile(NUMBER + r"(?:FN\s*\d+\s*:\s*)?(Q[LRS]?\d+)\s*=", re.IGNORECASE)
+PARAMETER = re.compile(r"\bQ[LRS]?\d+", re.IGNORECASE)
+ASSIGNED = re.compile(NUMBER + r"(?:FN\s*\d+\s*:\s*)?Q[LRS]?\d+\s*=", re.IGNORECASE)
 FRAME = re.compile(
     NUMBER
     + r"(PLANE|TRANS|CYCL\s*DEF|TOOL|FUNCTION|PRESET|POLARKIN|PATTERN|SEL)|\bM\s*(12[6-9]|130|11[45]|14[45]|89)\b",
@@ -31,8 +32,9 @@ def unread_line(control: Control, text: str) -> None:
     """A line that could not be read is reached; raises `Fault` if the program may go on elsewhere."""
     if FLOW.match(text):
         raise Fault(UNREADABLE, DECIDES, "correct the line")
-    if found := ASSIGNED.match(text):
-        control.scope.parameters.assign(found[1].upper(), 0.0, runtime=True)
+    for name in PARAMETER.findall(text):
+        control.scope.parameters.assign(name.upper(), 0.0, runtime=True)
+    if ASSIGNED.match(text):
         return
     control.warn(UNREADABLE, NOT_KLARTEXT, HINT)
     if FRAME.search(text):
