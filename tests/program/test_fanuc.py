@@ -290,6 +290,15 @@ def test_a_tilted_plane_is_a_frame_in_the_workpiece() -> None:
 def test_roll_pitch_and_yaw() -> None:
     found = follow("G68.2P1X0.Y0.Z0.I90.J0.K90.\nG0X1.Y2.Z3.", "XYZAC", dialect="fanuc", no_point="IS-B")
     assert ends(found)[0][:3] == pytest.approx([3, 1, 2])
+    found = follow("G68.2P1Q321X0.Y0.Z0.I90.J0.K90.\nG0X1.Y2.Z3.", "XYZAC", dialect="fanuc", no_point="IS-B")
+    assert ends(found)[0][:3] == pytest.approx([-2, -3, 1])
+
+
+def test_angles_count_their_own_increments() -> None:
+    found = follow("G20\nG68X0Y0R90000\nG0X1.Y0", dialect="fanuc", no_point="IS-B")
+    assert last(found) == pytest.approx([0, 25.4, 0])
+    found = follow("G20\nG16\nG0X1.Y90000\nG15", dialect="fanuc", no_point="IS-B")
+    assert last(found) == pytest.approx([0, 25.4, 0])
 
 
 @pytest.mark.parametrize("name", ["wCAYFXZSt", "wCBXFZYSt", "dmu50"])

@@ -21,7 +21,7 @@ from ncfix.program.rs274.control import Block
 from ncfix.program.rs274.coordinates import INCH, LETTERS
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.groups import NON_MODAL
+from ncfix.program.rs274.groups import NON_MODAL, ROTATION
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.order import DWELL
 from ncfix.program.rs274.parameters import Store
@@ -31,6 +31,9 @@ from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 G15, G16, G20, G21 = 150, 160, 200, 210
 G65, G66, G66_1, G67 = 650, 660, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
+ANGLES = frozenset("IJKR")
+"""Of a rotation (G68, G68.2)."""
+
 DRILLING = frozenset("KLQ")
 """K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 SCALED = frozenset("XYZABCUVWIJKRQ")
@@ -162,7 +165,8 @@ class MacroInterpreter(Interpreter):
         for letter in plan.pointless:
             if self.is_scaled(letter, plan.codes):
                 self.span = next(word.span for word in plan.template.words if word.address == letter)
-                block.values[letter] = self.control.without_point(letter, block.values[letter])
+                angle = self.is_angle(letter, plan.codes)
+                block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
         self.span = None
         if G16 in codes:
             polar.switch(self.control, block, G16)
@@ -174,6 +178,14 @@ class MacroInterpreter(Interpreter):
         """What a block sets before its motion; H alone sets something, too."""
         super().settings(codes, block)
         lone_number(self.control, block, codes)
+
+    def is_angle(self, letter: str, codes: Codes | None) -> bool:
+        """Whether the number of a word counts degrees though its address is none of a rotary axis."""
+        found = {} if codes is None else codes.g
+        if ROTATION in found:
+            return letter in ANGLES
+        polar_words = (self.control.polar is not None or G16 in found.values()) and G15 not in found.values()
+        return polar_words and letter == LETTERS[self.control.modal.plane.second]
 
     def is_scaled(self, letter: str, codes: Codes | None) -> bool:
         """Whether the number of a word counts least increments when it has no point."""

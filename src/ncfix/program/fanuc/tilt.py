@@ -35,7 +35,11 @@ if TYPE_CHECKING:
 TILT, CANCEL = 682, 690
 EULER, ROLL_PITCH_YAW = 0, 1
 ORDER = 123
-"""X, Y, Z: the order of the turns of G68.2 P1 that is followed."""
+"""X, Y, Z: the order of the turns of G68.2 P1, if its Q does not name another."""
+
+ABOUT = {"1": PLANES[190], "2": PLANES[180], "3": PLANES[170]}
+"""The plane in which a turn about X, Y or Z is."""
+
 ALIGNMENT = "tool axis alignment (G53.1)"
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane (G53.1) is not known"
 TURNED_TO = "NCF243"
@@ -44,15 +48,16 @@ TURNED_TO = "NCF243"
 def tilt(control: MacroControl, block: Block, code: int) -> None:
     """G68.2 X Y Z I J K: the frame at X Y Z, turned by I J K; forms that are not followed are refused."""
     form = whole(block.get("P", EULER), "P of G68.2")
-    known = code == TILT and form in (EULER, ROLL_PITCH_YAW) and block.get("Q", ORDER) == ORDER
-    if control.mirrored or not known:
+    order = str(whole(block.get("Q", ORDER), "Q of G68.2"))
+    known = form == EULER or (form == ROLL_PITCH_YAW and sorted(order) == ["1", "2", "3"])
+    if control.mirrored or code != TILT or not known:
         unfollowed(control, block, code)
         return
     if block.runtime:
         control.refusal = control.refusal or "the tilted plane (G68.2) is known only at run time"
     angles = block.get("I"), block.get("J"), block.get("K")
     end(control)
-    control.offsets.rotation = euler(*angles) if form == EULER else roll_pitch_yaw(*angles)
+    control.offsets.rotation = euler(*angles) if form == EULER else in_order(order, angles)
     feature = zeros()
     for index in (X, Y, Z):
         feature[index] = control.modal.unit * block.get(LETTERS[index])
@@ -67,9 +72,12 @@ def euler(first: float, second: float, third: float) -> Rotation:
     return product(about(PLANES[170], first), product(about(PLANES[190], second), about(PLANES[170], third)))
 
 
-def roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Rotation:
-    """Turned about X, then Y, then Z of the workpiece, degrees."""
-    return product(about(PLANES[170], yaw), product(about(PLANES[180], pitch), about(PLANES[190], roll)))
+def in_order(order: str, angles: tuple[float, float, float]) -> Rotation:
+    """Turned about X, Y and Z of the workpiece in an order such as "123", degrees."""
+    rotation = IDENTITY
+    for axis in order:
+        rotation = product(about(ABOUT[axis], angles[int(axis) - 1]), rotation)
+    return rotation
 
 
 def rotate(control: MacroControl, block: Block, code: int) -> None:
