@@ -178,3 +178,24 @@ def test_a_machine_without_errors_leaves_programs_as_they_are(shop: Any, ncfix: 
     found = ncfix("export", "gcode", *arguments, "--json").json()["program"]
     assert found["error_before_um"]["max"] == found["error_after_um"]["max"] == 0
     assert (shop.folder / "g" / shop.program.name).read_bytes() == shop.program.read_bytes()
+
+
+TILTED = '[[effect]]\nname = "EBX"\nbasis = "polynomial"\ndegree = [1]\nscale = 100\ncoefficients = [20e-6]\n'
+
+
+def test_a_program_with_other_tools_than_the_tables_hold_for_is_remarked_on(shop: Any, ncfix: Any) -> None:
+    shop.machine.write_text(shop.perfect.read_text() + TILTED)
+    folder = shop.folder / "t"
+    arguments = ("-m", shop.machine, "-o", folder, "--tool-length", "100")
+    assert ncfix("export", "isg", *arguments).code == ExitCode.DONE
+    found = ncfix("emulate", "isg", folder, "-m", shop.machine, "--program", shop.program, "--assume-zero", "--json")
+    remarks = found.json()["program"]["remarks"]
+    assert remarks == ["The tables hold for a tool of 100 mm; this program also runs with 0 mm."]
+
+
+def test_tables_for_no_tool_are_remarked_on_if_the_error_depends_on_it(shop: Any, ncfix: Any) -> None:
+    shop.machine.write_text(shop.perfect.read_text() + TILTED)
+    found = ncfix("export", "isg", "-m", shop.machine, "-o", shop.folder / "t", "--json").json()
+    assert any("--tool-length was not given" in note for note in found["notes"])
+    found = ncfix("export", "isg", "-m", shop.perfect, "-o", shop.folder / "p", "--json").json()
+    assert not any("--tool-length" in note for note in found["notes"])

@@ -52,8 +52,8 @@ def emulate(
     with console.busy("running the tables"):
         found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
         if program is not None:
-            settings = loads(content[NAME], NAME).settings
-            more["program"] = along(following, chosen, found.tables, settings, program)
+            made = loads(content[NAME], NAME)
+            more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
     console.tell_some(found.messages)
     tell(found, as_json, control=chosen.name, reaches=chosen.reaches, **more)
     return ExitCode.FINDINGS if found.messages else ExitCode.DONE

@@ -83,7 +83,7 @@ def export(
     with console.busy("making tables"):
         made = exported(chosen, request)
         if program is not None:
-            more["program"] = along(following, chosen, made.tables, options, program)
+            more["program"] = along(following, chosen, made.tables, options, program, tool_length)
         if program is not None and chosen.rewrites:
             made = replace(made, files={**made.files, **rewritten_file(following, options, program)})
     write_folder(output, made, force)
@@ -150,6 +150,8 @@ def tell(made: Exported, as_json: bool, **more: object) -> None:
     if isinstance(program, dict):
         for when in ("before", "after"):
             console.put(f"{program['path']} {when}: {console.error_figures(program[f'error_{when}_um'])}\n")
+        for remark in program["remarks"]:
+            console.say(remark)
         if program["error_after_um"]["rms"] > program["error_before_um"]["rms"]:
             console.say("This program is made worse: it runs where these tables do not fit the machine.")
     for note in made.notes:

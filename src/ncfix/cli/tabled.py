@@ -11,7 +11,10 @@ from ncfix.cli.targets import shown
 from ncfix.diagnostics import Message, Place, RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from ncfix.compensate.fix import Fixed
     from ncfix.compensate.following import Followed
@@ -20,13 +23,24 @@ if TYPE_CHECKING:
     from ncfix.tables.neutral import Tables
 
 
+SAME = 0.5
+"""mm: tools whose lengths differ by less are the same to tables."""
+MANY = 4
+"""Lengths that are listed."""
+
+
 def along(
-    following: Following, control: Control, tables: Tables, settings: Mapping[str, str], path: str
+    following: Following,
+    control: Control,
+    tables: Tables,
+    settings: Mapping[str, str],
+    path: str,
+    tool_length: float,
 ) -> dict[str, Any]:
-    """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um}`.
+    """What a control with these tables leaves along a program: `{path, error_before_um, error_after_um, remarks}`.
 
     Both are looked at where the tool cuts; rewritten programs have the figures of `fix` after, which looks at the ends
-    of rapids too.
+    of rapids too. It is remarked on if the program's tools are not of the length that the tables hold for, mm.
 
     Raises `RefusedError` NCF493 for a program that carries a stamp of ncfix: it would be corrected twice.
     """
@@ -42,7 +56,18 @@ def along(
     else:
         error = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
         after = figures(error, lines)
-    return {"path": shown(path), "error_before_um": before, "error_after_um": after}
+    fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
+    remarks = list(_other_tools(moves.tool_length, tool_length)) if fixed_length else []
+    return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}
+
+
+def _other_tools(used: NDArray[np.float64], length: float) -> Iterator[str]:
+    import numpy as np
+
+    others = sorted({float(round(each, 3)) for each in used[np.isfinite(used)] if abs(each - length) > SAME})
+    if others:
+        listed = ", ".join(f"{each:g}" for each in others[:MANY]) + (" ..." if len(others) > MANY else "")
+        yield f"The tables hold for a tool of {length:g} mm; this program also runs with {listed} mm."
 
 
 def rewritten(following: Following, settings: Mapping[str, str], path: str) -> Fixed:
