@@ -26,15 +26,28 @@ EVENT = re.compile(
 )
 """What sets a pole, relies on one, or may lead elsewhere; other labels are passed through."""
 
+CALCULATION = re.compile(rb"(?i)FN[ \t]*(?!9|1[0-2])\d")
+LOOK = 80
+"""Bytes of a line that tell what it is."""
+
 
 def is_relied_on(source: bytes, after: int) -> bool:
     """Whether what follows a byte of the program may rely on the pole that is in force there."""
-    for found in EVENT.finditer(source, after):
-        line = source[found.start("what") : found.start("what") + 80]
-        if re.match(rb"(?i)FN[ \t]*(?!9|1[0-2])\d", line):
-            continue
-        return SETS.match(line) is None
-    return False
+    places, relying = _events(source)
+    index = bisect_left(places, after)
+    return index < len(places) and relying[index]
+
+
+@lru_cache(maxsize=4)
+def _events(source: bytes) -> tuple[list[int], list[bool]]:
+    """Where a pole is set or something may rely on one, and which of the two it is."""
+    places, relying = [], []
+    for found in EVENT.finditer(source):
+        line = source[found.start("what") : found.start("what") + LOOK]
+        if CALCULATION.match(line) is None:
+            places.append(found.start())
+            relying.append(SETS.match(line) is None)
+    return places, relying
 
 
 def pole_in_force(source: bytes, at: int) -> str | None:
