@@ -58,8 +58,9 @@ class Account:
         refused = {block: reasons[block] for block in moves.block[motion & kept].tolist() if block in reasons}
         passed = {int(moves.block[row]): moves.reasons[moves.reason[row]] for row in by_rule}
         passed = {block: reason for block, reason in passed.items() if block not in refused}
-        compensated = frozenset(moves.block[motion & ~kept].tolist()) - refused.keys() - passed.keys()
-        return cls(compensated, passed, refused)
+        compensated = frozenset(moves.block[motion & ~kept].tolist())
+        others = refused.keys() | passed.keys()
+        return cls(compensated - others if others else compensated, passed, refused)
 
     @property
     def total(self) -> int:

@@ -65,7 +65,9 @@ class Bulk:
         """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
         first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         layouts = Layouts.of(language, program, moves)
-        fit = _qualified(program, moves, pieces, first_piece, layouts) & ~jumps.any(axis=1)
+        fit = _qualified(program, moves, pieces, first_piece, layouts)
+        if jumps.any():
+            fit &= ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         breaks = np.ones(len(moves) + 1, dtype=np.bool_)
         breaks[:-1] = ~fit
@@ -137,14 +139,18 @@ def _is_plain(frame: Frame) -> bool:
 def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
     """(n,) motions that may be written in bulk, as far as their own data say."""
     first = first_piece[:-1]
-    turns = (moves.kind == Kind.FEED) & (moves.end == moves.start)[:, ~moves.rotary].all(axis=1)
+    turns = moves.kind == Kind.FEED
+    for column in np.flatnonzero(~moves.rotary):
+        turns &= moves.end[:, column] == moves.start[:, column]
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
     fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
     fit &= ~pieces.kept[first] & _writable_pieces(program, moves, pieces, first_piece, layouts)
     fit &= np.isfinite(pieces.end[first]).all(axis=1)
     fit &= layouts.known[program.template[moves.block]]
-    fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
-    fit[1:] &= moves.block[1:] > moves.block[:-1]
+    rising = moves.block[1:] > moves.block[:-1]
+    if not rising.all():
+        fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
+        fit[1:] &= rising
     return fit
 
 

@@ -112,9 +112,9 @@ class _Emitter:
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
-        self.first_piece = np.searchsorted(pieces.move, np.arange(len(moves) + 1))
+        self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
-        self.moved = moves.moved
+        self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.eol = line_end(program.source).decode()
@@ -157,6 +157,13 @@ class _Emitter:
         edits, added = self._edits()
         splices = Splices.joined([*self.bulk.parts, Splices.of(edits)])
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, added + self.bulk.added)
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that a motion takes to its end; found out when a motion is kept."""
+        if self._moved is None:
+            self._moved = self.moves.moved
+        return self._moved
 
     def _stretch(self, row: int) -> int:
         """Write the stretch of plain motions that begins here all at once; the number of motions written."""

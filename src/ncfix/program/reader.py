@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix import fast
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program import dialects
 from ncfix.program.build import Parsed
@@ -29,6 +30,9 @@ from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Templa
 
 PART_BYTES = 1 << 19
 """How much text is scanned at once: the columns of a scan take about a hundred times as much."""
+
+COMPILED_PART_BYTES = 1 << 22
+"""The same, compiled: the columns take no more than the result."""
 
 WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
 
@@ -124,7 +128,8 @@ class Reading:
         """Read all parts, then what follows the end of the tape."""
         parts = [self.part(first, stop) for first, stop in self.parts()]
         parts.append(self.tail())
-        counts, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+        parts = [part for part in parts if len(part.counts)] or parts[:1]
+        counts, spans, values = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
         return Program(
             source=self.source,
             path=self.path,
@@ -141,8 +146,9 @@ class Reading:
     def parts(self) -> Iterator[tuple[int, int]]:
         """First block and the one after the last of each part; a very long line is a part of its own."""
         first, end = 0, min(self.tape_end + 1, len(self.blocks))
+        size = COMPILED_PART_BYTES if fast.engaged() else PART_BYTES
         while first < end:
-            limit = self.blocks[first, 0] + PART_BYTES
+            limit = self.blocks[first, 0] + size
             stop = max(int(np.searchsorted(self.blocks[:end, 1], limit, side="right")), first + 1)
             yield first, stop
             first = stop
@@ -156,7 +162,7 @@ class Reading:
         if None not in known:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
-            return Columns(np.diff(found.first_number), found.spans + self.blocks[first, 0], found.values)
+            return Columns(np.diff(found.first_number), moved_by(found.spans, self.blocks[first, 0]), found.values)
         found = found.expanded()
         exact: dict[int, Parsed] = {}
         for row, shape in enumerate(found.shapes):
@@ -265,6 +271,11 @@ class Reading:
             self.reach.follow(self.templates[row])
         self.followed = block
         return self.reach.in_doubt
+
+
+def moved_by(spans: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
+    """Spans so many bytes further on."""
+    return spans + offset if offset else spans
 
 
 def agrees(found: Scan, row: int, parsed: Parsed, start: int) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
 from ncfix.program.tree import Comment, Flow, Opaque, Program, Tape, Word
 from ncfix.program.writer import Edit
 
@@ -13,12 +15,13 @@ SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
 
 def find(program: Program) -> int | None:
     """The block that carries a stamp, or None."""
-    if b"ncfix" not in program.source.lower():
+    carriers = [any(isinstance(item, (Comment, Opaque)) for item in each.items) for each in program.templates]
+    if not any(carriers) or b"ncfix" not in program.source.lower():
         return None
-    for block in program:
+    for block in np.flatnonzero(np.array(carriers)[program.template]).tolist():
         for item in program.items_of(block):
             if isinstance(item, (Comment, Opaque)) and SIGN.search(program.slice(block, item.span)):
-                return block
+                return int(block)
     return None
 
 
