@@ -176,17 +176,20 @@ class Builder:
         """All motions so far."""
         self._flush()
         parts = self._stretches or [Buffer().stretch()]
-        block, mask, style, feed, start, end = (
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in ("block", "programmed", "style", "feed", "start", "end")
+        block, mask, style, feed = (
+            np.concatenate([getattr(part, name) for part in parts]) for name in ("block", "programmed", "style", "feed")
+        )
+        start, end = (
+            np.concatenate([getattr(part, name).take(self.columns, axis=1) for part in parts])
+            for name in ("start", "end")
         )
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
             axes=self.axes,
             rotary=self.rotary,
-            start=start[:, self.columns],
-            end=end[:, self.columns],
+            start=start,
+            end=end,
             programmed=(mask[:, None] & bits) != 0,
             block=block.astype(np.int32),
             feed=feed,
