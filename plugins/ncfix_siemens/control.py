@@ -166,7 +166,8 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     if scheme.rest > request.target / 10:
         yield f"{1e3 * scheme.rest:.2f} um rms of the correction take three axes at once and are left."
     if scheme.bound > request.target / 10:
-        yield f"No sums and products of pairs leave less than {1e3 * scheme.bound:.2f} um at the worst."
+        at_that = ", with the rotary axes corrected as here" if _turns(request, scheme) else ""
+        yield f"No sums and products of pairs leave less than {1e3 * scheme.bound:.2f} um at the worst{at_that}."
     if scheme.dropped > request.target / 10:
         yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
     yield from _turned(request, scheme)
@@ -177,6 +178,11 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
         yield "Tables for one way hold the play of the axes: MD32450 $MA_BACKLASH must be what it was when measured."
     if products:
         yield "Products hold in millimetres only: do not switch the control to inches with these tables on."
+
+
+def _turns(request: Request, scheme: Scheme) -> bool:
+    rotary = [axis.name for axis in request.machine.axes if axis.rotary]
+    return any(term.outputs[0] in rotary for term in scheme.tables.terms)
 
 
 def _turned(request: Request, scheme: Scheme) -> Iterator[str]:
