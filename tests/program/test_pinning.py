@@ -59,6 +59,13 @@ def test_holes_are_drilled_where_their_blocks_say() -> None:
     assert pinned("G0 X1. Y1.\nG81 X2. Z-1. R1.\nX3.", 3, "fanuc") == []
 
 
+def test_a_bound_increment_begins_where_it_began() -> None:
+    moves = moves_of("G1 X1 Y1\nY2\nG91 X5")
+    kept = np.array([False, False, False, True])
+    _, added = closure_of_refusals(moves, kept, kept)
+    assert added == {2: 3, 1: 3}
+
+
 LINES = (
     "G1 X1 Y2 Z3",
     "G1 X2",

@@ -70,6 +70,23 @@ def over_travel(written: Written) -> Finding:
 
     On the limit is within.
     """
+    text = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
+    return _of_axes(written, "NCF404", text, _correction_excess(written))
+
+
+def led_astray(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
+    """Increments that are left as they are, and that leave the range of an axis because of where they begin."""
+    rows = np.flatnonzero(moves.incremental)
+    if not rows.size or not pieces.kept.any():
+        return rows[:0]
+    kept = np.zeros(len(moves), dtype=bool)
+    kept[pieces.move] = pieces.kept
+    beyond = _correction_excess(Written(Intent(machine, moves, state), pieces, start))
+    return rows[kept[rows] & (beyond[rows] > FUZZ).any(axis=1)]
+
+
+def _correction_excess(written: Written) -> Array:
+    """As `excess`, of the corrected program, (n, n_axes); negative, too, where the program itself goes beyond."""
     pieces = written.pieces
     each = np.arange(len(pieces))
     curved = written.segments.arc | written.intent.moves.tcp[pieces.move]
@@ -78,7 +95,7 @@ def over_travel(written: Written) -> Finding:
     if (found > FUZZ).any():
         np.maximum.at(beyond, pieces.move, found)
         beyond[programmed_excess(written) > FUZZ] = -np.inf
-    return _of_axes(written, "NCF404", "the correction takes axis {axis} {value:.4g} {unit} beyond its range", beyond)
+    return beyond
 
 
 def too_large(written: Written) -> Finding:

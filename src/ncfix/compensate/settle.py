@@ -17,7 +17,7 @@ from ncfix.compensate.budget import Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
-from ncfix.compensate.limits import findings
+from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
@@ -26,7 +26,7 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.emit import Emission, Reading, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.pinning import PINNED, closure_of_refusals
+from ncfix.program.pinning import LED, PINNED, closure_of_refusals
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
@@ -124,10 +124,12 @@ def agree(
     if before is not None:
         kept[0] |= before.kept
         state = State(direction=before.direction)
+    bound = np.zeros(len(moves), dtype=bool)
     while True:
-        kept, pinned = closure_of_refusals(moves, kept)
-        for row, arc in pinned.items():
-            reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, PINNED, int(moves.block[arc])))
+        kept, pinned = closure_of_refusals(moves, kept, bound)
+        for row, cause in pinned.items():
+            why = LED if bound[cause] else PINNED
+            reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
         planned = _planned(dialect, moves, machine, options, kept, state, before)
         planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))
@@ -135,10 +137,12 @@ def agree(
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
             refused[finding.moves] = True
-        if not refused.any():
+        astray = led_astray(machine, moves, planned.pieces, planned.start, state)
+        if not (refused.any() or (~bound[astray]).any()):
             return Agreed(planned, kept, reasons)
         _explain_findings(reasons, (*against, *planned.findings), moves, refused)
         kept |= refused
+        bound[astray] = True
 
 
 def increments(machine: Machine) -> Array:

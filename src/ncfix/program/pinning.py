@@ -15,16 +15,19 @@ from ncfix.program.moves import Kind, Moves, Rule
 Mask = NDArray[np.bool_]
 
 PINNED = "a refused arc that follows starts from its end"
+LED = "a refused increment that follows would leave the travel"
 STILL = 1e-9
 """A component of a unit normal so near to 1 is 1."""
 
 
-def closure_of_refusals(moves: Moves, kept: Mask) -> tuple[Mask, dict[int, int]]:
+def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> tuple[Mask, dict[int, int]]:
     """Extend `kept` (n,) so that refused arcs begin where they began.
 
-    Returns the extended mask, and the rows added, each with the row of the arc that needs it.
+    bound  (n,) other motions that must begin where they began, along the axes that they name
+
+    Returns the extended mask, and the rows added, each with the row that needs it.
     """
-    walk = _Walk(moves, kept.copy())
+    walk = _Walk(moves, kept.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
     for row in np.flatnonzero(kept & walk.anchored)[::-1].tolist():
         walk.back_from(row)
     return walk.kept, walk.added
@@ -33,14 +36,15 @@ def closure_of_refusals(moves: Moves, kept: Mask) -> tuple[Mask, dict[int, int]]
 class _Walk:
     """Goes back from refused arcs to motions that name all axes in question."""
 
-    def __init__(self, moves: Moves, kept: Mask) -> None:
+    def __init__(self, moves: Moves, kept: Mask, bound: Mask) -> None:
         self.moves = moves
         self.kept = kept
+        self.bound = bound
         self.added: dict[int, int] = {}
         self.reached = len(moves)
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
-        self.anchored = (moves.kind == Kind.ARC) & ~self.passed & ~self._floating()
+        self.anchored = ((moves.kind == Kind.ARC) & ~self._floating() | bound) & ~self.passed
 
     def _floating(self) -> Mask:
         """Arcs of which both end and centre count from where they start: incremental ones, and full circles."""
@@ -68,7 +72,9 @@ class _Walk:
                 needed |= self._plane(row)
 
     def _plane(self, row: int) -> Mask:
-        """The axes of an arc's plane."""
+        """The axes of an arc's plane; of other motions those that they name."""
+        if self.bound[row]:
+            return np.asarray(self.moves.programmed[row].copy())
         axes = np.zeros(len(self.moves.axes), dtype=bool)
         for column, across in zip(self.columns, np.abs(self.moves.normal[row]).tolist(), strict=True):
             if column >= 0 and across < 1 - STILL:

@@ -1,0 +1,51 @@
+"""What is refused, and what has to be left for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import fix_program
+from ncfix.compensate.following import follow
+from ncfix.compensate.options import FixOptions
+from ncfix.machine import Machine, load
+from ncfix.program.moves import Kind
+from ncfix.program.pinning import LED
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+ZERO = dict.fromkeys("XYZ", 0.0)
+SETUP = Setup(work_offsets={"G54": ZERO}, initial=ZERO, assume_zero=True)
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(str(root / "examples/machines/three_axis.toml"))
+
+
+def loop_to(end: float, step: float, machine: Machine) -> tuple[dict[int, str], np.ndarray]:
+    """A loop of increments that ends there along X: what is refused, and where the corrected program leads."""
+    start = end - 3 * step
+    text = f"G21 G90 G94 F500 G54\nG0 X0 Y90 Z-40\nG1 X{start}\no1 repeat [3]\nG91 G1 X{step}\no1 endrepeat\nM2\n"
+    program = read(text.encode(), "part.ngc", "linuxcnc")
+    fixed = fix_program(program, machine, SETUP, FixOptions(tolerance_um=50.0, verify=False))
+    moves = follow(read(fixed.text, "part.ngc", "linuxcnc"), machine, SETUP).trace.moves
+    return {each.line: each.reason for each in fixed.report.refused}, moves.end[moves.kind != Kind.DWELL]
+
+
+def test_a_refused_increment_begins_where_the_corrected_program_has_led(machine: Machine) -> None:
+    refused, ends = loop_to(250.0, 100.0, machine)
+    assert refused == {5: "the block is executed from several states that need different corrections"}
+    assert abs(ends[1, 0] + 50.0) > 0.0005
+    np.testing.assert_allclose(np.diff(ends[1:, 0]), 100.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_but_never_beyond_the_travel(machine: Machine, side: int) -> None:
+    """The whole loop is off by what the correction is where it begins: where that leads outwards, it begins there."""
+    refused, ends = loop_to(side * 400.0, side * 100.0, machine)
+    assert np.abs(ends[:, 0]).max() <= 400.0 + 1e-9
+    assert 5 in refused
+    assert (refused.get(3) == f"{LED} (line 5)") == (ends[1, 0] == side * 100.0)
