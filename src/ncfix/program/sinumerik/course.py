@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.modal import Modal
+from ncfix.program.sinumerik.modes import Frames, Modes
 from ncfix.program.sinumerik.plans import Branching, Letting
-from ncfix.program.sinumerik.state import Frames, Modes, Sinumerik
+from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unit import BROKEN, CLOSING, Unit
 from ncfix.program.sinumerik.values import Evaluate, Key, Value, compiled, number
 from ncfix.program.sinumerik.variables import Local

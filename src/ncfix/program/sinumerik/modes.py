@@ -1,0 +1,78 @@
+"""What is in force while a SINUMERIK program is followed, besides the modal state that all controls have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from ncfix.program.sinumerik.affine import WORLD, Affine
+
+if TYPE_CHECKING:
+    from ncfix.program.sinumerik.cycles import Drilling
+
+NO_SYSTEM = "G500"
+"""The name under which the setup may give what is in force while no settable frame is."""
+
+
+@dataclass(slots=True)
+class Frames:
+    """The chain of frames in force.
+
+    name      of the settable frame, G54 ... G599 or G500
+    settable  its shift
+    swivel    the plane of CYCLE800
+    program   TRANS, ROT, SCALE, MIRROR
+    """
+
+    name: str = NO_SYSTEM
+    settable: Affine = WORLD
+    swivel: Affine = WORLD
+    program: Affine = WORLD
+
+    @property
+    def whole(self) -> Affine:
+        """All of them."""
+        return self.settable.then(self.swivel).then(self.program)
+
+
+@dataclass(slots=True)
+class Modes:
+    """What is in force besides the modal state that all controls have.
+
+    diameter     "", "DIAMON" or "DIAM90"
+    pole         of polar coordinates in the frame of the program, mm; None until one is programmed
+    polar        the last AP and RP
+    transformed  TRAORI is on
+    swivelled    CYCLE800 has tilted the plane
+    modal_cycle  what MCALL calls after each block with a motion
+    whole_polar  every block with a polar coordinate has both
+    orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
+    orientation_in_machine  ORIMKS
+    angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
+    """
+
+    diameter: str = ""
+    pole: tuple[float, float] | None = None
+    polar: tuple[float | None, float | None] = (None, None)
+    transformed: bool = False
+    swivelled: bool = False
+    modal_cycle: Drilling | None = None
+    whole_polar: bool = True
+    orientation: str = ""
+    orientation_in_machine: bool = False
+    angles: str = ""
+
+
+@dataclass(slots=True)
+class Named:
+    """Tools that are called by name: numbers that stand for them here, beyond those that a magazine has."""
+
+    numbers: dict[str, int] = field(default_factory=dict)
+
+    def number(self, name: str) -> int:
+        """The number of a name."""
+        return self.numbers.setdefault(name, 1_000_000 + len(self.numbers))
+
+    def name(self, number: int) -> str:
+        """How people call a tool."""
+        return next((name for name, known in self.numbers.items() if known == number), str(number))
