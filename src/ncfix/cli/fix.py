@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     type=click.Choice(["same", "none", "renumber"]),
     default="same",
     show_default=True,
-    help="Klartext: of blocks that are put in, or all blocks anew.",
+    help="Of blocks that are put in (Klartext), or all blocks anew (SINUMERIK, too).",
 )
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
