@@ -43,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
         help="keep the answers there, and do not ask again what is there (default: keep none)",
     )
     p.add_argument("--table", type=Path, help="Markdown file whose section is replaced")
+    p.add_argument("--note", default="", help="what the section says besides about this run")
     p.add_argument("--write", type=Path, metavar="DIR", help="only write the scenarios there, ask nothing")
     p.add_argument("--keep", type=Path, metavar="DIR", help="keep what was handed over and the truth there")
     p.add_argument("-j", "--jobs", type=int, default=2)
@@ -60,7 +61,8 @@ def main(arguments: list[str] | None = None) -> int:
     asked = candidate.load(options.callable) if options.callable else program(options)
     answer_all(todo, asked, options, records)
     chosen = [records[task.family, task.seed] for task in wanted if (task.family, task.seed) in records]
-    section = tally.markdown(chosen, "Final seeds." if options.final else "Development seeds.")
+    run = f"{'Final' if options.final else 'Development'} seeds. {options.note}".strip()
+    section = tally.markdown(chosen, run)
     print(section)
     if options.table:
         old = options.table.read_text() if options.table.exists() else ""

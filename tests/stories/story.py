@@ -12,8 +12,9 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 FENCE = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
@@ -21,8 +22,6 @@ LEFT_OUT = "..."
 NUMBER = re.compile(r"(?<![A-Za-z0-9_.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z0-9_])")
 UNSTEADY = re.compile(r"p = \S+(?=[),;])|log odds \d+|, \d+ less")
 """Figures that the last digits of a computer's arithmetic decide."""
-HEADLINE = re.compile(r"verdict: [a-z-]+(?=:)|(?!gap|where|unknown|to tell)[A-Za-z][A-Za-z0-9 ]*: .*")
-"""Of a diagnosis: its verdict, and the line with a name. The rest of it, runners-up and patterns, is for the reader."""
 RELATIVE, ABSOLUTE = 0.1, 0.15
 """How far figures may be from the printed ones: sums in another order, another release of a library."""
 FINDINGS = 1
@@ -72,9 +71,13 @@ def alike(shown: tuple[str, ...], printed: list[str]) -> bool:
     return bool(printed) and _same(first, printed[0]) and alike(tuple(rest), printed[1:])
 
 
-def headlines(lines: Iterable[str]) -> list[str]:
-    """What a diagnosis says, in one line each."""
-    return [found[0] for found in map(HEADLINE.match, lines) if found]
+def headlines(lines: Sequence[str]) -> list[str]:
+    """What a diagnosis says: its verdict, and the lines with a name (the next one gives its odds).
+
+    The rest of it, runners-up and patterns, is for the reader.
+    """
+    verdict = [":".join(line.split(":")[:2]) for line in lines if line.startswith("verdict:")]
+    return verdict + [name for name, odds in pairwise(lines) if "log odds" in odds]
 
 
 def _same(shown: str, printed: str) -> bool:

@@ -73,7 +73,15 @@ def test_steps_are_read() -> None:
 
 
 def test_headlines_of_a_diagnosis() -> None:
-    text = ["verdict: found: words", "gap: 1 um", "", "wobble C: wobble of C", "  12 um rms: odds", "where:", "  dx: a"]
+    text = [
+        "verdict: found: words",
+        "gap: 1 um",
+        "",
+        "wobble C: wobble of C",
+        "  12 um rms, log odds 4",
+        "where:",
+        "  dx: a",
+    ]
     assert headlines(text) == ["verdict: found", "wobble C: wobble of C"]
 
 
