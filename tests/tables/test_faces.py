@@ -80,6 +80,15 @@ def test_what_needs_all_axes_at_once_has_no_faces_of_three() -> None:
     assert {face.inputs for face in found} == {(0, 1, 2, 3, 4)}
 
 
+def test_kinks_that_are_fine_steps_but_for_rounding_are_not_there_twice() -> None:
+    """A file could not tell such nodes apart."""
+    kinks = np.array([1e-12, 25.0 + 1e-10, 50.0 - 1e-10, 100.0 - 1e-12])
+    bending = Bending.over(0.0, 100.0, kinks, lambda line: np.sign(line - 25.0)[None, :, None])
+    assert np.diff(bending.places).min() > 1e-5
+    assert (bending.places[0], bending.places[-1]) == (0.0, 100.0)
+    assert all(np.diff(np.round(nodes, 6)).min() > 0 for nodes, _ in bending.uneven().values())
+
+
 def test_uneven_nodes_lie_on_the_kinks() -> None:
     """A table of three straight lines takes four nodes, wherever they meet."""
     knots, values = np.array([0.0, 13.7, 61.3, 100.0]), np.array([0.0, 0.02, -0.01, 0.03])

@@ -20,6 +20,8 @@ TRIED = 40
 """Positions in between at which it is seen whether there are enough."""
 RIGHT = 2e-5
 """mm: what fine steps may miss there."""
+SAME = 1e-7
+"""Of the range: places nearer to each other than that are one."""
 BETWEEN = 4
 """Points looked at between two nodes of a line."""
 GOLDEN = 0.6180339887498949
@@ -52,9 +54,11 @@ class Bending:
         """
         tried = low + (high - low) * np.mod(GOLDEN * np.arange(1, TRIED + 1), 1.0)
         meant = along(tried)
-        inner = kinks[(kinks > low) & (kinks < high)]
+        gap = SAME * (high - low)
+        inner = kinks[(kinks > low + gap) & (kinks < high - gap)]
         for steps in STEPS:
             places = np.union1d(np.linspace(low, high, steps + 1), inner)
+            places = places[np.append(np.diff(places) > gap, True)]
             found = cls(places, along(places))
             if np.abs(found.at(tried) - meant).max() < RIGHT:
                 break
