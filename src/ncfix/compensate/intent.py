@@ -19,13 +19,13 @@ import numpy as np
 from ncfix.compensate.direction import Signs, carried, matters, signs
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import (
-    affine_tip,
     common,
     linear_columns,
     programmed_tip,
     reached_joints,
     regular,
     solve,
+    tip_maps,
 )
 from ncfix.compensate.rows import some
 from ncfix.compensate.segments import Segments
@@ -169,7 +169,7 @@ class Intent:
         """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""
         tcp = self.moves.tcp[rows]
         programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands)
-        maps = regular(affine_tip(self.machine, programmed)[0])[0]
+        maps = regular(tip_maps(self.machine, programmed))[0]
         return np.broadcast_to(maps, (len(rows), 3, 3))
 
     def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:

@@ -46,7 +46,12 @@ def affine_tip(machine: Machine, q: Array, tool_length: ArrayLike = 0.0) -> tupl
     length = np.asarray(tool_length, dtype=np.float64)
     if len(q) > 1 and length.ndim == 0 and (still == still[0]).all():
         still = still[:1]
-    return machine.follows(still, tuple(columns.tolist())), machine.tip(still, length)
+    return tip_maps(machine, still), machine.tip(still, length)
+
+
+def tip_maps(machine: Machine, q: Array) -> Array:
+    """How the tip follows X Y Z at axis positions (n, n_axes): (n, 3, 3) mm per mm, workpiece frame."""
+    return machine.follows(q, tuple(linear_columns(machine).tolist()))
 
 
 def solve(maps: Array, tips: Array) -> Array:

@@ -21,6 +21,7 @@ import numpy as np
 from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import largest, offsets, owners, places
+from ncfix.compensate.rows import lengths
 
 
 class Cuttable(Protocol):
@@ -60,8 +61,11 @@ class Grid:
         a, b = first[piece], last[piece]
         share = (self.fraction[node] - self.fraction[a]) / (self.fraction[b] - self.fraction[a])
         command = self.command[a] + share[:, None] * (self.command[b] - self.command[a])
-        off = (self.follow[node] * (command - self.command[node])[:, None]).sum(axis=2)
-        return largest(np.sqrt((off * off).sum(axis=1)), inner)
+        short, follow = command - self.command[node], self.follow[node]
+        off = follow[:, :, 0] * short[:, None, 0]
+        for j in range(1, short.shape[1]):
+            off += follow[:, :, j] * short[:, None, j]
+        return largest(lengths(off), inner)
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
         """No piece is an arc."""
