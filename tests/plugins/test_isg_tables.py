@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.diagnostics import ConfigError
-from ncfix.machine import Effect
+from ncfix.diagnostics import ConfigError, UsageError
+from ncfix.machine import Effect, loads
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import export
 from ncfix.tables.poses import ranges_of
@@ -123,3 +123,57 @@ def test_a_jump_is_doubtful() -> None:
 
 def test_good_files_are_not_remarked_on() -> None:
     assert not CONTROL.lint(files())
+
+
+TABLE = """
+ncfix = 1
+name = "table"
+topology = "w C A F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0], range = [-200, 300] }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [-150, 250] }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [-300, 0] }
+axis.A = { type = "rotary", direction = [-1, 0, 0], point = [0, 0, -350], range = [-60, 90] }
+axis.C = { type = "rotary", direction = [0, 0, -1], point = [0, 0, -350], range = [0, 120] }
+
+[[effect]]
+name = "EBC"
+basis = "fourier"
+order = [1]
+coefficients = [50e-6, 20e-6]
+"""
+
+
+def test_five_axes_have_a_sum_of_grids() -> None:
+    """A tilt of the table by B turns with C: X is moved by Z (and what lies above it), Z by X, each over A and C."""
+    machine = loads(TABLE)
+    options = CONTROL.settings({})
+    made = export(CONTROL, Request(machine, ranges_of(machine), 100.0, 0.001, options), 3000)
+    assert made.left.before.max() > 0.015
+    assert made.left.after.max() < 0.001
+    names = sorted(name for name in made.native if name.endswith(".csv"))
+    listed = made.native["volcomp.lis"].decode().splitlines()
+    assert [line.split()[1] for line in listed if line.startswith("file[")] == [f"C:\\vc\\{name}" for name in names]
+    heads = [made.native[name].decode().splitlines()[1].split() for name in names]
+    parameters = [word for head in heads for word in head if word.startswith("E")]
+    assert len(set(parameters)) == len(parameters)
+    assert all(len([word for word in head if not word.startswith("E")]) <= 3 for head in heads)
+    assert ["Z", "A", "C", "EXZ"] in [[word for word in head if word != "EYZ"] for head in heads]
+    assert made.tables.points < 3000
+
+
+@pytest.mark.parametrize("settings", [{"grids": "one", "points": "200"}, {"steps": "even"}, {"fit": "area"}])
+def test_other_ways_to_fill_them(settings: dict[str, str]) -> None:
+    """One grid over five axes has too few nodes: it leaves more."""
+    machine = loads(TABLE)
+    made = export(CONTROL, Request(machine, ranges_of(machine), 100.0, 0.001, CONTROL.settings(settings)), 1000)
+    single = settings.get("grids") == "one"
+    assert (made.left.after.max() > 0.001) == single
+    assert (len(made.tables.grids) == 1) == single
+
+
+def test_wrong_settings() -> None:
+    machine = loads(TABLE)
+    for wrong in ({"fit": "best"}, {"steps": "some"}, {"grids": "two"}, {"points": "7"}, {"axes": "X:1"}):
+        with pytest.raises(UsageError) as caught:
+            CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, CONTROL.settings(wrong)))
+        assert caught.value.code == "NCF485"
