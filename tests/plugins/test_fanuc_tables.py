@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ncfix.diagnostics import ConfigError, UsageError
-from ncfix.machine import Effect
+from ncfix.machine import Effect, load
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.poses import ranges_of
@@ -167,3 +168,24 @@ def test_least_squares_leave_less_at_the_worst() -> None:
     ]
     assert made[1].tables.points < made[0].tables.points
     assert made[1].left.after.max() < 0.004 + 1e-4  # and the rounding
+
+
+def test_the_target_includes_the_rounding() -> None:
+    """Values up to 30 um in 127 steps are rounded by up to 0.12 um: the points are so many that 0.4 um hold anyway."""
+    machine = single_error("EXX", 0.02)
+    settings = CONTROL.settings({"sign": "error"})
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.0004, settings), 2000)
+    assert json.loads(made.native["volume.json"])["magnification"] > 1
+    assert made.left.after.max() <= 0.0004
+
+
+def test_points_are_fitted_to_what_is_around_them_if_exact_ones_miss_too_much(root: Path) -> None:
+    """The screw of the shipped machine: a wave of 12 mm along X, for which 25 exact points are too few."""
+    machine = load(str(root / "examples" / "machines" / "three_axis.toml"))
+    left = {}
+    for fit in ("nodes", "auto"):
+        settings = CONTROL.settings({"sign": "error", "fit": fit})
+        made = export(CONTROL, Request(machine, ranges_of(machine), 120.0, 0.0008, settings), 2000)
+        left[fit] = float(made.left.after.max())
+    assert left["nodes"] > 0.0008
+    assert left["auto"] < left["nodes"]
