@@ -178,4 +178,4 @@ def scan(
             starts[known] = end
         group[block] = table[found]
     first[n] = count
-    return n, group, comment, first, spans[:count].copy(), values[:count].copy(), shapes, starts[: known + 1]
+    return n, group, comment, first, spans[:count], values[:count], shapes, starts[: known + 1]

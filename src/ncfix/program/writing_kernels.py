@@ -254,7 +254,7 @@ def write(
         done = last_piece + 1
         for axis in range(axes):
             here[axis] = commands[last_piece, axis]
-    changes = start[:edits].copy(), stop[:edits].copy(), length[:edits].copy(), data[:size].copy()
+    changes = start[:edits], stop[:edits], length[:edits], data[:size]
     return commands[:done], *changes, lines
 
 
