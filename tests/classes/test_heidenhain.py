@@ -74,7 +74,10 @@ FRAMES = [
     case("preset that is not given", "CYCL DEF 247 PRESET Q339=+7\nL X+5 F100", L5=N),
     case("a plane that the machine cannot reach", "PLANE SPATIAL SPA+30 SPB+0 SPC+0 STAY\nL X+5 Y+5 Z+5 F100", L5=N),
     case(
-        "a plane that is none", "PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY\nL X+5 F100\nPLANE RESET STAY\nL X+1", L5=R, L7=R
+        "a plane that is none",
+        "PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY\nL X+5 Y+2 Z+9 F100\nPLANE RESET STAY\nL X+1 Y+2 Z+9",
+        L5=R,
+        L7=R,
     ),
     case("M91", "L Z+0 FMAX M91\nL X+5 Y+5 Z+20", L4=P, L5=R),
     case("M92", "L Z+0 FMAX M92\nL X+5\nL Z+20 FMAX", L4=P, L5=N, L6=R),

@@ -98,7 +98,8 @@ class FiveAxisTnc:
                 self.at[COLUMN[letter]] = number
             self.travels.append(Travel("machine", self.at[None].copy(), self.length))
         elif words:
-            self.go(words, "rapid" if re.search(r"F ?MAX", block) else "path")
+            rapid = "rapid" if {"X", "Y", "Z"} <= words.keys() else "positioning"
+            self.go(words, rapid if re.search(r"F ?MAX", block) else "path")
         self.m128 &= "M129" not in block
 
     # -- geometry -----------------------------------------------------------------------------------------------------

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ncfix.diagnostics import SourceError
 from ncfix.program.klartext.poles import is_relied_on
 from ncfix.program.moves import Rule
+from ncfix.program.setup import Tool
 from program.klartext.test_following import reasons
 from program.klartext.test_writing import lines
-from program.klartext.tnc import ends, fixed, follow
+from program.klartext.tnc import KNOWN, ends, fixed, follow
 
 
 def test_turns_are_taken_off_before_the_motion() -> None:
@@ -97,6 +100,33 @@ def test_increments_of_parameters_say_the_same_from_a_corrected_place() -> None:
 )
 def test_what_relies_on_a_pole(text: str, relied_on: bool) -> None:
     assert is_relied_on(("CR X+1 R5 DR+\n" + text).encode(), 12) == relied_on
+
+
+@pytest.mark.parametrize(
+    "event",
+    ["L Z+250 FMAX M91", "TOOL CALL 3 Z", "CYCL DEF 247 PRESET Q339=+1", "PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY"],
+)
+def test_no_axis_is_named_that_the_program_leaves_where_offsets_have_put_it(event: str) -> None:
+    """Were a preset or a tool length another on the machine, an added Z would lead the tool there at rapid."""
+    setup = replace(KNOWN, tools={0: Tool(0.0), 3: Tool(50.0)})
+    body = f"L X+100 Y+100 Z+90 FMAX\n{event}\nL X+50 Y+20 FMAX\nL Z+20 FMAX\nL X+60 F500"
+    text = fixed(body, setup=setup).text.decode().splitlines()
+    away, down, cut = (line for line in text[-4:-1])
+    assert away == "L X+50 Y+20 FMAX"
+    assert {"X", "Y", "Z"} <= {word[0] for word in down.split()}
+    assert cut.startswith("L X+60.")
+
+
+def test_at_the_start_only_axes_that_are_named_are_moved() -> None:
+    found = fixed("L Z+90 FMAX\nL X+50 Y+20 FMAX\nL X+60 F500", setup=replace(KNOWN, initial={}))
+    assert "L Z+90 FMAX" in found.text.decode().splitlines()
+    assert found.report.refused == ()
+
+
+def test_a_cut_is_refused_along_an_axis_that_was_left_at_a_machine_position() -> None:
+    report = fixed("L X+100 Y+100 Z+90 FMAX\nL Z+0 FMAX M91\nL X+50 F500\nL Z+20 FMAX").report
+    assert [refusal.line for refusal in report.refused] == [4]
+    assert "has not been named" in report.refused[0].reason
 
 
 def test_a_free_contour_begins_where_it_was_meant_to() -> None:

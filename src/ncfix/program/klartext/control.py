@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
@@ -15,16 +16,22 @@ from ncfix.program.rs274 import control as base
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import Unknown
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Plane, Vector, Z, rotated, zeros
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.program.rs274.knowledge import WORK_OFFSET
 from ncfix.program.setup import Setup, Tool
 
 START = "PRESET"
 """The name in the setup of the preset that is active when the program starts; G54 is taken for it."""
 
+BY_DEPTH, FROM_START = 2000, 1000
+"""Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
+
 TILTED, DOUBTFUL, TOOL = "tilt", "doubt", "tool"
 """The keys under which motions are suspended."""
 
+
+ADRIFT = "the axis {} has not been named since M91, the start, a change of tool, preset, plane or M128: {}"
+APART = "its numbers in the workpiece would rest on the offsets alone"
 
 RETRACTED = "where the axis {} stands after M140 is not followed"
 """Rapids at such a height are passed: the tool is off the workpiece, and the next block that names the axis is not."""
@@ -94,6 +101,7 @@ class Control(base.Control):
         self.preset_checked = False
         self.tool_called = False
         self.defined_tools: dict[int, Tool] = {}
+        self.adrift = {i for i in (X, Y, Z) if i in self.machine and LETTERS[i] not in setup.initial}
         self.load_preset(START if START in setup.work_offsets else "G54")
 
     # -- coordinates --------------------------------------------------------------------------------------------------
@@ -127,7 +135,22 @@ class Control(base.Control):
         if on != self.tcp:
             self.ask_for_tool()
             tcp.switch(self, self.offsets.tool, on)
+            self.set_adrift((X, Y, Z))
         self.refresh()
+
+    def set_adrift(self, indices: Iterable[int]) -> None:
+        """Where these axes stand in the workpiece follows from offsets now, not from a word of the program."""
+        everywhere = self.is_rotated or self.tcp
+        self.adrift |= {i for i in ((X, Y, Z) if everywhere else indices) if i in (X, Y, Z) and i in self.machine}
+
+    def not_said(self, axes: int) -> str:
+        """Why a motion must not get words for axes that it does not name; empty if it may.
+
+        An added word would lead such an axis to where the setup says that it is, and if a preset or a tool length is
+        another on the machine, somewhere else.
+        """
+        letter = next((LETTERS[index] for index in sorted(self.adrift) if not axes >> index & 1), "")
+        return ADRIFT.format(letter, APART) if letter else ""
 
     def use(self) -> None:
         """A motion in workpiece coordinates: preset and tool length matter."""
@@ -173,6 +196,13 @@ class Control(base.Control):
         What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
         (PATHCTRL VECTOR), which in pieces would be turns of axes.
         """
+        judged = refusal or passing or self.refusal or self.suspended
+        why = "" if judged else self.not_said(axes | (1 << Z if code == BY_DEPTH else 0))
+        if why and (kind == Kind.RAPID or not axes & 7):
+            passing = why
+        refusal = refusal or why
+        if not self.modal.incremental and not passing.startswith("machine"):
+            self.adrift -= {index for index in (X, Y, Z) if axes >> index & 1}
         before = self.modal.compensated
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)

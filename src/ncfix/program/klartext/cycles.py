@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.control import BY_DEPTH, FROM_START, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
@@ -32,9 +32,6 @@ CALLING = 12
 CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
 """Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
-
-BY_DEPTH, FROM_START = 2000, 1000
-"""Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
 
 AT_ONCE = frozenset({7, 8, 10, 11, 19, 26, 247})
 """Cycles that take effect where they are defined."""
@@ -137,6 +134,7 @@ def preset(control: Control) -> None:
         control.suspended["preset"] = NO_PRESET
         return
     control.load_preset(f"PRESET{number:g}")
+    control.set_adrift((X, Y, Z))
 
 
 # -- execution --------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ the tool stands, so that gets a word.
 
 from __future__ import annotations
 
-from ncfix.program.klartext.cycles import BY_DEPTH
+from ncfix.program.klartext.control import BY_DEPTH
 from ncfix.program.klartext.number_text import value_of
 from ncfix.program.klartext.words_text import WordWriter
 from ncfix.program.tree import Word

@@ -70,6 +70,13 @@ def straight_polar(control: Control, step: Step) -> None:
     axes = polar_axes(control, step.words)
     target, unknown = command_of(control, where, axes)
     run(control, step, target, unknown, axes, follows=True)
+    name_polar(control, step)
+
+
+def name_polar(control: Control, step: Step) -> None:
+    """PR and PA say where the axes of the plane are as well as their own words."""
+    if {"PR", "PA"} <= step.words.values.keys():
+        control.adrift -= {control.path.plane.first, control.path.plane.second}
 
 
 def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
@@ -145,6 +152,7 @@ def at_machine(control: Control, step: Step) -> None:
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
     control.move(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code))
+    control.set_adrift([index for index in range(3) if step.words.axes >> index & 1])
     if was:
         control.switch_tip()
     control.path.tangent = None
@@ -163,6 +171,8 @@ def approach(control: Control, step: Step) -> None:
     with_increments(control, step.words.incremental or " p" in step.name)
     control.move(Kind.FEED, axes, target, unknown, 10)
     with_increments(control, False)
+    if " p" in step.name:
+        name_polar(control, step)
     control.path.tangent = None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
-from ncfix.program.klartext.cycles import BY_DEPTH, FROM_START
+from ncfix.program.klartext.control import BY_DEPTH, FROM_START
 from ncfix.program.klartext.holes_text import HoleWriter
 from ncfix.program.klartext.layout import Layout, poles_move
 from ncfix.program.klartext.number_text import value_of

@@ -119,6 +119,7 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
         control.lose(range(3), "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed")
     control.recompose()
     control.switch_tip()
+    control.set_adrift(range(3))
     control.path.tangent = None
 
 

@@ -69,6 +69,8 @@ def set_length(control: Control, length: float) -> None:
     """The machine stands still when the length of the tool changes; the tip does not."""
     tool = zeros()
     tool[Z] = length
+    if length != control.offsets.tool[Z]:
+        control.set_adrift((Z,))
     if control.tcp:
         tcp.switch(control, tool, True)
     control.offsets.tool = tool
