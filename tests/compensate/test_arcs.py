@@ -7,6 +7,7 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions, sweep_of
+from ncfix.compensate.arcs import turns_begun
 from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.path import plan
@@ -189,3 +190,8 @@ def test_under_cutter_compensation_an_arc_stays_one_or_is_kept_and_named() -> No
     assert (first.code, first.moves.tolist()) == ("NCF415", [1])
     assert result.pieces.arc[2]
     assert moves.kind[2] == Kind.ARC
+
+
+def test_a_little_more_than_a_turn_is_a_turn_more() -> None:
+    sweeps = np.array([2 * np.pi, 2 * np.pi + 1e-4, -2 * np.pi + 1e-4, -4 * np.pi, 4 * np.pi + 1e-12, 0.1])
+    assert turns_begun(sweeps).tolist() == [1, 2, 1, 2, 2, 1]

@@ -122,6 +122,7 @@ class Interpreter:
                 done = run_lane(control, course.unit, course.block, main)  # type: ignore[arg-type]
                 if done:
                     course.block += done
+                    control.heading = None
                     self.spend(done)
                     continue
             plan = course.unit.plan(course.block)
