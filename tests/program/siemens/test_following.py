@@ -268,7 +268,7 @@ def test_plain_blocks_go_through_the_fast_lane_with_the_same_result() -> None:
 
 
 def test_ct_does_not_go_on_from_an_older_motion() -> None:
-    """Plain motions in number go many at a time, which leaves no direction behind; CT in a file of its own asks late."""
+    """Many plain motions go at once and leave no direction behind; CT in a file of its own asks for it too late."""
     plain = "".join(f"X{n} Y{n % 3}\n" for n in range(400))
     found = follow(f"G0 X-5 Y0\nG1 F100\n{plain}SUB1\n", files={"SUB1": "CT X500 Y50\nM17\n"}).moves
     assert "direction" in found.reasons[found.reason[-1]]
