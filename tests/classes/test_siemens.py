@@ -47,7 +47,7 @@ ARCS = [
     case("several turns", "G3 I10 J0 Z40 TURN=2 F100", L3=R),
     case("arc through a point", "CIP X21 Y2 I1=11 J1=12 F100\nG1 X5", L3=R, L4=R),
     case("arc through a point, and more turns", "CIP X21 Y2 I1=11 J1=12 TURN=1 F100", L3=R),
-    case("arc with an absolute centre in diameters", "DIAMON\nG1 X2 F100\nG2 X22 Y2 I=AC(12) J=AC(2)", L2=N, L4=N, L5=N),
+    case("absolute centre in diameters", "DIAMON\nG1 X2 F100\nG2 X22 Y2 I=AC(12) J=AC(2)", L2=N, L4=N, L5=N),
     case("helix", "G2 X11 Y12 Z40 I10 J0 F100", L3=R),
     case("tangential arc", "G1 X5 F100\nCT X10 Y5\nX15 Y2\nG1 X20", L3=R, L4=R, L5=R, L6=R),
     case("tangential arc that is a line", "G1 X5 F100\nCT X10\nY5\nG1 X20", L3=R, L4=R, L5=R, L6=R),
