@@ -92,12 +92,14 @@ def farthest(points: Floats, path: Floats) -> float:
 
 
 def judged(text: str, fixed: Fixed, model: errors.Machine) -> dict[str, float]:
-    """The worst distance (mm) of each kind of section from where it should be."""
+    """The worst distance (mm) of each kind of section from where it should be; rapids in machine height are passed."""
     before, after = sections(control().run(text)), sections(seen(control().run(fixed.text.decode()), model))
     assert [kind for kind, _, _ in before] == [kind for kind, _, _ in after]
     worst: dict[str, float] = {}
+    earlier = ""
     for (kind, meant, _), (_, done, _) in zip(before, after, strict=True):
-        if kind == "machine":
+        left_alone, earlier = kind == "machine" or (kind == "rapid" and earlier == "machine"), kind
+        if left_alone:
             continue
         off = max(farthest(done, meant), farthest(meant, done)) if kind == "path" else np.abs(done - meant).max()
         worst[kind] = max(worst.get(kind, 0.0), float(off))

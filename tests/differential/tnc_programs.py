@@ -154,7 +154,7 @@ class Maker:
             ["CYCL DEF 11.0 SCALING", f"CYCL DEF 11.1 SCL {self.dice.uniform(0.7, 1.2):.3f}"],
             ["CYCL DEF 247 DATUM SETTING ~\n Q339=+1 ;NUMBER"],
         ]
-        self.emit(*RESET, *self.dice.choice(choices), f"L {xy(self.somewhere())} F700")
+        self.emit(*RESET, *self.dice.choice(choices), f"L {xy(self.somewhere())} Z+3 F700")
 
     def holes(self) -> None:
         to = self.somewhere()
