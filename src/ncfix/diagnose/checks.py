@@ -91,8 +91,11 @@ def agreeing(view: View, residual: Array, sigma: float) -> None:
 def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
     """What the user should know: directions that never change, names that do not exist."""
     found = []
-    sides = [name for each in view.measurements for name in each.columns if name.startswith("dir_")]
-    if sides and not any(name.startswith("dir_") for name in view.reach.columns):
-        found.append(Message("NCF653", "every axis came from one side: backlash and play cannot show"))
+    stated = {name for each in view.measurements for name in each.columns if name.startswith("dir_")}
+    fixed = [axis.name for axis in view.machine.axes if view.reach.moved(axis) and f"dir_{axis.name}" in stated]
+    fixed = [name for name in fixed if f"dir_{name}" not in view.reach.columns]
+    if fixed:
+        text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
+        found.append(Message("NCF653", f"{text} cannot show"))
     found += [Message("NCF657", f"there is no effect {name!r} in the catalogue of this machine") for name in unheard_of]
     return found

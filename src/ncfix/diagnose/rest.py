@@ -15,7 +15,7 @@ import numpy as np
 from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.rivals import functions, scaled
-from ncfix.diagnose.selection import LEAST, Selected, judged, select
+from ncfix.diagnose.selection import LEAST, Selected, judged, likelihood, select
 from ncfix.measure.measurement import Array
 
 MISSHAPEN = 0.15
@@ -56,13 +56,11 @@ def _instead(court: Court, selected: Selected) -> list[Selected]:
 
 
 def _weight(court: Court, selected: Selected) -> float:
-    """Log likelihood of a whole, with how many names it chose its own from."""
-    members = list(selected.members.values())
+    """Log likelihood of a whole, its names in the shapes of the catalogue or misshapen."""
     named = [selected.members[name] for name in selected.named]
-    plain = court.likelihood(members)
-    misshapen = court.likelihood(members, allowance(court, named)) if named else plain
-    choice = len(named) * np.log(len(court.names)) + len(selected.unnamed) * np.log(max(len(court.rivals), 1))
-    return float(np.logaddexp(plain, misshapen) - np.log(2) - choice)
+    plain = likelihood(court, selected.members)
+    misshapen = likelihood(court, selected.members, allowance(court, named)) if named else plain
+    return float(np.logaddexp(plain, misshapen) - np.log(2))
 
 
 def allowance(court: Court, named: Sequence[Member]) -> Array | None:

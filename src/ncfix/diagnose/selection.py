@@ -13,6 +13,8 @@ from ncfix.measure.measurement import Array
 
 MOST = 5
 """Effects that are named at most."""
+RARE = float(np.log(10))
+"""Log odds against each further effect that is missing at the same time."""
 TRIALS = 300
 FALSE_ALARM = 0.01
 """How often noise alone may name anything."""
@@ -85,18 +87,50 @@ def select(court: Court, null: Null | None = None, start: Sequence[str] = ()) ->
     empty = court.heard([])
     first = {name: empty.of(court.forms[name]) for name in court.names}
     null = noise_alone(court, empty) if null is None else null
-    members, steps = _started(court, start), []
-    while len(members) < MOST + len(start):
-        evidence = court.heard(list(members.values())) if members else empty
-        odds = {name: evidence.of(court.forms[name]) for name in court.names if name not in members}
+    steps: list[tuple[str, float]] = []
+    members = _grown(court, null, _started(court, start), steps)
+    if len(members) > 1 and not start:
+        members = _regrown(court, null, members)
+    return judged(court, members, first, null, steps)
+
+
+def _grown(
+    court: Court, null: Null, members: dict[str, Member], steps: list[tuple[str, float]], barred: str = ""
+) -> dict[str, Member]:
+    """Members with all that can be added one after another; `steps` tells in which order."""
+    most = MOST + sum(name in court.rivals for name in members)
+    while len(members) < most:
+        evidence = court.heard(list(members.values()))
+        offered = [name for name in court.names if name not in members and name != barred]
+        odds = {name: evidence.of(court.forms[name]) for name in offered}
         name = max(odds, key=lambda each: odds[each], default=None)
         if name is None or odds[name] < asked(court, null, members):
             break
         steps.append((name, odds[name]))
-        members[name] = evidence.best(court.forms[name])
+        members = {**members, name: evidence.best(court.forms[name])}
         if len(members) > 1:
             members = _exchanged(court, members, int(evidence.null.argmax()))
-    return judged(court, members, first, null, steps)
+    return members
+
+
+def _regrown(court: Court, null: Null, members: dict[str, Member]) -> dict[str, Member]:
+    """Every member in turn taken away and others looked for: two may stand for the one that came in first."""
+    best, most = members, likelihood(court, members)
+    for out in members:
+        others = {name: member for name, member in members.items() if name != out}
+        found = _grown(court, null, others, [], barred=out)
+        value = likelihood(court, found)
+        if value > most + 1.0:
+            best, most = found, value
+    return best
+
+
+def likelihood(court: Court, members: Mapping[str, Member], beside: Array | None = None) -> float:
+    """Log likelihood of a whole, the names that it was chosen from counted against it, and how rare several are."""
+    named = sum(name in court.names for name in members)
+    chosen = named * np.log(len(court.names)) + max(named - 1, 0) * RARE
+    nameless = (len(members) - named) * np.log(max(len(court.rivals), 1))
+    return court.likelihood(list(members.values()), beside) - float(chosen + nameless)
 
 
 def asked(court: Court, null: Null, members: Mapping[str, Member]) -> float:
@@ -187,4 +221,4 @@ def aliases(selected: Selected, name: str, within: float = 3.0) -> list[str]:
     return sorted(found, key=lambda key: -rest[key])
 
 
-__all__ = ["Null", "Selected", "aliases", "judged", "noise_alone", "select"]
+__all__ = ["Null", "Selected", "aliases", "judged", "likelihood", "noise_alone", "select"]

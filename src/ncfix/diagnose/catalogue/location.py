@@ -15,7 +15,11 @@ ONE = (np.eye(1),)
 
 
 def candidates(reach: Reach) -> Iterator[Candidate]:
-    """Those that the file lacks."""
+    """Those that the file lacks.
+
+    Gains, and lines of which the file says nothing, go before all other effects. Where it has some of the lines, what
+    it lacks says the same again for the most part: those are names like others.
+    """
     known = {effect.name for effect in reach.machine.effects}
     for axis in (*reach.linear, *reach.rotary):
         for name in _lines(axis):
@@ -23,16 +27,26 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
                 title = catalogue.title(name, axis)
                 remedy = "re-measure where the axis lies"
                 effect = zero([Effect(name, ())])
-                yield Candidate(name, title, axis.name, f"{axis.name} location", effect, ONE, (), remedy, constant=True)
+                family, first = f"{axis.name} location", not _located(reach, axis)
+                yield Candidate(name, title, axis.name, family, effect, ONE, (), remedy, constant=first)
     for axis in reach.linear:
-        own = along(axis)
-        name = f"E{LETTERS[own or 0]}{axis.name}"
+        own, name = along(axis), _gain(axis)
         if own is not None and not any(_is_gain(effect, name) for effect in reach.machine.effects):
             gain = zero([Effect(name, (), Polynomial(degree=(1,)), **reach.scaled(axis))])
             title = f"scale of {axis.name}: positions too long or too short in proportion"
             yield Candidate(
                 f"scale {axis.name}", title, axis.name, f"{axis.name} geometry", gain, ONE, (), "", constant=True
             )
+
+
+def _gain(axis: Axis) -> str:
+    return f"E{LETTERS[along(axis) or 0]}{axis.name}"
+
+
+def _located(reach: Reach, axis: Axis) -> bool:
+    """Whether the file says where this axis lies; of linear axes, where any of them does."""
+    names = {axis.name} if axis.rotary else {each.name for each in reach.linear}
+    return any(effect.location and effect.joint in names for effect in reach.machine.effects)
 
 
 def _is_gain(effect: Effect, name: str) -> bool:
