@@ -107,3 +107,24 @@ def test_a_turn_that_hardly_turns_does_not_go_the_other_way_round() -> None:
     text, moves = on_the_cradle("G0 X0 Y0 Z40 A20 C30\nG1 X20 C=ACN(30) F100\nX-5 C=ACP(30)\nX7 C=DC(30)")
     assert "C=IC(" in text
     assert np.abs(np.degrees(moves.end[:, moves.axes.index("C")]) - 30).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("block", "given", "why"),
+    [
+        ("G1 X5 A2=10 B2=20 F100", {}, "ORIEULER"),
+        ("G1 X5 A2=10 B2=20 F100", {"$MC_ORIENTATION_IS_EULER": 1.0}, ""),
+        ("ORIRPY2\nG1 X5 A2=10 B2=20 F100", {}, ""),
+        ("ORIVIRT1\nG1 X5 A2=10 B2=20 F100", {}, "ORIEULER"),
+        ("ORIRPY\nG1 X5 A2=10 A3=0 C3=1 F100", {}, "more than one way"),
+        ("ORICONCW\nG1 X5 A3=0.1 C3=1 F100", {}, "cone"),
+        ("G1 X5 LEAD=5 F100", {}, "LEAD"),
+    ],
+)
+def test_directions_are_taken_or_refused_in_words(block: str, given: dict[str, float], why: str) -> None:
+    source = f"T1 D1 M6\nG54\nTRAORI\nG0 X0 Y0 Z40 A5 C5\n{block}\nG0 Z50 A5 C5\nM30\n".encode()
+    setup = Setup(tools={1: Tool(80.0)}, variables=given, assume_zero=True)
+    fixed = fix_program(read(source, "part.mpf", "siemens"), load(CRADLE), setup, FixOptions(verify=False))
+    reasons = [refusal.reason for refusal in fixed.report.refused]
+    assert all(why in reason for reason in reasons)
+    assert bool(reasons) == bool(why)
