@@ -100,7 +100,7 @@ def crew(jobs: int, machine: Machine, dialect: Dialect, options: FixOptions) -> 
     context: BaseContext = multiprocessing.get_context("fork" if forks else None)
     with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(task, fast.engaged())) as pool:
         try:
-            yield Workers(task, 2 * jobs, pool)
+            yield Workers(task, jobs + 1, pool)
         finally:
             pool.shutdown(cancel_futures=True)
 
