@@ -123,10 +123,13 @@ def test_at_the_start_only_axes_that_are_named_are_moved() -> None:
     assert found.report.refused == ()
 
 
-def test_a_cut_is_refused_along_an_axis_that_was_left_at_a_machine_position() -> None:
-    report = fixed("L X+100 Y+100 Z+90 FMAX\nL Z+0 FMAX M91\nL X+50 F500\nL Z+20 FMAX").report
-    assert [refusal.line for refusal in report.refused] == [4]
-    assert "has not been named" in report.refused[0].reason
+def test_an_axis_that_was_left_at_a_machine_position() -> None:
+    body = "L X+100 Y+100 Z+90 FMAX\nL Z+0 FMAX M91\nL X+50 F500\nCR X+60 Y+110 R+10 DR+\nL Z+20 FMAX"
+    report = fixed(body).report
+    assert [refusal.line for refusal in report.refused] == [2, 5]
+    assert "has not been named" in report.refused[1].reason
+    assert report.passed == 2
+    assert "NCF274" in {warning.code for warning in report.warnings}
 
 
 def test_a_free_contour_begins_where_it_was_meant_to() -> None:

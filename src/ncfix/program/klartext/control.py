@@ -15,7 +15,7 @@ from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import control as base
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.control import Unknown
+from ncfix.program.rs274.control import AT_START, Unknown
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.program.rs274.knowledge import WORK_OFFSET
 from ncfix.program.setup import Setup, Tool
@@ -32,6 +32,7 @@ TILTED, DOUBTFUL, TOOL = "tilt", "doubt", "tool"
 
 ADRIFT = "the axis {} has not been named since M91, the start, a change of tool, preset, plane or M128: {}"
 APART = "its numbers in the workpiece would rest on the offsets alone"
+NOT_NAMED = "NCF274"
 
 RETRACTED = "where the axis {} stands after M140 is not followed"
 """Rapids at such a height are passed: the tool is off the workpiece, and the next block that names the axis is not."""
@@ -196,9 +197,11 @@ class Control(base.Control):
         What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
         (PATHCTRL VECTOR), which in pieces would be turns of axes.
         """
-        judged = refusal or passing or self.refusal or self.suspended
+        lost = any(reason is not AT_START for reason in (*unknown.values(), *self.unknown.values()))
+        judged = refusal or passing or self.refusal or self.suspended or lost
         why = "" if judged else self.not_said(axes | (1 << Z if code == BY_DEPTH else 0))
-        if why and (kind == Kind.RAPID or not axes & 7):
+        if why and kind in (Kind.RAPID, Kind.FEED):
+            self.warn(NOT_NAMED, why, "let the program name X, Y and Z")
             passing = why
         refusal = refusal or why
         if not self.modal.incremental and not passing.startswith("machine"):

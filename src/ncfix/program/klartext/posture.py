@@ -101,6 +101,7 @@ def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
     if pointing is None:
         return []
     first, second = (control.machine[column] for column in pointing.columns)
+    control.settle((first, second))
     if first in control.unknown or second in control.unknown:
         return []
     ways = pointing.angles(np.array(direction), (control.position[first], control.position[second]))
