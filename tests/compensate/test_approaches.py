@@ -71,7 +71,9 @@ def test_a_level_in_inches_and_in_another_offset(machine: Machine) -> None:
 
 def test_least_increments_count(machine: Machine) -> None:
     setup = Setup(SETUP.work_offsets, SETUP.tools, SETUP.initial, no_point="IS-B")
-    program = read(b"G21 G90 G17 G94 G54\nG0 X0 Y0 Z50000\nG99 G81 X150000 Y145000 Z-4000 R2000 F100\nM2\n", "p", "fanuc")
+    program = read(
+        b"G21 G90 G17 G94 G54\nG0 X0 Y0 Z50000\nG99 G81 X150000 Y145000 Z-4000 R2000 F100\nM2\n", "p", "fanuc"
+    )
     text = fix_program(program, machine, setup, OPTIONS).text.decode()
     assert "R1999" in text
 
