@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from compensate.motions import motions
+from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import _look, bounds, uneasy_starts
@@ -95,3 +96,14 @@ def test_figures_from_what_is_known(root: Path, name: str) -> None:
     np.testing.assert_allclose(known.move_before, looked.move_before, rtol=0, atol=10 * PM)
     np.testing.assert_allclose(known.move_after, looked.move_after, rtol=0, atol=10 * PM)
     assert known.samples == looked.samples
+
+
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
+@pytest.mark.parametrize("name", ["benchmarks/five_axis", "examples/machines/dmu50", "examples/machines/wCBXFZYSt"])
+def test_programs_come_out_the_same(root: Path, name: str, strategy: str) -> None:
+    """With arcs, cycles, increments and refusals, on machines with tables and with play."""
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    machine, source = load(root / f"{name}.toml"), program(5, 60, 0.1)
+    plain = whole(source, machine, replace(OPTIONS, strategy=strategy))[0]
+    assert fast.engage()
+    assert whole(source, machine, replace(OPTIONS, strategy=strategy))[0] == plain != source
