@@ -30,7 +30,7 @@ def told(tmp_path_factory: pytest.TempPathFactory, root: Path):
     return tell
 
 
-STORIES = ("worn_table", "size_conflict")
+STORIES = ("worn_table", "laspas", "size_conflict")
 
 
 def test_all_stories_are_told(root: Path) -> None:
@@ -65,6 +65,16 @@ def test_the_worn_table_is_named_and_the_part_gets_better(told) -> None:
     (before, spring), (_, autumn) = (rms_um(script, name) for name in ("spring.nc", "autumn.nc"))
     assert spring < before
     assert autumn < 0.25 * spring  # 1.5 um of noise at 180 poses leave some tenths of the tilt's curve unknown
+
+
+def test_the_reversal_of_z_is_named_and_its_step_goes(told) -> None:
+    folder, script = told("laspas")
+    assert "backlash Z: backlash of Z: lost motion at reversal" in script[0][1]
+    effects = tomllib.loads((folder / "found.toml").read_text())["effect"]
+    [size] = [each["coefficients"][0] for each in effects if each.get("basis") == "backlash"]
+    assert size == pytest.approx(0.015553, abs=4 * 0.00022)  # four times the sigma that calibrate states
+    (_, model), (_, found) = (rms_um(script, name) for name in ("model.nc", "found.nc"))
+    assert found < 0.1 * model
 
 
 def test_steps_are_read() -> None:
