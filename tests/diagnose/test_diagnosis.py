@@ -143,7 +143,9 @@ def test_one_side_only_is_said(known: Machine) -> None:
     poses = plan(known, "tcp", 60)
     one = poses.with_columns({name: np.ones(60) for name in poses.columns if name.startswith("dir_")})
     seen = view([simulate(one, known, Faults(NOISE_UM), 1)], known)
-    assert [message.code for message in remarks(seen, ())] == ["NCF653"]
+    [message] = remarks(seen, ())
+    assert message.code == "NCF653"
+    assert "C, B, X, Z, Y came from one side only" in message.text
     assert not any("backlash" in each.name for each in catalogue(seen.reach))
 
 

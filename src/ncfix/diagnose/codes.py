@@ -23,9 +23,9 @@ CODES = {
         "Repeat ten poses a few times, one after another, or state the noise of the instrument.",
     ),
     "NCF653": Code(
-        "every axis came from one side",
-        "All directions of approach that the file states are the same: backlash and play cannot show, and what they do "
-        "would be taken for something else.",
+        "an axis came from one side only",
+        "All directions of approach that the files state for it are the same: its backlash and play cannot show, "
+        "and what they do would be taken for something else.",
         "Approach half of the poses from the other side.",
     ),
     "NCF654": Code(
