@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
         default=Path(os.devnull),
         help="keep the answers there, and do not ask again what is there (default: keep none)",
     )
+    p.add_argument("--known", action="store_true", help="ask nothing: the table of what the records hold")
     p.add_argument("--table", type=Path, help="Markdown file whose section is replaced")
     p.add_argument("--note", default="", help="what the section says besides about this run")
     p.add_argument("--write", type=Path, metavar="DIR", help="only write the scenarios there, ask nothing")
@@ -59,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
     records = known(options.records)
     todo = [task for task in wanted if (task.family, task.seed) not in records]
     asked = candidate.load(options.callable) if options.callable else program(options)
-    answer_all(todo, asked, options, records)
+    answer_all([] if options.known else todo, asked, options, records)
     chosen = [records[task.family, task.seed] for task in wanted if (task.family, task.seed) in records]
     run = f"{'Final' if options.final else 'Development'} seeds. {options.note}".strip()
     section = tally.markdown(chosen, run)
