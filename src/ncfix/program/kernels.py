@@ -123,8 +123,7 @@ def scan(
     Returns how many blocks were scanned, or `UNTOUCHED`; which shape each has, where its last comment begins, and its
     first number; spans and values of the numbers; the shapes one after the other, and where each begins.
     """
-    kinds, fixed, unsigned_after, blank = tables
-    number_mark, pointless_mark, comment_mark = marks
+    (kinds, fixed, unsigned_after, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
     n = len(blocks)
     group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
     spans, values = np.empty((len(text) // 2 + 1, 2), np.int64), np.empty(len(text) // 2 + 1)
@@ -154,11 +153,9 @@ def scan(
                     place, character = past - 1, np.uint8(number_mark if points else pointless_mark)
             elif kind == COMMENT:
                 close = comment_end(text, place, stop, kinds)
+                past = max(past, close)
                 if close > 0 and is_last(text, close, stop, blank):
-                    comment[block], place, past = place, close - 1, close
-                    character = np.uint8(comment_mark)
-                elif close > 0:
-                    past = close
+                    comment[block], place, character = place, close - 1, np.uint8(comment_mark)
                 kind = ODD if close == BROKEN else kind
             elif kind == SIGN:
                 code_at_sign, end_at_sign = code, end

@@ -21,6 +21,8 @@ Ints = NDArray[np.int64]
 Rows = NDArray[np.int32]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Changes = tuple[Ints, Ints, Ints]
+"""Start, stop and length of edits, as in `Splices`."""
 
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
@@ -158,6 +160,76 @@ def put_line(
 
 
 @njit(cache=True, nogil=True)
+def note(changes: Changes, edits: int, start: int, stop: int, length: int) -> int:
+    """Note an edit; how many there are."""
+    changes[0][edits], changes[1][edits], changes[2][edits] = start, stop, length
+    return edits + 1
+
+
+@njit(cache=True, nogil=True)
+def rewrite_words(
+    data: Bytes,
+    size: int,
+    changes: Changes,
+    edits: int,
+    text: Bytes,
+    number: int,
+    numbers: tuple[Floats, Ints],
+    slots: Ints,
+    by_place: Ints,
+    wanted: Floats,
+    now: Floats,
+    told: Mask,
+    several: bool,
+    digits: tuple[Ints, Floats],
+) -> tuple[int, int]:
+    """Write the words of a block anew whose values change, all of them if `several` pieces follow.
+
+    `number` is the first number of the block. Returns how many edits there are, and their bytes; -1 if not clear.
+    """
+    (values, spans), (decimals, half) = numbers, digits
+    for axis in by_place:
+        if axis < 0:
+            break
+        word = number + slots[axis]
+        now[axis], told[axis] = values[word], True
+        if abs(wanted[axis] - now[axis]) >= half[axis] or several:
+            begin, end = spans[word, 0], spans[word, 1]
+            at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis])
+            if at < 0:
+                return edits, -1
+            edits, size = note(changes, edits, begin, end, at - size), at
+    return edits, size
+
+
+@njit(cache=True, nogil=True)
+def add_words(
+    data: Bytes,
+    size: int,
+    changes: Changes,
+    edits: int,
+    place: int,
+    by_letter: Ints,
+    heads: Bytes,
+    wanted: Floats,
+    now: Floats,
+    told: Mask,
+    digits: tuple[Ints, Floats],
+) -> tuple[int, int]:
+    """Add words at `place` for axes that must move and have none; as `rewrite_words`."""
+    decimals, half = digits
+    for axis in by_letter:
+        if told[axis] or abs(wanted[axis] - now[axis]) < half[axis]:
+            continue
+        at, now[axis] = put_new(data, size, heads[axis], wanted[axis], decimals[axis])
+        if at < 0:
+            return edits, -1
+        told[axis] = True
+        edits, size = note(changes, edits, place, place, at - size), at
+    return edits, size
+
+
+@njit(cache=True, nogil=True)
 def to_numbers(commands: Floats, frame: tuple[Floats, Floats], out: Floats) -> None:
     """What a program writes for commands, (axes,)."""
     offset, scale = frame
@@ -200,15 +272,15 @@ def write(
     Returns the commands at the ends of the pieces written, what changes in the source, as in `Splices`, and how many
     lines were added.
     """
-    (edges, rows, first, shapes), (values, spans), (decimals, half) = blocks, numbers, digits
+    (edges, rows, first, shapes), (_, spans) = blocks, numbers
     slots, by_place, by_letter, anchors, heads = layouts
     axes = len(position)
     most = len(rows) * (axes + 1)
-    start, stop, length = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
+    changes = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
     data = np.empty(len(ends) * (axes * ROOM + len(end_of_line)), np.uint8)
     commands, here, now = np.empty((len(ends), axes)), position.copy(), np.empty(axes)
     wanted, told = np.empty(axes), np.empty(axes, np.bool_)
-    edits, size, done, lines, clear = 0, 0, 0, 0, True
+    edits, size, done, lines = 0, 0, 0, 0
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
         shape, number = shapes[block], first[block]
@@ -216,46 +288,49 @@ def write(
         to_numbers(ends[first_piece], frame, wanted)
         for axis in range(axes):
             told[axis] = False
-        for axis in by_place[shape]:
-            if axis < 0 or not clear:
-                break
-            word = number + slots[shape, axis]
-            now[axis], told[axis] = values[word], True
-            if abs(wanted[axis] - now[axis]) >= half[axis] or first_piece < last_piece:
-                begin, end = spans[word, 0], spans[word, 1]
-                at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis])
-                clear = at >= 0
-                start[edits], stop[edits], length[edits] = begin, end, at - size
-                edits, size = edits + 1, at
-        for axis in by_letter:
-            if told[axis] or abs(wanted[axis] - now[axis]) < half[axis] or not clear:
-                continue
-            at, now[axis] = put_new(data, size, heads[shape, axis], wanted[axis], decimals[axis])
-            told[axis], clear, slot = True, at >= 0, anchors[shape, 0]
-            edge = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
-            start[edits], length[edits] = edge + anchors[shape, 1], at - size
-            stop[edits] = start[edits]
-            edits, size = edits + 1, at
+        several = first_piece < last_piece
+        edits, size = rewrite_words(
+            data,
+            size,
+            changes,
+            edits,
+            text,
+            number,
+            numbers,
+            slots[shape],
+            by_place[shape],
+            wanted,
+            now,
+            told,
+            several,
+            digits,
+        )
+        if size >= 0:
+            slot = anchors[shape, 0]
+            place = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
+            place += anchors[shape, 1]
+            edits, size = add_words(
+                data, size, changes, edits, place, by_letter, heads[shape], wanted, now, told, digits
+            )
         to_commands(now, told, here, frame, commands[first_piece])
         lines_from = size
         for piece in range(first_piece + 1, last_piece + 1):
-            if not clear:
+            if size < 0:
                 break
             to_numbers(ends[piece], frame, wanted)
             size = put_line(data, size, end_of_line, by_letter, heads[shape], wanted, now, told, digits)
-            clear = size >= 0
             to_commands(now, told, here, frame, commands[piece])
-        if not clear:
+        if size < 0:
             edits, size = before, was
             break
-        if first_piece < last_piece:
-            start[edits], stop[edits], length[edits] = edges[block, 1], edges[block, 1], size - lines_from
-            edits, lines = edits + 1, lines + last_piece - first_piece
+        if several:
+            edits = note(changes, edits, edges[block, 1], edges[block, 1], size - lines_from)
+            lines += last_piece - first_piece
         done = last_piece + 1
         for axis in range(axes):
             here[axis] = commands[last_piece, axis]
-    changes = start[:edits], stop[:edits], length[:edits], data[:size]
-    return commands[:done], *changes, lines
+    start, stop, length = changes
+    return commands[:done], start[:edits], stop[:edits], length[:edits], data[:size], lines
 
 
 @njit(cache=True, nogil=True)
