@@ -51,7 +51,9 @@ FANUC = Dialect(
         "polar coordinates (G15 G16) with --flatten",
         "G41 G42: the programmed contour is corrected, the control offsets it",
     ),
-    passes=("G53, G27, G28, G30, G31, the turn of G53.1, dwell (G4), G5.1, G8, G61 ... G64, tool change and other M codes",),
+    passes=(
+        "G53, G27, G28, G30, G31, the turn of G53.1, dwell (G4), G5.1, G8, G61 ... G64, tool change, other M codes",
+    ),
     refuses=(
         "G43.5, G68.3, G68.4, G68.2 P2 ... P4, G51, G12.1 while in force, threads, lines by their angle (,A)",
         "a block that names one axis of the plane only, the first after G68 or G69",

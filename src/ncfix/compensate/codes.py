@@ -128,7 +128,8 @@ CODES = {
     "NCF433": Code(
         "a block that cannot be written once for all",
         "The block is executed several times from different places and needs another correction each time, or it has "
-        "to stay as it is because a refused arc, whose line is named, begins where it ends: only so does the arc close.",
+        "to stay as it is because a refused arc, whose line is named, begins where it ends: only so does the arc "
+        "close.",
         "Write the loop out, or accept it with `--allow-refused`.",
     ),
     "NCF437": Code(
@@ -142,6 +143,14 @@ CODES = {
         "machine are put into them: as if they had been corrected for it. Correcting them again would put the errors "
         "back in.",
         "Fix the original program. `--force` corrects this one all the same.",
+    ),
+    "NCF439": Code(
+        "a word for an axis that the program has not named",
+        "The correction needs an axis that no block has named so far, so its word says where it already stands, but "
+        "for some um. Where that is was assumed (`--assume-zero`). If the axis stands elsewhere on the machine, the "
+        "word makes it go there.",
+        "Let the program name X, Y and Z in one of its first blocks, or say where the axes stand: `--initial`, "
+        "`--offset`, `--tool`.",
     ),
     "NCF445": Code(
         "program written out flat",

@@ -21,6 +21,7 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
 from ncfix.compensate.settle import Settled, settle
 from ncfix.compensate.strategies import get_strategy
+from ncfix.compensate.unnamed import words_on_trust
 from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
@@ -84,7 +85,8 @@ def fix_program(
     if errors is not None:
         _check_sane(program, proof.settled, errors)
     report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
-    report = replace(report, warnings=(*suspicion, *report.warnings))
+    trusted = words_on_trust(program, proof.settled, followed.assumed)
+    report = replace(report, warnings=(*suspicion, *trusted, *report.warnings))
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
 

@@ -30,6 +30,7 @@ from ncfix.compensate.proof import SelfCheckError, differences
 from ncfix.compensate.settle import Agreed, Before, Settled, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
+from ncfix.compensate.unnamed import words_on_trust
 from ncfix.compensate.verify import PathError
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
@@ -269,6 +270,8 @@ class Stream:
             raise NotInPartsError("a refusal reaches back into an earlier part")
         if self.before is None:
             self.suspicion = suspected(settled, machine.least_increment[0], self.path, self.options.force)
+            assumed = (*follower.assumed, *self.tools)
+            self.suspicion += words_on_trust(program, settled, assumed)
         text = self._text(program, settled, follower)
         self._prove(text, settled, own, unit.last, *proof)
         self.tally.add(program, settled, own)
