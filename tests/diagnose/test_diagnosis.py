@@ -17,6 +17,7 @@ from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Backlash
 from ncfix.measure.measurement import Measurement
+from ncfix.measure.reader import reads
 from ncfix.measure.synthetic import Faults, simulate
 from ncfix.report import html, markdown
 from ncfix.report.diagnosis import document
@@ -64,6 +65,50 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert found["effects"][0]["plausible"]["is"]
     assert found["effects"][0]["targets"] == ["fix", "export linuxcnc", "export fanuc-pitch", "export siemens"]
     assert result.with_provenance(backlash).provenance["added"] == "backlash X"
+
+
+def test_constants_that_the_data_do_not_ask_to_change_stay(known: Machine, backlash: Diagnosis) -> None:
+    assert backlash.machine is not None
+    kept = backlash.machine.effects[: len(known.effects)]
+    assert [each.coefficients for each in kept] == [each.coefficients for each in known.effects]
+    assert backlash.moved == ()
+
+
+def test_constants_that_the_data_put_elsewhere_are_said_and_changed(known: Machine) -> None:
+    index = next(k for k, effect in enumerate(known.effects) if effect.name == "EC0Y")
+    true = known.effects[index].coefficients[0]
+    off = replace(known.effects[index], coefficients=(true + 60e-6,))
+    file = known.replace(effects=(*known.effects[:index], off, *known.effects[index + 1 :]))
+    worn = known.replace(effects=(*known.effects, Effect("EXX", (0.016,), Backlash())))
+    found = diagnose([measured(worn)], file)
+    (moved,) = found.moved
+    assert moved.name.startswith("EC0Y")
+    assert abs(moved.data - true) < 4 * moved.sigma
+    assert "EC0Y" in words.text(found)
+    assert result.as_dict(found)["constants"][0]["file"] == pytest.approx(true + 60e-6)
+    assert found.machine is not None
+    assert abs(found.machine.effects[index].coefficients[0] - true) < 20e-6
+
+
+def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None:
+    """Kind `axis` has `direction`, not `dir_X`; play is seen all the same."""
+    text = "# ncfix-measurement: 1\n# kind: axis\n# noise_um: 0.5\naxis,component,position,value,run,direction\n"
+    rng = np.random.default_rng(4)
+    rows = [
+        (axis, x, way, run, (0.012 * way / 2 if axis == "X" else 0.0) + rng.normal(0, 0.0005))
+        for axis in "XYZ"
+        for run in range(1, 4)
+        for way in (1, -1)
+        for x in range(0, 301, 30)
+    ]
+    text += "".join(
+        f"{axis},E{axis}{axis},{-x if axis == 'Z' else x},{value:.5f},{run},{way}\n"
+        for axis, x, way, run, value in rows
+    )
+    bare = perfect(machine("three_axis")).replace(effects=())
+    found = diagnose([reads(text.encode(), bare)], bare)
+    assert found.verdict in (FOUND, AMBIGUOUS)
+    assert "backlash X" in {name for each in found.findings for name in (each.candidate.name, *each.aliases)}
 
 
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:

@@ -20,19 +20,23 @@ from ncfix.measure.measurement import Array
 WIDE = 1e3
 """um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
 NOTHING = 1e-12
+FIRM = 3.0
+"""Standard deviations by which the data must ask for another constant; else the machine file keeps its own."""
 
 
 @dataclass(frozen=True)
 class Joint:
     """Everything fitted at once.
 
-    constants   (k,) changes of the free constants of the machine file
+    constants   (k,) changes of the free constants of the machine file, from where the view has them
+    sigmas      (k,) their standard deviations
     numbers     for each member (p,) the numbers behind its coefficients; `covariances` of them
     shown       for each member (m,) what it shows, um
     before      (m,) residual with the constants alone; after with the members
     """
 
     constants: Array
+    sigmas: Array
     numbers: tuple[Array, ...]
     covariances: tuple[Array, ...]
     shown: tuple[Array, ...]
@@ -64,8 +68,76 @@ def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:
     shown = tuple(part @ own_numbers for part, own_numbers in zip(parts_of, numbers, strict=True))
     k = view.problem.design.shape[1]
     constants = (z[: base.shape[1]] / _lengths(free))[base.shape[1] - k :]
+    sigmas = (np.sqrt(np.diag(spread)[: base.shape[1]]) / _lengths(free))[base.shape[1] - k :]
     covariances = tuple(spread[part, part] for part in parts)
-    return Joint(constants, numbers, covariances, shown, view.y - base @ alone, view.y - columns @ z)
+    return Joint(constants, sigmas, numbers, covariances, shown, view.y - base @ alone, view.y - columns @ z)
+
+
+def moved(court: Court, joint: Joint) -> Array:
+    """(k,) how far the data move the free constants from what the machine file says, in mm and rad."""
+    view = court.background.view
+    change: Array = view.coefficients + joint.constants - view.problem.selection.start
+    return change
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation."""
+
+    name: str
+    file: float
+    data: float
+    sigma: float
+
+
+def surely_moved(court: Court, joint: Joint) -> tuple[Moved, ...]:
+    """The constants that the data move by more than three standard deviations."""
+    selection = court.background.view.problem.selection
+    change = moved(court, joint)
+    rows = np.flatnonzero(np.abs(change) > FIRM * joint.sigmas)
+    return tuple(
+        Moved(selection.labels[k], float(selection.start[k]), float(selection.start[k] + change[k]), float(sigma))
+        for k, sigma in zip(rows.tolist(), joint.sigmas[rows], strict=True)
+    )
+
+
+def firm(court: Court, members: Sequence[Member], share: float, joint: Joint) -> Joint:
+    """The fit in which constants stay that the data do not ask to change; the one given if it needs them changed.
+
+    A constant that the data hardly see takes any value that helps a little, and would do harm at other poses.
+    """
+    view, k = court.background.view, len(joint.constants)
+    back = view.problem.selection.start - view.coefficients
+    stay = np.abs(moved(court, joint)) <= FIRM * joint.sigmas
+    if not stay.any():
+        return joint
+    held = view.base[:, view.base.shape[1] - k :][:, stay] @ back[stay]
+    kept = np.concatenate([np.ones(view.base.shape[1] - k, dtype=bool), ~stay])
+    factor = cho_factor(court.background.covariance(share))
+    columns = np.concatenate([view.base[:, kept], *(court.groups[m.group].columns for m in members)], axis=1)
+    lengths = np.concatenate([_lengths(view.base[:, kept]), np.ones(columns.shape[1] - kept.sum())])
+    own = [np.full(court.groups[m.group].columns.shape[1], m.size**-2) for m in members]
+    prior = np.concatenate([np.full(kept.sum(), WIDE**-2), *own])
+    z, spread = _solved(columns / lengths, view.y - held, factor, prior)
+    after = view.y - held - (columns / lengths) @ z
+    count = int(stay.sum())
+    if _misfit(after, factor) - _misfit(joint.after, factor) > count + FIRM * np.sqrt(2 * count):
+        return joint
+    constants = back.copy()
+    constants[~stay] = (z / lengths)[: kept.sum()][kept.sum() - (~stay).sum() :]
+    ends = kept.sum() + np.cumsum([0, *(len(each) for each in own)])
+    parts = [slice(a, b) for a, b in pairwise(ends)]
+    return replace(
+        joint,
+        constants=constants,
+        numbers=tuple(z[part] for part in parts),
+        covariances=tuple(spread[part, part] for part in parts),
+        after=after,
+    )
+
+
+def _misfit(residual: Array, factor: tuple[Array, bool]) -> float:
+    return float(residual @ cho_solve(factor, residual))
 
 
 def _lengths(columns: Array) -> Array:
@@ -88,7 +160,9 @@ def likeliest_share(null: Array) -> float:
 def machine_with(court: Court, members: Sequence[Member], joint: Joint) -> tuple[Machine, list[tuple[Effect, ...]]]:
     """The machine with constants changed and effects added; and the effects that each member brought."""
     view = court.background.view
+    start = view.problem.selection.start
     coefficients = view.coefficients + joint.constants
+    coefficients = np.where(np.isclose(coefficients, start, rtol=1e-9, atol=0.0), start, coefficients)
     machine = view.problem.selection.machine(view.machine, coefficients.tolist())
     added = [
         effects(court.groups[m.group], numbers, spread)

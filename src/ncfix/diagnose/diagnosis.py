@@ -94,6 +94,7 @@ class Diagnosis:
     unknown_um   rms of what has no name, and `unknown_kind` what it depends on
     machine      with the findings added, or None if there is nothing to add
     p_lack       probability of the residuals before by chance; p_left after
+    moved        constants of the machine file that the data put elsewhere; the gap before is after that
     """
 
     verdict: str
@@ -118,6 +119,7 @@ class Diagnosis:
     mistake: mistakes.Mistake | None = None
     proposal: next_poses.Proposal | None = None
     court: Court | None = None
+    moved: tuple[addition.Moved, ...] = ()
 
 
 def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Sequence[str] = ()) -> Diagnosis:
@@ -207,7 +209,7 @@ def _concluded(
     sigma = _sigma(court, selected)
     checks.agreeing(seen, joint.before, sigma)
     floor = noise.floor(seen, ground, sigma, keep)
-    machine, added = addition.machine_with(court, told, joint)
+    machine, added = addition.machine_with(court, told, addition.firm(court, told, share, joint))
     findings = tuple(
         Finding(
             court.groups[member.group].owner, selected.odds[name], selected.null.p_value(selected.odds[name]),
@@ -247,6 +249,7 @@ def _concluded(
         view=seen, gathered=gathered, considered=candidates, unheard_of=unheard_of, selected=selected,
         before=joint.before, after=joint.after, court=court,
         proposal=_proposal(court, selected, sigma) if told else None,
+        moved=addition.surely_moved(court, joint),
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
         "invisible": [{"name": c.name, "visible_share": share} for c, share in found.gathered.invisible],
         "considered": len(found.considered),
         "outliers": _outliers(found),
+        "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in found.moved],
     }
 
 

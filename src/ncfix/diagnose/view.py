@@ -97,8 +97,17 @@ class View:
         return np.concatenate([each.q for each in self.problem.observations])
 
     def column(self, name: str) -> Array:
-        """A state column of all rows, zero where a file lacks it."""
+        """A state column of all rows, zero where a file lacks it; directions as each kind of measurement says them."""
+        axis = name.removeprefix("dir_")
+        if axis != name and axis in self.machine.axis_names:
+            return self.directions[:, self.machine.axis_names.index(axis)]
         return np.concatenate([each.column(name) for each in self.measurements])
+
+    @cached_property
+    def directions(self) -> Array:
+        """(n, n_axes) in which the axes came to all rows, zero where that is not known."""
+        own = [np.broadcast_to(each.state.direction, each.q.shape) for each in self.problem.observations]
+        return np.concatenate(own).astype(np.float64)
 
     @cached_property
     def component(self) -> Index:
@@ -146,7 +155,8 @@ class View:
             zip(self.machine.axis_names, zip(places.min(0).tolist(), places.max(0).tolist(), strict=True), strict=True)
         )
         shared = set.intersection(*(set(each.columns) for each in self.measurements))
-        moving = {name for name in shared if np.ptp(self.column(name)) > 0}
+        stated = shared | {f"dir_{name}" for name in self.machine.axis_names}
+        moving = {name for name in stated if np.ptp(self.column(name)) > 0}
         time = self.column("time_s")
         return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())))
 

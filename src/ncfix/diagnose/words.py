@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ncfix.diagnose.addition import Moved
 from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, Finding
 
@@ -30,10 +31,22 @@ def text(found: Diagnosis) -> str:
         lines += ["", rest(found)]
     if found.patterns:
         lines += ["", "where:", *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns)]
+    if found.moved:
+        lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
+        lines += [f"  {constant(each)}" for each in found.moved]
     lines += _next(found)
     if found.outlying.any():
         lines += ["", f"{int(found.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
+
+
+def constant(moved: Moved) -> str:
+    """A constant of the file, and what the data say."""
+    slope = "u^1" in moved.name
+    factor, unit = (1e6, "urad") if moved.name[1] in "ABC" else (1e3, "um")
+    file, data, sigma = (factor * value for value in (moved.file, moved.data, moved.sigma))
+    per = " per u" if slope else ""
+    return f"{moved.name}: {file:.4g} in the file, {data:.4g} +- {sigma:.2g} {unit}{per} by the data"
 
 
 def constants(finding: Finding) -> str:
