@@ -84,6 +84,13 @@ def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, A
     return things
 
 
+def nearest(name: str, known: Iterable[str]) -> str:
+    """A hint for a name that nobody registered: the one that was meant, perhaps, or all there are."""
+    names = sorted(known)
+    close = get_close_matches(name, names, 1)
+    return f"did you mean {close[0]}?" if close else f"there are {', '.join(names)}"
+
+
 @lru_cache(maxsize=1)
 def load_plugins() -> Plugins:
     """Every plugin of the entry-point group, loaded once per process; `load_plugins.cache_clear()` forgets them."""

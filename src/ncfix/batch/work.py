@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
-from difflib import get_close_matches
 from typing import TypeVar
 
 from ncfix.diagnostics import UsageError
-from ncfix.plugins import registry
+from ncfix.plugins import nearest, registry
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -26,9 +25,7 @@ def staff(name: str) -> Staff:
     """The executors of that name; raises `UsageError` NCF015."""
     known: dict[str, Staff] = registry("executors", BUILT_IN)
     if name not in known:
-        close = get_close_matches(name, known, 1)
-        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(sorted(known))}"
-        raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=hint)
+        raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=nearest(name, known))
     return known[name]
 
 

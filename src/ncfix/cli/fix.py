@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ncfix.batch.work import staff
 from ncfix.cli import console
-from ncfix.cli.batch import Batch
 from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import STREAM, Outputs, targets
@@ -75,6 +73,9 @@ def fix(
     Programs are never changed where they are unless --in-place says so. Exit code 4: motions were refused and nothing
     was written.
     """
+    from ncfix.batch.work import staff
+    from ncfix.cli.batch import Batch
+
     outputs = Outputs(output, in_place, force, resume)
     found = targets(programs, outputs, (machine_path, *given.files), folders=True)
     if as_json and any(target.path == STREAM for target in found):

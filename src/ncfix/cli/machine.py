@@ -65,15 +65,15 @@ def _as_dict(machine: Machine) -> dict[str, Any]:
 
 
 def _effect_as_dict(machine: Machine, effect: Effect) -> dict[str, Any]:
-    from ncfix.machine.summary import extent
+    from ncfix.machine.summary import extent, title_of
 
     found = extent(machine, effect)
     return {
         "name": effect.name,
-        "title": _title(machine, effect),
+        "title": title_of(machine, effect),
         "axis": effect.joint,
         "basis": effect.basis.name,
-        "depends_on": _depends_on(effect),
+        "depends_on": [signal for signal in (effect.signal, effect.times) if signal is not None],
         "coefficients": effect.coefficients,
         "unit": "urad" if effect.rotational else "um",
         "range": [value * 1e3 * (1e3 if effect.rotational else 1.0) for value in found] if found else None,
@@ -85,31 +85,27 @@ def _page(machine: Machine) -> list[str]:
 
 
 def _facts(machine: Machine) -> list[str]:
-    degree = 180 / 3.141592653589793
-    pairs = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
-    facts = {name: f"{linear:g} mm, {rotary * degree:g} deg" for name, (linear, rotary) in pairs.items()}
-    facts = {"topology": machine.topology, "control": machine.control or "", **facts}
-    facts |= {name: str(value) for name, value in machine.provenance.items()}
-    return [f"{name + ':':<20}{value}" for name, value in facts.items() if value]
+    from ncfix.machine.summary import facts
+
+    return [f"{name + ':':<20}{value}" for name, value in facts(machine).items()]
 
 
 def _chain(machine: Machine) -> list[str]:
     """The joints as they follow one another."""
+    from ncfix.machine.summary import vector
+
     workpiece = [_axis(axis) for axis in machine.axes if axis.workpiece_side]
     tool = [_axis(axis) for axis in machine.axes if not axis.workpiece_side]
-    end = f"tool        tip to spindle {_vector(machine.tool.direction)}, gauge line at {_vector(machine.tool.point)}"
+    end = f"tool        tip to spindle {vector(machine.tool.direction)}, gauge line at {vector(machine.tool.point)}"
     return ["workpiece", *workpiece, "foundation", *tool, end]
 
 
 def _axis(axis: Axis) -> str:
-    if axis.rotary:
-        where = f"about {_vector(axis.direction)} through {_vector(axis.point)}"
-    else:
-        where = f"along {_vector(axis.direction)}"
-    low, high = (limit / axis.unit for limit in axis.range)
-    unit = "deg" if axis.rotary else "mm"
-    travel = f"{low:g} ... {high:g} {unit}" if high - low < float("inf") else "no limits"
-    return f"  {axis.name}  {'rotary' if axis.rotary else 'linear'}  {travel:<20}  {where}"
+    from ncfix.machine.summary import travel_of, vector
+
+    along = f"along {vector(axis.direction)}"
+    where = f"about {vector(axis.direction)} through {vector(axis.point)}" if axis.rotary else along
+    return f"  {axis.name}  {'rotary' if axis.rotary else 'linear'}  {travel_of(axis):<20}  {where}"
 
 
 def _errors(machine: Machine) -> list[str]:
@@ -125,26 +121,12 @@ def _errors(machine: Machine) -> list[str]:
 
 
 def _effect(machine: Machine, effect: Effect) -> str:
+    from ncfix.machine.summary import depends_on
+
     facts = _effect_as_dict(machine, effect)
     if facts["range"] is None:
         size = "size not known from the file"
     else:
         low, high = facts["range"]
         size = f"{low:+.3g} {facts['unit']}" if low == high else f"{low:+.3g} ... {high:+.3g} {facts['unit']}"
-    depends = f"{effect.basis.name} of {', '.join(facts['depends_on'])}" if facts["depends_on"] else "constant"
-    return f"  {effect.name:<5} {facts['title']:<44} {depends:<28} {size}"
-
-
-def _depends_on(effect: Effect) -> list[str]:
-    return [signal for signal in (effect.signal, effect.times) if signal is not None]
-
-
-def _title(machine: Machine, effect: Effect) -> str:
-    from ncfix.machine import catalogue
-
-    axes = {axis.name: axis for axis in machine.axes}
-    return catalogue.title(effect.name, axes.get(effect.joint))
-
-
-def _vector(vector: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in vector)})"
+    return f"  {effect.name:<5} {facts['title']:<44} {depends_on(effect):<28} {size}"

@@ -57,9 +57,7 @@ def looks_corrected(settled: Settled, step: float) -> bool:
 
 def _numbers(settled: Settled, step: float) -> list[tuple[Array, Array]]:
     """For each linear axis the different commands that change it, and their corrections, mm."""
-    moves, pieces = settled.moves, settled.plan.pieces
-    last = np.searchsorted(pieces.move, np.arange(len(moves)), side="right") - 1
-    change = settled.emission.end[last] - moves.end
+    moves, change = settled.moves, settled.shift
     new = np.abs(moves.end - moves.start) > step / 2
     said = new & ~settled.kept[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
     rows = (np.flatnonzero(each) for each in said.T)

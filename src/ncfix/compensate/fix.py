@@ -193,8 +193,5 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
 
 def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
     """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    pieces = settled.plan.pieces
-    last = np.searchsorted(pieces.move, np.arange(len(moves)), side="right") - 1
-    shift = settled.emission.end[last] - moves.end
-    shift = shift[~settled.kept if own is None else own & ~settled.kept][:, ~moves.rotary]
+    shift = settled.shift[~settled.kept if own is None else own & ~settled.kept][:, ~moves.rotary]
     return float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)) if len(shift) else 0.0

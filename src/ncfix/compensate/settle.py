@@ -67,6 +67,13 @@ class Settled:
     kept: Mask
     reasons: dict[int, Reason]
 
+    @property
+    def shift(self) -> Array:
+        """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""
+        last = np.searchsorted(self.plan.pieces.move, np.arange(len(self.moves)), side="right") - 1
+        change: Array = self.emission.end[last] - self.moves.end
+        return change
+
 
 @dataclass(frozen=True, slots=True)
 class Agreed:

@@ -33,8 +33,6 @@ def words_on_trust(program: Program, settled: Settled, assumed: tuple[str, ...])
 
 def _rows(settled: Settled) -> list[Index]:
     """For each axis the motions that move it although no block has named it so far."""
-    moves, pieces = settled.moves, settled.plan.pieces
-    last = np.searchsorted(pieces.move, np.arange(len(moves)), side="right") - 1
-    changed = np.abs(settled.emission.end[last] - moves.end) > WRITTEN
+    moves, changed = settled.moves, np.abs(settled.shift) > WRITTEN
     named = np.logical_or.accumulate(moves.programmed & ~moves.incremental[:, None], axis=0)
     return [np.flatnonzero(each) for each in (changed & ~named & ~settled.kept[:, None]).T]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ncfix.diagnose.background import SHARES
@@ -16,6 +17,8 @@ from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis
 from ncfix.machine.smooth import Fourier, Polynomial
 from ncfix.measure.measurement import Array
+
+Mask = NDArray[np.bool_]
 
 WIDE = 1e3
 """um: how far a constant of the machine file may be off; wide enough to be no prior, and what cannot be seen stays."""
@@ -50,27 +53,33 @@ class Joint:
         return whole
 
 
-def fitted(court: Court, members: Sequence[Member], share: float) -> Joint:
-    """The most probable coefficients of constants and members together, and the residuals."""
+def fitted(court: Court, members: Sequence[Member], share: float, stay: Mask | None = None) -> Joint:
+    """The most probable coefficients of constants and members together, and the residuals.
+
+    stay  (k,) free constants that are left as the machine file has them; None: none
+    """
     view, free = court.background.view, court.background.view.base
-    covariance = court.background.covariance(share)
-    base, parts_of = free / _lengths(free), [court.groups[m.group].columns for m in members]
-    columns = np.concatenate([base, *parts_of], axis=1)
+    back = view.problem.selection.start - view.coefficients
+    loose = np.ones(len(back), dtype=bool) if stay is None else ~stay
+    kept = np.concatenate([np.ones(free.shape[1] - len(back), dtype=bool), loose])
+    y = view.y - free[:, ~kept] @ back[~loose]
+    lengths = _lengths(free[:, kept])
+    base, parts_of = free[:, kept] / lengths, [court.groups[m.group].columns for m in members]
+    columns, n = np.concatenate([base, *parts_of], axis=1), base.shape[1]
     widths = [part.shape[1] for part in parts_of]
     own = [np.full(width, m.size**-2) for m, width in zip(members, widths, strict=True)]
-    prior = np.concatenate([np.full(base.shape[1], WIDE**-2), *own])
-    factor = cho_factor(covariance)
-    z, spread = _solved(columns, view.y, factor, prior)
-    alone, _ = _solved(base, view.y, factor, prior[: base.shape[1]])
-    ends = base.shape[1] + np.cumsum([0, *widths])
-    parts = [slice(a, b) for a, b in pairwise(ends)]
+    prior = np.concatenate([np.full(n, WIDE**-2), *own])
+    factor = cho_factor(court.background.covariance(share))
+    z, spread = _solved(columns, y, factor, prior)
+    alone, _ = _solved(base, y, factor, prior[:n])
+    parts = [slice(a, b) for a, b in pairwise(n + np.cumsum([0, *widths]))]
     numbers = tuple(z[part] for part in parts)
     shown = tuple(part @ own_numbers for part, own_numbers in zip(parts_of, numbers, strict=True))
-    k = view.problem.design.shape[1]
-    constants = (z[: base.shape[1]] / _lengths(free))[base.shape[1] - k :]
-    sigmas = (np.sqrt(np.diag(spread)[: base.shape[1]]) / _lengths(free))[base.shape[1] - k :]
+    constants, sigmas = back.copy(), np.zeros(len(back))
+    constants[loose] = (z[:n] / lengths)[n - loose.sum() :]
+    sigmas[loose] = (np.sqrt(np.diag(spread)[:n]) / lengths)[n - loose.sum() :]
     covariances = tuple(spread[part, part] for part in parts)
-    return Joint(constants, sigmas, numbers, covariances, shown, view.y - base @ alone, view.y - columns @ z)
+    return Joint(constants, sigmas, numbers, covariances, shown, y - base @ alone, y - columns @ z)
 
 
 def moved(court: Court, joint: Joint) -> Array:
@@ -106,34 +115,10 @@ def firm(court: Court, members: Sequence[Member], share: float, joint: Joint) ->
 
     A constant that the data hardly see takes any value that helps a little, and would do harm at other poses.
     """
-    view, k = court.background.view, len(joint.constants)
-    back = view.problem.selection.start - view.coefficients
     stay = np.abs(moved(court, joint)) <= FIRM * joint.sigmas
-    if not stay.any():
-        return joint
-    held = view.base[:, view.base.shape[1] - k :][:, stay] @ back[stay]
-    kept = np.concatenate([np.ones(view.base.shape[1] - k, dtype=bool), ~stay])
-    factor = cho_factor(court.background.covariance(share))
-    columns = np.concatenate([view.base[:, kept], *(court.groups[m.group].columns for m in members)], axis=1)
-    lengths = np.concatenate([_lengths(view.base[:, kept]), np.ones(columns.shape[1] - kept.sum())])
-    own = [np.full(court.groups[m.group].columns.shape[1], m.size**-2) for m in members]
-    prior = np.concatenate([np.full(kept.sum(), WIDE**-2), *own])
-    z, spread = _solved(columns / lengths, view.y - held, factor, prior)
-    after = view.y - held - (columns / lengths) @ z
-    count = int(stay.sum())
-    if _misfit(after, factor) - _misfit(joint.after, factor) > count + FIRM * np.sqrt(2 * count):
-        return joint
-    constants = back.copy()
-    constants[~stay] = (z / lengths)[: kept.sum()][kept.sum() - (~stay).sum() :]
-    ends = kept.sum() + np.cumsum([0, *(len(each) for each in own)])
-    parts = [slice(a, b) for a, b in pairwise(ends)]
-    return replace(
-        joint,
-        constants=constants,
-        numbers=tuple(z[part] for part in parts),
-        covariances=tuple(spread[part, part] for part in parts),
-        after=after,
-    )
+    held, factor = fitted(court, members, share, stay), cho_factor(court.background.covariance(share))
+    worse, count = _misfit(held.after, factor) - _misfit(joint.after, factor), int(stay.sum())
+    return joint if worse > count + FIRM * np.sqrt(2 * count) else held
 
 
 def _misfit(residual: Array, factor: tuple[Array, bool]) -> float:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ncfix.machine import catalogue
+from ncfix.machine.axis import Axis
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of
 from ncfix.machine.linear import functions
@@ -52,3 +56,34 @@ def travel(machine: Machine, axis: int) -> Array:
     kinks = machine.breakpoints(machine.axis_names[axis])
     inside = kinks[(kinks >= low) & (kinks <= high)]
     return np.concatenate([np.linspace(low, high, SAMPLES), inside]) if np.isfinite(high - low) else np.array([np.nan])
+
+
+def vector(values: Sequence[float]) -> str:
+    """Three numbers for people."""
+    return f"({', '.join(f'{value:.6g}' for value in values)})"
+
+
+def facts(machine: Machine) -> dict[str, str]:
+    """What a machine file says besides chain and errors."""
+    sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
+    said = {"topology": machine.topology, "control": machine.control or ""}
+    said |= {name: f"{linear:g} mm, {np.degrees(rotary):g} deg" for name, (linear, rotary) in sizes.items()}
+    said |= {str(name): str(value) for name, value in machine.provenance.items()}
+    return {name: value for name, value in said.items() if value}
+
+
+def travel_of(axis: Axis) -> str:
+    """The range of an axis for people."""
+    low, high = (limit / axis.unit for limit in axis.range)
+    return f"{low:g} ... {high:g} {'deg' if axis.rotary else 'mm'}" if np.isfinite(high - low) else "no limits"
+
+
+def title_of(machine: Machine, effect: Effect) -> str:
+    """What an effect is."""
+    return catalogue.title(effect.name, {axis.name: axis for axis in machine.axes}.get(effect.joint))
+
+
+def depends_on(effect: Effect) -> str:
+    """What an effect is a function of, for people."""
+    signals = [signal for signal in (effect.signal, effect.times) if signal is not None]
+    return f"{effect.basis.name} of {', '.join(signals)}" if signals else "constant"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from difflib import get_close_matches
 from pathlib import PurePath
 
 from ncfix.diagnostics import UsageError
-from ncfix.plugins import registry
+from ncfix.plugins import nearest, registry
 from ncfix.program.dialect import Dialect
 
 DEFAULT = "iso"
@@ -26,9 +25,7 @@ def get(name: str) -> Dialect:
     """The dialect of that name; raises UsageError NCF104."""
     known: dict[str, Dialect] = registry("dialects")
     if name not in known:
-        close = get_close_matches(name, known, 1)
-        hint = f"did you mean {close[0]}?" if close else f"there are {', '.join(sorted(known))}"
-        raise UsageError.of("NCF104", f"no dialect {name!r}", hint=hint)
+        raise UsageError.of("NCF104", f"no dialect {name!r}", hint=nearest(name, known))
     return known[name]
 
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine
-from ncfix.machine.catalogue import title
-from ncfix.machine.summary import extent
+from ncfix.machine.summary import depends_on, extent, facts, title_of, travel_of, vector
 from ncfix.machine.survey import Curve, Drift, curves, drifts
 from ncfix.report.document import Line, Part, Plot, Section, Table, Text
 
@@ -24,12 +23,7 @@ def sections(machine: Machine, path: str) -> list[Section]:
 
 
 def _facts(machine: Machine, path: str) -> Table:
-    degree = 180 / np.pi
-    sizes = {"least increment": machine.least_increment, "largest correction": machine.max_correction}
-    rows = [("file", path), ("hash", machine.hash), ("topology", machine.topology), ("control", machine.control or "")]
-    rows += [(name, f"{linear:g} mm, {rotary * degree:g} deg") for name, (linear, rotary) in sizes.items()]
-    rows += [(str(name), str(value)) for name, value in machine.provenance.items()]
-    return Table((), [row for row in rows if row[1]])
+    return Table((), [("file", path), ("hash", machine.hash), *facts(machine).items()])
 
 
 def _chain(machine: Machine) -> Table:
@@ -38,16 +32,9 @@ def _chain(machine: Machine) -> Table:
 
 
 def _axis(axis: Axis) -> Sequence[str]:
-    low, high = (limit / axis.unit for limit in axis.range)
-    unit = "deg" if axis.rotary else "mm"
-    travel = f"{low:g} ... {high:g} {unit}" if np.isfinite(high - low) else "no limits"
     carries = "workpiece" if axis.workpiece_side else "tool"
-    through = _vector(axis.point) if axis.rotary else ""
-    return axis.name, "rotary" if axis.rotary else "linear", carries, _vector(axis.direction), through, travel
-
-
-def _vector(vector: Sequence[float]) -> str:
-    return f"({', '.join(f'{value:.6g}' for value in vector)})"
+    through = vector(axis.point) if axis.rotary else ""
+    return axis.name, "rotary" if axis.rotary else "linear", carries, vector(axis.direction), through, travel_of(axis)
 
 
 def _tip(machine: Machine) -> Section:
@@ -68,10 +55,7 @@ def _effects(machine: Machine) -> Table:
 
 
 def _effect(machine: Machine, effect: Effect) -> Sequence[str]:
-    axes = {axis.name: axis for axis in machine.axes}
-    signals = [signal for signal in (effect.signal, effect.times) if signal is not None]
-    depends = f"{effect.basis.name} of {', '.join(signals)}" if signals else "constant"
-    return effect.name, title(effect.name, axes.get(effect.joint)), depends, _size(machine, effect)
+    return effect.name, title_of(machine, effect), depends_on(effect), _size(machine, effect)
 
 
 def _size(machine: Machine, effect: Effect) -> str:
