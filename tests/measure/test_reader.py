@@ -49,8 +49,19 @@ def test_what_is_written_reads_back(kind):
 def test_a_plan_has_empty_columns():
     poses = plan(THREE, "tcp", 10)
     text = dumps(poses, ("dx", "dy", "dz"))
-    assert reads(text.encode(), THREE, plan=True).measured == ()
+    found = reads(text.encode(), THREE, plan=True)
+    assert found.measured == ("dx", "dy", "dz")
+    assert all(np.isnan(found.columns[name]).all() for name in found.measured)
     assert {code for code, *_ in faults(text)} == {"NCF607"}
+
+
+def test_a_plan_says_which_columns_it_wants():
+    wanted = reads(dumps(plan(THREE, "tcp", 10), ("dz",)).encode(), THREE, plan=True)
+    filled = simulate(wanted, THREE, Faults(noise_um=1.0), seed=1)
+    assert filled.measured == ("dz",)
+    assert np.isfinite(filled.columns["dz"]).all()
+    silent = reads(dumps(plan(THREE, "tcp", 10)).encode(), THREE, plan=True)
+    assert simulate(silent, THREE).measured == ("dx", "dy", "dz")
 
 
 BAD = {

@@ -35,7 +35,8 @@ def read(path: str, machine: Machine, plan: bool = False) -> Measurement:
 def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bool = False) -> Measurement:
     """The measurement in a text, of this machine.
 
-    plan  the file is a plan to be filled in: measured columns may be missing or empty and are then left out.
+    plan  the file is a plan to be filled in: measured columns may be missing or empty. Empty ones are left out; where a
+          kind has some of its columns or others, they are NaN, since they say which of them will be filled in.
 
     Raises `ConfigError` with NCF600 ... NCF616, all faults at once. Instruments' own formats are recognised by what
     they look like, see `ncfix.measure.foreign`.
@@ -160,6 +161,7 @@ def _columns(
     for index, name in enumerate(names):
         cells = [row[index] for row in rows]
         if plan and name in form.measured and not any(cell.text for cell in cells):
+            columns |= {name: np.full(len(cells), math.nan)} if form.any_of else {}
             continue
         if name in (*LABELS, *form.labels):
             labels[name] = tuple(_label(text, cell, name) for cell in cells)

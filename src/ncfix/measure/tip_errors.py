@@ -44,7 +44,7 @@ class TipErrors(Observation):
 
     @property
     def components(self) -> tuple[str, ...]:
-        """The columns that there are; in a plan all."""
+        """The columns that there are; all, in a plan that has none."""
         every = (*SHIFTS, *TURNS) if self.measurement.kind == "tcp6" else SHIFTS
         return self.measurement.measured or every
 
