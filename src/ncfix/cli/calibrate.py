@@ -12,6 +12,8 @@ from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ncfix.measure.calibrate import Calibration
     from ncfix.measure.prediction import Prediction
 
@@ -136,14 +138,7 @@ def _set_up(found: Calibration) -> dict[str, float]:
 
 
 def _print(found: Calibration, over: Prediction) -> None:
-    rows = []
-    for label, value, deviation in zip(
-        found.labels, found.estimate.coefficients.tolist(), found.sigma.tolist(), strict=True
-    ):
-        factor, unit = (1e6, "urad") if label[1] in "ABC" else (1e3, "um")
-        known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
-        rows.append((label, f"{factor * value:.4g}", known, unit))
-    console.table(("coefficient", "value", "sigma", "unit"), rows)
+    console.table(("coefficient", "value", "sigma", "unit"), list(_rows(found)))
     for bar in _ball_bars(found):
         _say_bar(bar)
     for row in _positioning(found):
@@ -153,6 +148,17 @@ def _print(found: Calibration, over: Prediction) -> None:
         f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
         f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
     )
+
+
+def _rows(found: Calibration) -> Iterator[tuple[str, str, str, str]]:
+    from ncfix.machine.units import units
+
+    machine, selection = found.problem.machine, found.problem.selection
+    said = [unit for effect in selection.estimated for unit in units(machine, effect)]
+    values, sigma = found.estimate.coefficients.tolist(), found.sigma.tolist()
+    for label, value, deviation, (factor, unit) in zip(found.labels, values, sigma, said, strict=True):
+        known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
+        yield label, f"{factor * value:.4g}", known, unit
 
 
 def _say_bar(bar: dict[str, Any]) -> None:
