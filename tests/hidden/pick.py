@@ -17,7 +17,7 @@ from . import designs
 from .draft import Draft
 from .families import Family
 from .motion import Array
-from .physics import Entry, catalogue, foreign, location
+from .physics import Entry, catalogue, foreign, location, vocabulary
 from .situation import joined
 from .visibility import View, first_order, relatives, sensitivities, view
 from .world import Specimen
@@ -69,7 +69,8 @@ def judge(
         return None
     if spec.source in ("foreign", "blind"):
         return {}
-    rivals = tuple(e for e in catalogue(draft.world.machine) if e.name != specimen.entry.name)
+    known = vocabulary if spec.alone else catalogue
+    rivals = tuple(e for e in known(draft.world.machine) if e.name != specimen.entry.name)
     kin = relatives(rng, draft.situation, draft.sight, seen_from, truth, rivals)
     closest = next(iter(kin))
     larger = max(1.0, USUAL_MM / specimen.moved_mm) ** 2

@@ -14,7 +14,7 @@ from . import remeasure
 from .candidate import Answer, Candidate, Reported, ask
 from .families import FAMILIES, Task
 from .names import Named, matches
-from .physics import catalogue
+from .physics import vocabulary
 from .scenario import Scenario, after_um, scenario
 
 EXTRA_POSES = 12
@@ -121,7 +121,7 @@ def _family_right(scene: Scenario, first: Reported | None) -> bool:
     truth = scene.truth.named()[0]
     meant = [
         entry
-        for entry in catalogue(scene.draft.world.machine)
+        for entry in vocabulary(scene.draft.world.machine)
         if matches(_named(entry), first.name, first.title, first.axis)
     ]
     return any(e.family == truth.family or scene.truth.relatives.get(e.name, 0.0) >= CLOSE for e in meant)

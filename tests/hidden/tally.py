@@ -104,7 +104,7 @@ def lines(records: Sequence[Record]) -> list[Line]:
     single, deleted = of["single"], of["deleted"]
     far, near = ([r for r in deleted if (r.closest < CLOSE) == lone] for lone in (True, False))
     gone = [x for x in map(removed, single) if x is not None]
-    false = [float(r.false_names) for r in single]
+    false, besides = ([float(r.false_names) for r in rows] for rows in (single, of["two"] + of["three"]))
     named: Judge = lambda r: bool(r.reported)  # noqa: E731
     return [
         share("one effect 5 to 20 um: first name right", single, lambda r: r.first_right, 0.97, prototype="0.98"),
@@ -122,6 +122,7 @@ def lines(records: Sequence[Record]) -> list[Line]:
         share("software and set-up mistakes: named", of["mistake"], lambda r: r.first_right, 28 / 30),
         share("two effects: both right", of["two"], lambda r: r.all_right, 0.90, prototype="0.90"),
         share("three effects: all right", of["three"], lambda r: r.all_right, 0.85, prototype="0.95"),
+        mean("two or three effects: wrong names a scenario", besides),
         quantile("excess gap removed: median", gone, 0.5, 0.97, prototype="0.986"),
         quantile("excess gap removed: worst tenth", gone, 0.1, 0.90, prototype="0.96"),
         share("gap made worse", single, worse, 0.01, True, "0"),

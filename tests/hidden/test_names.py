@@ -7,7 +7,7 @@ import pytest
 
 from hidden import mistakes, workshop
 from hidden.names import KINDS, Named, matches
-from hidden.physics import catalogue, foreign
+from hidden.physics import catalogue, foreign, vocabulary
 
 EXX = Named("EXX", "curve", "X", ("EXX",), "X geometry")
 EYX = Named("EYX", "curve", "X", ("EYX",), "X geometry")
@@ -79,6 +79,15 @@ def test_the_catalogues_own_names_mean_one_effect_each(topology: str) -> None:
         allowed = {truth.name, f"wobble {truth.axis}"} if truth.kind == "table stiffness" else {truth.name}
         assert truth.name in meant
         assert set(meant) <= allowed
+
+
+@pytest.mark.parametrize("topology", workshop.TOPOLOGIES)
+def test_the_vocabulary_says_more_and_each_name_is_its_own(topology: str) -> None:
+    machine = workshop.draw_machine(np.random.default_rng(1), topology)
+    said = vocabulary(machine)
+    assert {e.name for e in said} > {e.name for e in catalogue(machine)}
+    for entry in said:
+        assert matches(Named(entry.name, entry.kind, entry.axis, entry.symbols, entry.family), entry.name), entry.name
 
 
 def test_every_kind_can_be_read() -> None:

@@ -86,6 +86,18 @@ def test_deleted_name_and_its_family() -> None:
     assert [tally.confident(r) for r in (kin, stranger, silent)] == [True, True, False]
 
 
+@pytest.mark.parametrize(
+    ("deleted", "topology", "said"), [("column nod Y", "wCBXFZYSt", "column nod Z"), ("EYY", "wCBXFZYSt", "ECY")]
+)
+def test_kin_need_not_be_hidden_anywhere(deleted: str, topology: str, said: str) -> None:
+    scene = scenario(77, "deleted", effect=deleted, topology=topology)
+    task = Task("deleted", 0, 77)
+    near = judged(task, scene, found(Reported(said, "", said[-1])), None)
+    assert near.closest > 0.7
+    assert tally.family_or_unknown(near)
+    assert not tally.family_or_unknown(judged(task, scene, found(Reported("wobble B", "", "B")), None))
+
+
 def test_wilson_and_bootstrap() -> None:
     assert wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)  # Wilson 1927, as in any table
     assert wilson(0, 100) == pytest.approx((0.0, 0.0370), abs=1e-4)

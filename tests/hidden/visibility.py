@@ -160,16 +160,17 @@ def relatives(
     """Share of the visible truth that each rival can imitate, by name, the largest first.
 
     A rival's reach is the span of `draws` specimens of it as seen in the data, directions below 8 % of the strongest
-    left out.
+    left out; of several forms of one name the best counts. Who cannot be seen imitates nothing.
     """
     target = sight.left(sight.observed(truth))
     basis = _range(sight.observed(sight.columns))
-    shares = {}
+    shares: dict[str, float] = {}
     for entry in rivals:
         specimens = [first_order(sensitivity, entry.draw(rng)(s)) for _ in range(draws)]
         seen = np.stack([sight.observed(x) / (np.sqrt(np.mean(x**2)) + 1e-30) for x in specimens], axis=1)
         seen -= basis @ (basis.T @ seen)
         u, d, _ = np.linalg.svd(seen, full_matrices=False)
         reach = u[:, d > max(0.08 * d[0], 1e-9)]
-        shares[entry.name] = float(np.sum((reach.T @ target) ** 2) / np.sum(target**2))
+        share = float(np.sum((reach.T @ target) ** 2) / np.sum(target**2))
+        shares[entry.name] = max(share, shares.get(entry.name, 0.0))
     return dict(sorted(shares.items(), key=lambda item: -item[1]))

@@ -22,9 +22,9 @@ def entries(machine: Machine) -> list[Entry]:
     for joint in machine.joints:
         if not joint.rotary:
             components = [c for c in "XYZABC" if c in "XYZ" or _has_lever(machine, joint, c)]
-            result += [_motion(joint, component) for component in components]
+            result += [motion(joint, component) for component in components]
             result += [_pitch(joint), _backlash(joint)]
-            result += [_play(joint, component) for component in components if component != joint.name]
+            result += [play(joint, component) for component in components if component != joint.name]
     return result
 
 
@@ -40,7 +40,7 @@ def _has_lever(machine: Machine, joint: Joint, component: str) -> bool:
     return bool(np.max(np.linalg.norm(lever, axis=1)) > LEVER)
 
 
-def _motion(joint: Joint, component: str) -> Entry:
+def motion(joint: Joint, component: str) -> Entry:
     """EXX, EYX, EAX: a smooth curve, one in six a local dent; a rotation has its pivot some millimetres off."""
 
     def draw(rng: Generator) -> Field:
@@ -90,7 +90,7 @@ def _backlash(joint: Joint) -> Entry:
     return Entry(f"backlash {joint.name}", 9, "backlash", joint.name, (name,), f"{joint.name} reversal", draw)
 
 
-def _play(joint: Joint, component: str) -> Entry:
+def play(joint: Joint, component: str) -> Entry:
     """Lateral play (EYX) or angular play (ECX): the carriage shifts or yaws at reversal."""
 
     def draw(rng: Generator) -> Field:

@@ -23,8 +23,8 @@ def entries(machine: Machine) -> list[Entry]:
     result += [_drift(letter) for letter in "XYZ"]
     result += [_swing(letter) for letter in "XYZ"]
     result += [_scale(joint) for joint in linear]
-    result += [_bend(joint, "AB"[i % 2]) for i, joint in enumerate(linear) if joint.tool_side]
-    result += [_centre(machine, joint) for joint in machine.joints if joint.rotary and _carried(machine, joint)]
+    result += [bend(joint, "AB"[i % 2]) for i, joint in enumerate(linear) if joint.tool_side]
+    result += [centre(joint) for joint in machine.joints if joint.rotary and _carried(machine, joint)]
     return result
 
 
@@ -96,7 +96,7 @@ def _scale(joint: Joint) -> Entry:
     return Entry(f"thermal scale {joint.name}", 41, "thermal scale", joint.name, (name,), FAMILY, draw)
 
 
-def _bend(joint: Joint, component: str) -> Entry:
+def bend(joint: Joint, component: str) -> Entry:
     """A column warmer in front than behind leans: a rotation, so the lever decides."""
 
     def draw(rng: Generator) -> Field:
@@ -107,7 +107,7 @@ def _bend(joint: Joint, component: str) -> Entry:
     return Entry(f"thermal bend {name}", 42, "thermal bend", joint.name, (name,), FAMILY, draw)
 
 
-def _centre(machine: Machine, joint: Joint) -> Entry:
+def centre(joint: Joint) -> Entry:
     """The seat of a rotary axis grows out of the middle of what carries it."""
     along = int(np.argmax(np.abs(np.asarray(joint.triad) @ np.asarray(joint.direction))))
     letter = "XYZ"[(along + 1) % 3]

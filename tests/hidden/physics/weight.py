@@ -19,16 +19,21 @@ def entries(machine: Machine) -> list[Entry]:
     down = np.asarray(machine.gravity)
     linear = [joint for joint in machine.joints if not joint.rotary]
     flat = [joint for joint in linear if abs(down @ np.asarray(joint.direction)) < 0.5]
-    result = [_bed_sag(machine, flat[0]), _ram_droop(machine), _foundation_tilt(machine, flat[0]), _nod(machine)]
+    result = [
+        bed_sag(machine, flat[0]),
+        ram_droop(machine, machine.joint(machine.ram)),
+        foundation_tilt(machine, flat[0]),
+        _nod(machine),
+    ]
     for joint in machine.joints:
-        if joint.rotary and _feels_gravity(machine, joint):
+        if joint.rotary and feels_gravity(machine, joint):
             result += _under_gravity(machine, joint)
     if any(joint.rotary and joint.tool_side for joint in machine.joints):
         result += [_tool_droop(machine)]
     return result
 
 
-def _feels_gravity(machine: Machine, joint: Joint) -> bool:
+def feels_gravity(machine: Machine, joint: Joint) -> bool:
     """Whether weight across the axis ever changes: it lies, or something that turns carries it."""
     lying = abs(np.asarray(machine.gravity) @ np.asarray(joint.direction)) < 0.99
     names = [j.name for j in machine.outwards(joint.tool_side)]
@@ -98,7 +103,7 @@ def _components(machine: Machine, joint: Joint) -> tuple[str, ...]:
     return symbol(vertical, joint.name), symbol(pitch, joint.name)
 
 
-def _bed_sag(machine: Machine, joint: Joint) -> Entry:
+def bed_sag(machine: Machine, joint: Joint) -> Entry:
     symbols = _components(machine, joint)
     return Entry(
         f"bed sag {joint.name}", 32, "bed sag", joint.name, symbols, f"{joint.name} geometry",
@@ -106,8 +111,7 @@ def _bed_sag(machine: Machine, joint: Joint) -> Entry:
     )  # fmt: skip
 
 
-def _ram_droop(machine: Machine) -> Entry:
-    joint = machine.joint(machine.ram)
+def ram_droop(machine: Machine, joint: Joint) -> Entry:
     symbols = _components(machine, joint)
     return Entry(
         f"ram droop {joint.name}", 33, "ram droop", joint.name, symbols, f"{joint.name} geometry",
@@ -115,7 +119,7 @@ def _ram_droop(machine: Machine) -> Entry:
     )  # fmt: skip
 
 
-def _foundation_tilt(machine: Machine, joint: Joint) -> Entry:
+def foundation_tilt(machine: Machine, joint: Joint) -> Entry:
     """A heavy slide tilts the bed against the column; more the further it is out."""
     axis = "ABC"[int(np.argmax(np.abs(np.cross(joint.direction, machine.gravity))))]
 
@@ -228,6 +232,10 @@ def _twist(joint: Joint) -> Entry:
 def _entry(joint: Joint, row: int, kind: str, components: tuple[str, ...], draw: object) -> Entry:
     symbols = tuple(symbol(c, joint.name) for c in components)
     return Entry(f"{kind} {joint.name}", row, kind, joint.name, symbols, f"{joint.name} rotary", draw)  # type: ignore[arg-type]
+
+
+TURNING = (_stiffness, _unbalance, _torque, _twist)
+"""What weight does to a rotary axis, wherever it lies."""
 
 
 def _tool_droop(machine: Machine) -> Entry:
