@@ -82,7 +82,7 @@ FRAMES = [
     case("M91", "L Z+0 FMAX M91\nL X+5 Y+5 Z+20", L4=P, L5=R),
     case("M92", "L Z+0 FMAX M92\nL X+5\nL Z+20 FMAX", L4=P, L5=N, L6=R),
     case("retract", "L M140 MB MAX\nL X+5 FMAX\nL X+6 F100\nL Z+20 FMAX", L4=P, L5=P, L6=N, L7=R),
-    case("probing", "TCH PROBE 400 X\nL X+5 Y+5 Z+5 FMAX", L4=P, L5=R),
+    case("probing", "TCH PROBE 421 X\nL X+5 Y+5 Z+5 FMAX", L4=P, L5=R),
     case("polar lines", "CC X+5 Y+5\nLP PR+10 PA+30 F100\nLP IPA+30", L5=R, L6=R),
     case("polar lines without a pole", "LP PR+10 PA+30 F100", L4=N),
     case("M128", "L M128\nL X+5 Y+6 Z+7 F100\nL M129", L5=R),

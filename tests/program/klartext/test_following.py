@@ -162,12 +162,12 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("FC DR+ R5 X+10", "free contour"),
         ("TOOL CALL 1 Y\nL X+1", "tool axis is Y"),
         ('TOOL CALL "DRILL" Z\nL X+1', "DRILL"),
-        ("L X+1 F100\nG91 G28 Z0", "not Klartext"),
+        ("L X+1 F100\nG91 G28 Z0", "no Klartext"),
         ("LN X1 Y2 Z3 TX0 TY0 TZ1", "works out the rotary axes"),
         ("CC X+0 Y+0\nL X+10 Y+0 F1\nC X+0 Y+10.1 DR+", "does not close"),
         ("FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\nL X+1", "spatial angles"),
         ("M114\nL X+1", "M114"),
-        ("TRANS ROTATION ROT+5\nL X+1", "TRANS ROTATION"),
+        ("TRANS ROTATION ABOUT+5\nL X+1", "TRANS ROTATION"),
     ],
 )
 def test_what_is_not_sure_is_refused(body: str, reason: str) -> None:

@@ -15,8 +15,11 @@ from ncfix.program.rs274.arcs import sweep_angle
 
 FloatArray = NDArray[np.float64]
 
-POLE_DIGITS = 4
-"""What a control takes after the point of a coordinate; angles are written with two more."""
+POLE_DIGITS, ANGLE_DIGITS = 4, 4
+"""What a control takes after the point of a coordinate, and of an angle (TNC 640, "Technical information")."""
+
+ASIDE = 1e-4
+"""How far (in program units) an arc may pass beside its place so that an angle of so many digits leads to its end."""
 
 FULL = 2 * math.pi - 1e-6
 
@@ -128,12 +131,16 @@ def written_pole(arc: PieceOfArc, middle: FloatArray, style: Style, digits: int)
 def helix(arc: PieceOfArc, style: Style, sense: str) -> ArcText:
     """CP with IPA about a pole that is equally far from both ends; the control works the end out."""
     begin, end = arc.begin[arc.columns], arc.end[arc.columns]
-    pole, words = written_pole(arc, equally_far(begin, end, arc.middle), style, max(POLE_DIGITS, arc.digits))
-    angle = swept(arc, pole, begin, end)
+    wanted = equally_far(begin, end, arc.middle)
+    angle = swept(arc, wanted, begin, end)
     if arc.turn is not None:
         angle += 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
-    text = style.number(math.degrees(angle), POLE_DIGITS + 2)
+    text = style.number(math.degrees(angle), ANGLE_DIGITS)
     angle = math.radians(value_of(text))
+    fitting = seen_under(begin, end, angle)
+    if float(np.hypot(*(fitting - wanted))) * (1 - math.cos(angle / 2)) < ASIDE:
+        wanted = fitting
+    pole, words = written_pole(arc, wanted, style, max(POLE_DIGITS, arc.digits))
     spoke = begin - pole
     turned = np.array(
         [
@@ -155,6 +162,15 @@ def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> Float
     along = chord / length
     result: FloatArray = middle - float(np.dot(middle - (begin + end) / 2, along)) * along
     return result
+
+
+def seen_under(begin: FloatArray, end: FloatArray, angle: float) -> FloatArray:
+    """The point from which the way from begin to end is seen under a signed angle; far away where there is none."""
+    chord = end - begin
+    half = math.tan(angle / 2)
+    apart = 0.5 / half if abs(half) > 1e-12 else math.inf
+    found: FloatArray = (begin + end) / 2 + apart * np.array([-chord[1], chord[0]])
+    return found
 
 
 def spatial(arc: PieceOfArc, middle: FloatArray) -> FloatArray:

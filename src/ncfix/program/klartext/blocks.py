@@ -14,6 +14,7 @@ from lark import Token, UnexpectedInput
 from ncfix.program.build import Branch, Builder, Node, Parsed, edges, kind, tokens_of
 from ncfix.program.dialect import Dialect
 from ncfix.program.grammar import Squeezed, parse
+from ncfix.program.klartext.plans import MOVING, owners
 from ncfix.program.reach import UNREAD
 from ncfix.program.tree import (
     END,
@@ -116,6 +117,8 @@ def built(tree: Branch, text: str) -> Parsed:
     slots = {span: slot for slot, span in enumerate(spans)}
     maker = Maker(Builder(text, identity(text), slots, tuple(stop for _, stop in spans)))
     items = list(maker.items(tree))
+    if is_twice(items):
+        return unread_block()
     taken = [place_of(item.span.stop, spans) for item in items if isinstance(item, Opaque)]
     notes = [match.span() for match in BLANKED.finditer(text) if match[0][0] == ";"]
     notes = [span for span in notes if not any(span[0] < stop for stop in taken)]
@@ -124,6 +127,14 @@ def built(tree: Branch, text: str) -> Parsed:
     comment = notes[-1][0] if notes and not text[notes[-1][1] :].strip() else -1
     values = tuple(value_of(token) for token in tokens)
     return Parsed(Template(tuple(items), len(tokens)), spans, values, comment)
+
+
+def is_twice(items: list[Item]) -> bool:
+    """Whether a block says twice where an axis goes: the control marks it as an error."""
+    owned = owners(items)
+    words = [w.address.removeprefix("I") for k, w in enumerate(items) if isinstance(w, Word) and k not in owned]
+    leading = [address for address in words if address in MOVING]
+    return len(leading) > len(set(leading))
 
 
 def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:
@@ -160,6 +171,10 @@ class Maker:
                 yield self.terminal(node, nodes)
             elif kind(node) in ("plane", "datum"):
                 nodes = [*node.children, *nodes]
+            elif kind(node) == "code":
+                code, *named = node.children
+                yield self.code(code)
+                nodes = [*named, *nodes]
             else:
                 yield self.rule(node)
 
@@ -196,8 +211,6 @@ class Maker:
             case "word":
                 address, value = tree.children
                 return Word(str(address).upper(), self.expression(value), span, self.builder.span(value))
-            case "code":
-                return self.code(first)
             case "assignment":
                 target, value = tree.children
                 return Assignment(NamedParameter(str(target).upper()), self.expression(value), span)

@@ -17,6 +17,7 @@ SUSPENDING = {
     144: "M144: the control works the geometry of the machine into positions",
 }
 ENDING = {115: 114, 145: 144}
+CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
 RETRACT = "retract along the tool axis (M140)"
 COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
@@ -44,7 +45,9 @@ def before_motion(control: Control, step: Step) -> None:
     if 128 in step.codes:
         tip_control(control, on=True)
     if 94 in step.codes:
-        reduce_turns(control)
+        reduce_turns(control, step.flags)
+    if 138 in step.codes:
+        choose_axes(control, step.flags)
 
 
 def end_of_short_ways(control: Control, on: bool) -> None:
@@ -61,10 +64,19 @@ def end_of_short_ways(control: Control, on: bool) -> None:
     control.shortest = not on
 
 
-def reduce_turns(control: Control) -> None:
-    """M94: rotary axes are said by an angle below a turn from here on."""
+def choose_axes(control: Control, flags: frozenset[str]) -> None:
+    """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
+    control.suspended.pop("M138", None)
+    turning = {"XYZABCUVW"[index].lower() for index in control.machine if control.rotary[index]}
+    if flags & set("abc") not in (set(), turning):
+        control.suspended["M138"] = CHOSEN
+
+
+def reduce_turns(control: Control, flags: frozenset[str]) -> None:
+    """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
+    named = flags & set("abc")
     for index in control.machine:
-        if control.rotary[index]:
+        if control.rotary[index] and (not named or "XYZABCUVW"[index].lower() in named):
             control.position[index] %= 2 * math.pi
 
 

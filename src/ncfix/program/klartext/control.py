@@ -26,7 +26,7 @@ START = "PRESET"
 BY_DEPTH, FROM_START = 2000, 1000
 """Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
 
-TILTED, DOUBTFUL, TOOL = "tilt", "doubt", "tool"
+TILTED, DOUBTFUL, TOOL, PRESET = "tilt", "doubt", "tool", "preset"
 """The keys under which motions are suspended."""
 
 
@@ -35,7 +35,14 @@ APART = "its numbers in the workpiece would rest on the offsets alone"
 NOT_NAMED = "NCF274"
 
 RETRACTED = "where the axis {} stands after M140 is not followed"
-"""Rapids at such a height are passed: the tool is off the workpiece, and the next block that names the axis is not."""
+MOVED_ALONG = "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed"
+DEPARTED = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
+AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
+FREELY = "where the axis {} stands after a free contour (FK) the control works out"
+AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is not followed"
+LED_BY_CONTROL = frozenset({RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
+"""Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the
+next block that names the axis is corrected."""
 
 
 @dataclass(slots=True)
@@ -89,6 +96,7 @@ class Control(base.Control):
     ) -> None:
         super().__init__(setup, axes, rotary, dialect, kinematics)
         self.transformations = Transformations()
+        self.functions: frozenset[str] = frozenset()
         self.scope = Scope(parameters=Parameters(dict(q_parameters(setup))))
         self.path = Path()
         self.cycle = CycleInForce()
@@ -135,7 +143,9 @@ class Control(base.Control):
         on = self.m128 or self.transformations.tilted
         if on != self.tcp:
             self.ask_for_tool()
+            why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else tcp.TURNED
             tcp.switch(self, self.offsets.tool, on)
+            self.unknown = {i: why if reason is tcp.TURNED else reason for i, reason in self.unknown.items()}
             self.set_adrift((X, Y, Z))
         self.refresh()
 
@@ -214,9 +224,9 @@ class Control(base.Control):
         super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc)
         self.modal.compensated = before
 
-    def lost_to(self, reason: str, unknown: Unknown) -> bool:
-        """All that is not known is lost to one reason."""
-        return bool(unknown) and all(why == reason for why in unknown.values())
+    def is_led(self, unknown: Unknown) -> bool:
+        """What is not known is so because the control itself has led the axes somewhere."""
+        return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())
 
     def refuse_here(self, reason: str) -> None:
         """A motion that is not followed: none of the axes is known afterwards."""

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.program.klartext.control import BY_DEPTH, FROM_START, Control
+from ncfix.program.klartext.control import BY_DEPTH, FROM_START, PRESET, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
 from ncfix.program.klartext.tilting import cycle_19
+from ncfix.program.klartext.trans import FROM_TABLE, note_source
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, X, Y, Z
 from ncfix.program.rs274.faults import Fault
@@ -36,7 +37,9 @@ HARMLESS = frozenset({9, 13, 32, 239, 392})
 AT_ONCE = frozenset({7, 8, 10, 11, 19, 26, 247})
 """Cycles that take effect where they are defined."""
 
-TABLE = "the datum of the axis {} comes from a table that is not given"
+BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
+"""What a TRANS function can do, too."""
+
 NO_PRESET = "the number of the preset is known only at run time"
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
@@ -76,6 +79,8 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
 def define_at_once(control: Control, cycle: int, part: str, words: Words, text: str) -> None:
     """Coordinate transformations."""
     trans = control.transformations
+    if cycle in BY_FUNCTION and part == "1":
+        note_source(control, BY_FUNCTION[cycle], by_function=False)
     if cycle == 7:
         shift(control, words, text)
     elif cycle == 8 and part == "1":
@@ -110,7 +115,7 @@ def shift(control: Control, words: Words, text: str) -> None:
     """Cycle 7: `7.1 X+10`, `7.2 IY5`, `7.1 #5` for a row of the datum table."""
     if "#" in text:
         for letter in "XYZABCUVW":
-            control.shaky[INDEX[letter]] = TABLE
+            control.shaky[INDEX[letter]] = FROM_TABLE
         return
     for address, value in words.values.items():
         letter = address.removeprefix("I")
@@ -129,9 +134,9 @@ def preset(control: Control) -> None:
     parameters = control.scope.parameters
     parameters.touched = False
     number = parameters.get("Q339")
-    control.suspended.pop("preset", None)
+    control.suspended.pop(PRESET, None)
     if parameters.touched:
-        control.suspended["preset"] = NO_PRESET
+        control.suspended[PRESET] = NO_PRESET
         return
     control.load_preset(f"PRESET{number:g}")
     control.set_adrift((X, Y, Z))

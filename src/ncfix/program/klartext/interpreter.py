@@ -221,6 +221,7 @@ class Interpreter:
         """TRANS DATUM."""
         if name.endswith("reset"):
             self.control.transformations.reset_shift()
+            self.control.shaky.clear()
         cycles.shift(self.control, words, "")
         self.control.recompose()
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ncfix.program.klartext.plans import FUNCTIONS, OPENING
+from ncfix.program.klartext.plans import FUNCTIONS, OPENING, owners
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.tree import Anchor, Command, Comment, Constant, Item, Literal, Opaque, Program, Skip, Span, Word
 
@@ -74,7 +74,8 @@ def layout_of(program: Program, block: int) -> Layout | None:
     """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
     items = program.items_of(block)
     commands = [item for item in items if isinstance(item, Command)]
-    words = [item for item in items if isinstance(item, Word) and item.address != "N"]
+    owned = owners(items)
+    words = [w for k, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and k not in owned]
     functions = [c for c in commands if c.name in FUNCTIONS or c.name.startswith(OPENING)]
     function = functions[0] if functions else None
     axes = {w.address.removeprefix("I"): w for w in words if w.address.removeprefix("I") in AXIS_LETTERS}

@@ -5,7 +5,7 @@ Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellane
 
 import math
 
-from ncfix.program.klartext.control import RETRACTED, Control
+from ncfix.program.klartext.control import DEPARTED, Control
 from ncfix.program.klartext.posture import angles_for
 from ncfix.program.klartext.step import Step, refuse, with_increments
 from ncfix.program.klartext.targets import (
@@ -30,8 +30,7 @@ NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine co
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
 TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
-OFF = "a rapid after a retract (M140)"
-DEPARTURE = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
+OFF = "a rapid from where the control itself has led the tool"
 FLAT = 1e-9
 
 
@@ -88,7 +87,7 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     if control.shortest:
         take_short_way(control, target, axes)
     before = control.position, control.unknown
-    off = step.kind == Kind.RAPID and control.lost_to(RETRACTED, unknown)
+    off = step.kind == Kind.RAPID and control.is_led(unknown)
     with_increments(control, follows or step.words.incremental)
     code = 0 if step.kind == Kind.RAPID else 10
     control.move(step.kind, axes, target, unknown, code, refusal=check_normal(control), passing=OFF if off else "")
@@ -183,7 +182,7 @@ def departure(control: Control, step: Step) -> None:
         return
     tangent, control.path.tangent = control.path.tangent, None
     plane = control.path.plane
-    lost: Unknown = {i: DEPARTURE for i in (plane.first, plane.second) if i in control.machine}
+    lost: Unknown = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
     target = control.position[:]
     if step.name == "dep lt" and tangent is not None and "LEN" in step.words.values and not step.words.runtime:
         length = control.modal.unit * step.words.values["LEN"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.program.klartext.calculate import Evaluate, compiled
@@ -12,6 +12,7 @@ from ncfix.program.tree import (
     Command,
     Constant,
     Flow,
+    Item,
     Opaque,
     Skip,
     Span,
@@ -24,8 +25,17 @@ FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")
 """The words with which a block begins, if it is not words alone."""
 
-OWN_WORDS = frozenset({103, 118, 120, 124, 128, 138, 140, 94, 112, 144})
-"""M codes after which words are theirs: limits of the handwheel, a feed of their own, a distance."""
+LETTERS = frozenset("XYZABCUVW")
+OWN_WORDS = {
+    103: frozenset("F"),
+    112: frozenset("TAE"),
+    118: LETTERS,
+    120: frozenset({"LA"}),
+    124: frozenset("T"),
+    128: frozenset("F"),
+    140: frozenset({"MB", "F"}),
+}
+"""M code -> the addresses of words after it that are its own: limits of the handwheel, a feed, a distance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +76,19 @@ MOVING = frozenset(
 """The addresses that lead somewhere."""
 
 
+def owners(items: Sequence[Item]) -> dict[int, int]:
+    """Words that belong to an M code before them (`M118 X1 Y1`), not to the motion: place of the item -> that code."""
+    found: dict[int, int] = {}
+    code = -1
+    for place, item in enumerate(items):
+        match item:
+            case Word("M", Constant(value)):
+                code = int(value)
+            case Word(address) if address in OWN_WORDS.get(code, ()):
+                found[place] = code
+    return found
+
+
 def plan_of(template: Template) -> Plan:
     """Work out what the blocks of one shape do."""
     name, flags, assignments = "", set(), []
@@ -73,8 +96,8 @@ def plan_of(template: Template) -> Plan:
     spans: dict[str, Span] = {}
     codes: list[tuple[int, dict[str, Evaluate]]] = []
     rest: dict[str, object] = {}
-    target = words
-    for item in template.items:
+    owner = owners(template.items)
+    for place, item in enumerate(template.items):
         match item:
             case Skip():
                 rest["skip"] = True
@@ -85,14 +108,15 @@ def plan_of(template: Template) -> Plan:
             case Word("N"):
                 continue
             case Word("M", Constant(value)):
-                target = {} if int(value) in OWN_WORDS else words
-                codes.append((int(value), target if target is not words else {}))
+                codes.append((int(value), {}))
+            case Word(address, value) if place in owner:
+                codes[-1][1][address] = compiled(value)
             case Word("TOOL", value):
                 rest["tool"] = value.value if isinstance(value, Text) else compiled(value)
             case Word(address, value):
                 if address in ("RND", "CHF"):
                     name = address.lower()
-                target[address] = compiled(value)
+                words[address] = compiled(value)
                 spans.setdefault(address, item.span)
             case Assignment(parameter, value):
                 assignments.append((parameter.name, compiled(value)))  # type: ignore[union-attr]

@@ -5,16 +5,21 @@ from __future__ import annotations
 import re
 
 from ncfix.program.klartext.codes import tip_control
-from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.control import AFTER_PROBING, FREELY, PRESET, Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.patterns import pattern_of
-from ncfix.program.klartext.step import somewhere
+from ncfix.program.klartext.step import IN_PLANE, somewhere
+from ncfix.program.klartext.targets import command_of, here
+from ncfix.program.klartext.trans import transform
+from ncfix.program.rs274.coordinates import X, Y
 from ncfix.program.rs274.faults import Fault
 
 PROBING = "probing"
-AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
+MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
+SETTING = frozenset({*range(400, 406), *range(408, 420), 451, 452, 453, *range(1400, 1430)})
+"""Probing cycles that do not only measure."""
+
 FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
-LOST = "where the axis {} stands after a free contour (FK) the control works out"
 ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control itself leave results."""
@@ -23,7 +28,7 @@ TARGET = re.compile(r"(Q[LRS]?)(\d+)")
 CIRCLE = re.compile(r"FN\s*2[34]\b", re.IGNORECASE)
 READING = re.compile(r"FN\s*(18|2[0348])\b", re.IGNORECASE)
 PROGRAM_NAME = re.compile(r"CALL\s+PGM\s*(?P<name>.*)", re.IGNORECASE | re.DOTALL)
-FREE = re.compile(r"F(LT|L|CT|C|POL|SELECT)\b", re.IGNORECASE)
+FREE = re.compile(r"F(LT|L|CT|C)\b", re.IGNORECASE)
 TCPM = re.compile(r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 STOPPING = re.compile(r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", re.IGNORECASE)
 HARMLESS_FUNCTIONS = re.compile(
@@ -35,7 +40,6 @@ HARMLESS_FUNCTIONS = re.compile(
 WRITING = re.compile(r"FN\s*(17|25)\b", re.IGNORECASE)
 """They write into the control's own data: datums, presets, tools."""
 
-TRANSFORMATION = re.compile(r"TRANS\s+(MIRROR|ROTATION|SCALE)", re.IGNORECASE)
 CHOSEN = re.compile(r"(SEL\s+(PGM|CYCLE|TABLE)|CALL\s+SELECTED|POLARKIN)", re.IGNORECASE)
 
 
@@ -50,8 +54,10 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
     elif FREE.match(text):
         free_contour(control)
     elif re.match(r"TCH\s*PROBE", text, re.IGNORECASE):
-        probe(control)
-    elif TRANSFORMATION.match(text) or CHOSEN.match(text):
+        probe(control, text)
+    elif re.match("TRANS", text, re.IGNORECASE):
+        transform(control, text)
+    elif CHOSEN.match(text):
         name = " ".join(text.split()[:2]).upper()
         control.refusal = control.refusal or f"{name} is not followed"
     elif WRITING.match(text) or (re.match("FUNCTION", text, re.IGNORECASE) and not HARMLESS_FUNCTIONS.match(text)):
@@ -64,8 +70,13 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
 
 
 def free_contour(control: Control) -> None:
-    """An element of a free contour: as for an arc about a centre of its own, it matters where the one before ends."""
-    somewhere(control, 0, control.position[:], dict.fromkeys(control.machine, LOST), FREE_CONTOUR)
+    """An element of a free contour: as for an arc about a centre of its own, it matters where the one before ends.
+
+    It lies in the working plane: only X and Y of the frame are not known after it.
+    """
+    where = here(control)
+    where.unknown |= {X: FREELY, Y: FREELY}
+    somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
 
 
 def read_values(control: Control, text: str) -> None:
@@ -93,8 +104,11 @@ def tcpm(control: Control, found: re.Match[str]) -> None:
     tip_control(control, on=True)
 
 
-def probe(control: Control) -> None:
-    """TCH PROBE: the control moves on its own, and leaves results in Q parameters."""
+def probe(control: Control, text: str) -> None:
+    """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
+    found = re.match(r"TCH\s*PROBE\s*(\d+)", text, re.IGNORECASE)
+    if found and int(found[1]) in SETTING:
+        control.suspended[PRESET] = MEASURED.format(found[1])
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")
     for number in PROBED:
         control.scope.parameters.assign(f"Q{number}", 0.0, runtime=True)

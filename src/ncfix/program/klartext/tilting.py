@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ncfix.program.klartext.control import TILTED, Control
+from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
 from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
 from ncfix.program.klartext.transformations import euler, from_points, from_vectors, projected, spatial
@@ -116,7 +116,7 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
     if flags & {"turn", "move"}:
         turn_axes(control, way)
     if flags & {"move", RETRACTING}:
-        control.lose(range(3), "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed")
+        control.lose(range(3), MOVED_ALONG)
     control.recompose()
     control.switch_tip()
     control.set_adrift(range(3))

@@ -12,7 +12,7 @@ from ncfix.program.klartext.control import Control
 from ncfix.program.rs274.faults import Fault
 
 UNREADABLE = "NCF236"
-NOT_KLARTEXT = "this line is not Klartext; the control stops at it"
+NOT_KLARTEXT = "this line is not understood; if it is no Klartext, the control stops at it"
 NOT_FOLLOWED = "the line {} changes coordinates in a way that is not followed"
 DECIDES = "where the program goes on is decided by a line that is not understood"
 HINT = "correct the line, or name the dialect with --dialect"

@@ -1,0 +1,98 @@
+"""Statements and M codes that change what later blocks mean, or that only look as if they did."""
+
+from __future__ import annotations
+
+import pytest
+
+from ncfix.program.moves import Kind, Rule
+from ncfix.program.setup import Setup
+from program.klartext.tnc import KNOWN, ends, fixed, follow
+
+
+def fates(body: str, axes: str = "XYZ", setup: Setup = KNOWN) -> list[tuple[int, str]]:
+    """The rule of each motion, and why."""
+    moves = follow(body, axes, setup=setup).moves
+    return [(int(rule), moves.reasons[reason]) for rule, reason in zip(moves.rule, moves.reason, strict=True)]
+
+
+@pytest.mark.parametrize("code", ["M118 X1 Y1 Z1", "M120 LA5", "M124 T0.01", "M103 F20"])
+def test_words_of_an_m_code_are_no_words_of_the_motion(code: str) -> None:
+    assert ends(f"L X+50 F100 {code}") == [[50, 0, 0]]
+    line = fixed(f"L X+0 Y+0 Z+0 F100\nL X+50 F100 {code}").text.decode().splitlines()[-2]
+    assert line.startswith("L X+50.0")
+    assert line.endswith(code)
+
+
+@pytest.mark.parametrize("block", ["L X+1 X+2", "L X+1 IX+2", "LP PR+5 IPR+1", "L Z-1 Y+2 Z-3"])
+def test_an_axis_that_is_said_twice_is_an_error_of_the_block(block: str) -> None:
+    assert "no Klartext" in fates(f"CC X+0 Y+0\nL X+5 Y+5 Z+5 FMAX\n{block}")[-1][1]
+
+
+def test_m94_and_m138_name_axes_without_numbers() -> None:
+    assert ends("L C+370 FMAX\nL C+380 M94 C FMAX", "XYZC")[-1] == [0, 0, 0, 380]
+    assert fates("L X+1 Y+1 Z+1 M138 C FMAX\nL X+2\nM138\nL X+3", "XYZBC")[1:] == [
+        (Rule.REFUSE, "M138: the control takes only some of the rotary axes into account"),
+        (Rule.CORRECT, ""),
+    ]
+    assert [rule for rule, _ in fates("L X+1 Y+1 Z+1 M138 B C FMAX", "XYZBC")] == [Rule.CORRECT]
+
+
+@pytest.mark.parametrize("element", ["FLT", "FCT DR- R15 CCX+5 CCY+7", "FL X+5 Y+5", "FC DR- R18 CLSD+ CCX+2 CCY+3"])
+def test_elements_of_free_contours_leave_the_tool_axis_where_it_is(element: str) -> None:
+    moves = follow(f"L X+1 Y+1 Z+5 F100\nFPOL X+1 Y+1\n{element}\nFSELECT2\nL X+9 Y+9 FMAX").moves
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
+    assert moves.end[-1].tolist() == [9, 9, 5]
+
+
+@pytest.mark.parametrize(
+    "before",
+    ["DEP CT CCA90 R+5", "TCH PROBE 0.0 PLANE Q5 X-", "L M140 MB MAX", "PLANE SPATIAL SPA+0 SPB+0 SPC+0 MOVE DIST5"],
+)
+def test_a_rapid_from_where_the_control_has_led_the_tool_is_passed(before: str) -> None:
+    found = fates(f"L X+1 Y+1 Z+5 F100\n{before}\nL Y+8 FMAX\nL X+1 Y+1 Z+1 FMAX")
+    assert found[-2] == (Rule.PASS, "a rapid from where the control itself has led the tool")
+    assert found[-1] == (Rule.CORRECT, "")
+
+
+def test_probing_cycles_that_set_a_datum() -> None:
+    start = "L X+1 Y+1 Z+5 F100\n"
+    (rule, reason) = fates(start + "TCH PROBE 413 DATUM OUTSIDE CIRCLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1]
+    assert rule == Rule.REFUSE
+    assert "TCH PROBE 413 makes what it measures the datum" in reason
+    assert fates(start + "TCH PROBE 421 MEASURE HOLE ~\n Q321=+5\nL X+1 Y+1 Z+1 FMAX")[-1] == (Rule.CORRECT, "")
+    again = "TCH PROBE 413 DATUM ~\n Q321=+5\nCYCL DEF 247 PRESET Q339=+1\nL X+1 Y+1 Z+1 FMAX"
+    assert fates(start + again)[-1] == (Rule.CORRECT, "")
+
+
+@pytest.mark.parametrize(
+    ("function", "cycle"),
+    [
+        ("TRANS MIRROR AXIS X", "CYCL DEF 8.0 M\nCYCL DEF 8.1 X"),
+        ("TRANS ROTATION ROT-30", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT-30"),
+        ("TRANS ROTATION ROT-10\nTRANS ROTATION IROT-20", "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT-30"),
+        ("TRANS SCALE SCL0,5", "CYCL DEF 11.0 S\nCYCL DEF 11.1 SCL 0,5"),
+        ("TRANS SCALE SCL3\nTRANS SCALE RESET", ""),
+        ("TRANS MIRROR AXIS X Y\nTRANS MIRROR RESET", ""),
+        ("TRANS ROTATION ROT+5\nTRANS ROTATION RESET", ""),
+    ],
+)
+def test_trans_functions_do_what_the_cycles_do(function: str, cycle: str) -> None:
+    assert ends(f"{function}\nL X+10 Y+20 Z+5") == ends(f"{cycle}\nL X+10 Y+20 Z+5")
+
+
+def test_trans_functions_and_cycles_of_a_kind_are_not_mixed() -> None:
+    body = "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT-30\nTRANS ROTATION RESET\nL X+10 Y+20 Z+5"
+    assert "how they add up is not sure" in fates(body)[-1][1]
+
+
+def test_a_table_of_datums_by_trans() -> None:
+    found = fates("L X+0 Y+0 Z+9 FMAX\nTRANS DATUM TABLE TABLINE7\nL X+1 FMAX\nTRANS DATUM RESET\nL X+1 FMAX")
+    assert "comes from a table" in found[1][1]
+    assert found[2][0] == Rule.CORRECT
+
+
+def test_statements_that_move_nothing() -> None:
+    body = 'FUNCTION FEED DWELL TIME0.5\nMONITORING HEATMAP START AS "A"\nSECTION MONITORING STOP\nL X+5 FMAX'
+    moves = follow(body).moves
+    assert moves.kind.tolist() == [Kind.RAPID]
+    assert moves.rule.tolist() == [Rule.CORRECT]
