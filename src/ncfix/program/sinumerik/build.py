@@ -87,6 +87,7 @@ class SinumerikBuilder(Builder):
             "code": self.code,
             "assignment": self.setting,
             "command": self.command,
+            "indirect": self.indirect,
             "element": self.bare_element,
             "label": self.label_here,
             "condition": self.condition,
@@ -133,6 +134,11 @@ class SinumerikBuilder(Builder):
         name, *rest = tree.children
         arguments = self.arguments(rest[0]) if rest else ()
         return Command(str(name).lower(), arguments, bool(rest), self.span(tree))
+
+    def indirect(self, tree: Branch) -> Item:
+        """`CALL "NAME"`."""
+        name, text = tree.children
+        return Command(str(name).lower(), (Text(str(text)[1:-1]),), True, self.span(tree))
 
     def bare_element(self, tree: Branch) -> Item:
         """`NAME[..]` by itself: a macro of an array, not known to do anything."""

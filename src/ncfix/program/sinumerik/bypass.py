@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ncfix.program.sinumerik.course import Course
+from ncfix.program.sinumerik.lettings import BY_THEMSELVES
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan
 from ncfix.program.sinumerik.state import Sinumerik
-from ncfix.program.sinumerik.statements import BY_THEMSELVES
 from ncfix.program.sinumerik.unit import Unit
-from ncfix.program.sinumerik.vocabulary import HARMLESS
+from ncfix.program.sinumerik.vocabulary import HARMLESS, OF_THE_CONTROL, PROBING, UNSEEN
 
 LOUD_M = frozenset({20, 60, 170, 300})
 """M codes, in tenths, that end programs or change tools."""
@@ -53,7 +53,8 @@ def is_quiet_step(step: object) -> bool:
     """Whether an assignment, a name or a control structure does no more than that."""
     match step:
         case Letting(name):
-            return name not in BY_THEMSELVES and not name.startswith("$")
+            quiet = not name.startswith("$") and not OF_THE_CONTROL.match(name)
+            return quiet and name not in BY_THEMSELVES | UNSEEN.keys() | PROBING
         case Calling(name):
             return name in HARMLESS
         case Branching(keyword):

@@ -11,13 +11,14 @@ from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.affine import handed
-from ncfix.program.sinumerik.destination import End, Words, destination
+from ncfix.program.sinumerik.destination import NO_POLE, End, Words, destination, doubtful_polar
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE
 
 CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
 VIA_AT_RUNTIME = "the intermediate point of the arc is known only at run time"
-POLAR_ARC = "an arc in polar coordinates"
+POLAR_ARC = "an arc (CT) in polar coordinates"
+POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that has a centre or radius, too"
 DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
 VIA = ("I1", "J1", "K1")
 FLAT = 1e-9
@@ -32,7 +33,7 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
     end = destination(control, words)
     doubtful = bool(end.unknown or control.unknown or words.runtime("I", "J", "K", "CR", "AR", "TURN"))
     clockwise, plane = code == CLOCKWISE, control.modal.plane
-    refusal = refusal_of(words, plane) or doubtful_diameter(control, words, "I")
+    refusal = refusal_of(words, plane) or doubtful_diameter(control, words, "I") or doubtful_polar(control, words)
     try:
         centre, end = geometry(control, words, end, clockwise=clockwise)
     except Fault:
@@ -51,7 +52,8 @@ def refusal_of(words: Words, plane: Plane) -> str:
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     if words.runtime(*letters, "CR", "AR", "TURN"):
         return CENTRE_AT_RUNTIME
-    return POLAR_ARC if {"AP", "RP"} & words.values.keys() else ""
+    doubled = {"AP", "RP"} & words.values.keys() and {*letters, "CR", "AR"} & words.values.keys()
+    return POLAR_AND_CENTRE if doubled else ""
 
 
 def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
@@ -69,6 +71,10 @@ def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> 
     chord = step[plane.first], step[plane.second]
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     has_centre = any(letter in words.values for letter in letters)
+    if {"AP", "RP"} & words.values.keys():
+        centre = centre_at_pole(control, plane)
+        check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
+        return centre, end
     if "CR" in words.values:
         return centre_from_radius(chord, control.stretch * words.get("CR"), clockwise=clockwise), end
     if "AR" in words.values and not has_centre:
@@ -80,6 +86,14 @@ def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> 
         return centre, ended_by_angle(control, words, end, centre, clockwise=clockwise)
     check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
     return centre, end
+
+
+def centre_at_pole(control: Sinumerik, plane: Plane) -> Point:
+    """The centre of an arc in polar coordinates, the pole, relative to the start, mm."""
+    if control.modes.pole is None:
+        raise Fault(ARC_FAULT, NO_POLE)
+    here = control.program_position()
+    return control.modes.pole[0] - here[plane.first], control.modes.pole[1] - here[plane.second]
 
 
 def centre_words(control: Sinumerik, words: Words, plane: Plane) -> Point:

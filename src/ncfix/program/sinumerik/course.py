@@ -234,17 +234,19 @@ class Course:
         """Give a variable its value."""
         variables = self.control.variables
         if step.value is None:
-            variables.forget(step.name)
+            index: tuple[Value, ...] = tuple(part(self.control) for part in step.index)
+            values = [part(self.control) for part in step.listed]
+            variables.fill(step.name, index, values, repeated=step.repeated)
             return
         value = step.value(self.control)
         if not step.index:
             variables.assign(step.name, value)
             return
-        index = tuple(number(part(self.control)) for part in step.index)
-        if any(place is None for place in index):
+        places = tuple(number(part(self.control)) for part in step.index)
+        if any(place is None for place in places):
             variables.forget(step.name)
             return
-        variables.assign((step.name, tuple(place for place in index if place is not None)), value)
+        variables.assign((step.name, tuple(place for place in places if place is not None)), value)
 
     def key_of(self, expression: Expression | None) -> Key | None:
         """The variable that an expression names, if it names one."""

@@ -85,7 +85,7 @@ def drill(control: Sinumerik, drilling: Drilling) -> None:
         lost.pop(plane.across, None)
         end = End(command(control, program, {plane.across}), control.unknown_for(lost), lost)
         words = Words(drilling.block, {}, {}, 1 << plane.across)
-        control.go(kind, words, end, control.modal.motion, passing=DEPTH.format(name))
+        control.go(kind, words, end, control.modal.motion, passing=DEPTH.format(name), settles=words.axes)
     control.row_block = before
 
 

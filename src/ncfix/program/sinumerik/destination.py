@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 from ncfix.program.rs274.control import Unknown
 from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, rotated
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
 
 RUNTIME = "where the axis {} stands is known only at run time"
 POLAR = "NCF223"
+POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
 TURN = 2 * math.pi
 STILL = 1e-9
@@ -148,6 +150,11 @@ def polar(control: Sinumerik, words: Words, program: Vector, lost: Unknown) -> s
     return {plane.first, plane.second}
 
 
+def doubtful_polar(control: Sinumerik, words: Words) -> str:
+    """Why a motion with polar coordinates is refused whose radius might be meant as a diameter."""
+    return POLAR_DIAMETER if control.modal.diameter and {"AP", "RP"} & words.values.keys() else ""
+
+
 def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
     """AP in rad or RP in mm: as written, added to the last one, or the last one."""
     before = control.modes.polar[0 if address == "AP" else 1]
@@ -171,6 +178,7 @@ def set_pole(control: Sinumerik, words: Words, code: int) -> None:
     if code == 1100:
         control.settle_all()
         known = not {plane.first, plane.second} & control.lost.keys()
+        known = known and not control.places.adrift & mask_of((plane.first, plane.second))
         base = (here[plane.first], here[plane.second]) if known else None
     elif code == 1120:
         base = control.modes.pole or (0.0, 0.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ncfix.program.rs274.coordinates import INCH, INDEX, PLANES, Vector, zeros
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.state import Sinumerik
@@ -163,6 +164,7 @@ def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
     if change or (at_once and ("T" in words.values or "T" in words.texts)):
         control.tools.spindle = control.tools.selected
         control.edge = 1
+        control.places.lose(mask_of(control.machine))
     if "D" in words.values:
         if words.values["D"] is None:
             control.refusal = control.refusal or "the cutting edge (D) is known only at run time"

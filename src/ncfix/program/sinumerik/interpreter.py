@@ -14,9 +14,11 @@ from ncfix.program.rs274.lane import run_lane
 from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
+from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
-from ncfix.program.sinumerik.statements import BY_THEMSELVES, Turn, act, call_word, finish_block, let_axis_go, say
+from ncfix.program.sinumerik.statements import Turn, act, call_word, finish_block, say
 from ncfix.program.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix.program.sinumerik.unit import Unit, units_of
 from ncfix.program.sinumerik.unroll import Recorder
@@ -32,9 +34,6 @@ SAFE_ACTION = re.compile(
     r"MEAWA|SYNFCT|FTOC)\b)",
     re.IGNORECASE,
 )
-
-OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_dp|tc_carr|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$")
-"""Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 
 class Interpreter:
@@ -56,11 +55,6 @@ class Interpreter:
         plans = self.units[0].text.plans
         self.at_once = not any(60 in plan.m for plan in plans)
         self.tangents = any("ct" in plan.names for plan in plans)
-        control.modes.whole_polar = all(
-            {"AP", "RP"} <= {each.address for each in plan.settings}
-            or not {"AP", "RP"} & {each.address for each in plan.settings}
-            for plan in plans
-        )
         control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
         for parameter in self.units[0].parameters:
             control.variables.scopes[0].kinds[parameter.name] = ""
@@ -93,7 +87,7 @@ class Interpreter:
         except Fault as fault:
             self.span = fault.span or self.span
             raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
-        return demoted(self.control.builder.moves(), self.again)
+        return all_or_none(demoted(self.control.builder.moves(), self.again), self.units[0].program)
 
     def unrolled(self, recorder: Recorder) -> list[FlatLine]:
         """The blocks of the program as they are executed; raises SourceError NCF237 where that is not known before."""
@@ -167,10 +161,8 @@ class Interpreter:
             match step:
                 case Letting(name) if name in BY_THEMSELVES:
                     let_axis_go(control, turn, step)
-                case Letting(name):
-                    if OF_THE_CONTROL.match(name):
-                        why = f"the program sets {name.upper()}, which may change coordinates or tool lengths"
-                        control.refusal = control.refusal or why
+                case Letting():
+                    note_letting(control, turn, step)
                     course.let(step)
                 case Calling():
                     act(control, turn, step, self.find)
@@ -243,12 +235,12 @@ class Interpreter:
         control = self.control
         for setting in plan.settings:
             self.span = setting.span
-            value = setting.value(control)
-            if isinstance(value, str):
-                texts[setting.address] = value
+            value, address = setting.value(control), "T" if setting.address == "T1" else setting.address
+            if isinstance(value, str) and address == "T":
+                texts[address] = value
                 continue
-            values[setting.address] = value
+            values[address] = None if isinstance(value, str) else value
             if setting.form:
-                forms[setting.address] = setting.form
+                forms[address] = setting.form
         self.span = None
         return Words(index, values, forms, plan.axes, texts)

@@ -17,13 +17,12 @@ from ncfix.program.layout import (
 )
 from ncfix.program.sinumerik.circles import VIA
 from ncfix.program.sinumerik.orientation import ANGLES, VECTOR
-from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS
+from ncfix.program.sinumerik.poles import has_partial
+from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS, POLAR
 from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Skip, Tape, Word
 
 AFTER_MOTION = frozenset({"RND", "CHF", "CHR"})
 """Words that belong to the corner at the end of the block."""
-
-POLAR = ("AP", "RP")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +32,7 @@ class SinumerikLayout(Layout):
     via     I1 J1 K1 by address
     angle   AR
     polar   AP and RP by address
+    partial_polar  blocks of the program rely on such a word of a block before
     vector  A3 B3 C3 by address
     angles  A2 B2 C2 by address
     """
@@ -40,6 +40,7 @@ class SinumerikLayout(Layout):
     via: dict[str, Word]
     angle: Word | None
     polar: dict[str, Word]
+    partial_polar: bool
     vector: dict[str, Word]
     angles: dict[str, Word]
 
@@ -63,6 +64,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
     last = max(anchors, key=lambda word: program.position(block, word.span.stop))
     first = min(anchors, key=lambda word: program.position(block, word.span.start))
     by_address = {word.address: word for word in words}
+    polar = {address: by_address[address] for address in sorted(POLAR) if address in by_address}
     return SinumerikLayout(
         axes=axes,
         centre={letter: by_address[letter] for letter in CENTRE_LETTERS if letter in by_address},
@@ -78,7 +80,8 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         prefix=next((item.span for item in items if isinstance(item, Skip)), None),
         via={address: by_address[address] for address in VIA if address in by_address},
         angle=by_address.get("AR"),
-        polar={address: by_address[address] for address in POLAR if address in by_address},
+        polar=polar,
+        partial_polar=bool(polar) and has_partial(program),
         vector={address: by_address[address] for address in VECTOR if address in by_address},
         angles={address: by_address[address] for address in ANGLES if address in by_address},
     )

@@ -45,7 +45,6 @@ class Modes:
     transformed  TRAORI is on
     swivelled    CYCLE800 has tilted the plane
     modal_cycle  what MCALL calls after each block with a motion
-    whole_polar  every block with a polar coordinate has both
     orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
     orientation_in_machine  ORIMKS
     angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
@@ -57,7 +56,6 @@ class Modes:
     transformed: bool = False
     swivelled: bool = False
     modal_cycle: Drilling | None = None
-    whole_polar: bool = True
     orientation: str = ""
     orientation_in_machine: bool = False
     angles: str = ""

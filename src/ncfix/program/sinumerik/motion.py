@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.sinumerik.circles import arc, through_point
-from ncfix.program.sinumerik.destination import End, Words, destination, machine_destination
+from ncfix.program.sinumerik.destination import End, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import take_up
 from ncfix.program.sinumerik.orientation import oriented
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
@@ -68,9 +68,7 @@ def refusal_of(control: Sinumerik, words: Words) -> str:
         return "a rounding or chamfer is known only at run time"
     if "ANG" in words.values:
         return "a contour that is given by an angle (ANG)"
-    if words.values.keys() & {"AP", "RP"} and not control.modes.whole_polar:
-        return "polar coordinates of which only one is written (AP and RP are needed in every such block)"
-    return ""
+    return doubtful_polar(control, words)
 
 
 def refused(control: Sinumerik, words: Words, code: int, why: str) -> None:

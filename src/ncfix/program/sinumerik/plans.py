@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.plans import Lane
@@ -13,6 +13,7 @@ from ncfix.program.sinumerik.values import Evaluate, compiled, nothing
 from ncfix.program.sinumerik.vocabulary import FORMS
 from ncfix.program.tree import (
     Assignment,
+    Binary,
     Call,
     Command,
     Comment,
@@ -31,6 +32,10 @@ from ncfix.program.tree import (
     Word,
 )
 
+LISTS = frozenset({BRACKET, "set", "rep"})
+"""What gives several elements their values."""
+
+ANY_PARAMETER = "r[]"
 LANE_LETTERS = INDEX.keys() | {"F", "N"}
 
 
@@ -43,15 +48,25 @@ class Setting:
     form: str
     span: Span
 
+    def unsure(self) -> Setting:
+        """The word with a value that nobody knows: its block sets a variable of it, before it reads it or after."""
+        return replace(self, value=nothing)
+
 
 @dataclass(frozen=True, slots=True)
 class Letting:
-    """A variable that gets a value: its name, the index if it is an element, and the value (None: a list)."""
+    """A variable that gets a value: its name, the index if it is an element, and the value (None: a list).
+
+    listed    the values of a list, `SET(..)` or `REP(..)`
+    repeated  it is `REP`
+    """
 
     name: str
     index: tuple[Evaluate, ...]
     value: Evaluate | None
     span: Span
+    listed: tuple[Evaluate, ...] = ()
+    repeated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +125,10 @@ def plan_of(template: Template) -> Plan:
     words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
     plan = Plan(template)
     plan.settings = tuple(map(setting, words))
+    let = {name for item in items if isinstance(item, Assignment) for name in names_in(item.target)}
+    if let:
+        own = zip(plan.settings, words, strict=True)
+        plan.settings = tuple(each.unsure() if names_one(let, word.value) else each for each, word in own)
     makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, Flow: branching}
     plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
     plan.g, plan.m = template.g_codes, template.m_codes
@@ -135,25 +154,66 @@ def setting(word: Word) -> Setting:
     return Setting(word.address, compiled(value), "", word.span)
 
 
+def names_one(names: set[str], expression: Expression) -> bool:
+    """Whether an expression may name one of these variables."""
+    named = set(names_in(expression))
+    if named & names:
+        return True
+    mine, theirs = (set(filter(is_parameter, each)) for each in (named, names))
+    return bool(mine and theirs) and ANY_PARAMETER in mine | theirs
+
+
+def is_parameter(name: str) -> bool:
+    """Whether it is an R parameter."""
+    return name == ANY_PARAMETER or (name[0] == "r" and name[1:].isdigit())
+
+
+def names_in(expression: Expression) -> Iterator[str]:
+    """The variables that an expression names; an R parameter with a computed number may be any."""
+    match expression:
+        case Parameter(Constant(number)):
+            yield f"r{number:g}"
+        case Parameter(index):
+            yield from (ANY_PARAMETER, *names_in(index))
+        case NamedParameter(name):
+            yield name
+        case Unary(_, operand):
+            yield from names_in(operand)
+        case Binary(_, left, right):
+            yield from (*names_in(left), *names_in(right))
+        case Call(name, arguments):
+            yield name
+            yield from (each for part in arguments if part is not None for each in names_in(part))
+
+
 def letting(item: Assignment) -> Letting:
     """An assignment with its value as a function."""
-    values = isinstance(item.value, Call) and item.value.name in (BRACKET, "set", "rep")
-    value = None if values else compiled(item.value)
+    name, index = target_of(item)
+    if isinstance(item.value, Call) and item.value.name in LISTS:
+        return Letting(name, index, None, item.span, evaluates(item.value.arguments), item.value.name == "rep")
+    return Letting(name, index, compiled(item.value), item.span)
+
+
+def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
+    """The variable that gets a value, and the index if it is an element."""
     match item.target:
         case Parameter(number):
-            return Letting("r", (compiled(number),), value, item.span)
+            return "r", (compiled(number),)
         case NamedParameter(name):
-            return Letting(name, (), value, item.span)
+            return name, ()
         case Call(name, arguments):
-            index = tuple(nothing if part is None else compiled(part) for part in arguments)
-            return Letting(name, index, value, item.span)
+            return name, evaluates(arguments)
     raise AssertionError("there are no other targets")
+
+
+def evaluates(arguments: tuple[Expression | None, ...]) -> tuple[Evaluate, ...]:
+    """Arguments as functions; those that are left out are known only at run time."""
+    return tuple(nothing if part is None else compiled(part) for part in arguments)
 
 
 def calling(item: Command) -> Calling:
     """A name with its arguments as functions."""
-    values = tuple(nothing if part is None else compiled(part) for part in item.arguments)
-    return Calling(item.name, values, item.arguments, item.called, item.span)
+    return Calling(item.name, evaluates(item.arguments), item.arguments, item.called, item.span)
 
 
 def branching(item: Flow) -> Branching:

@@ -24,6 +24,7 @@ FloatArray = NDArray[np.float64]
 
 FORM = re.compile(r"\s*(?P<form>[A-Z]+)\s*\(\s*(?P<value>.*?)\s*\)\s*\Z", re.IGNORECASE | re.DOTALL)
 CIP = MOTIONS["cip"]
+ARCS = frozenset({20, 30})
 VECTOR_DECIMALS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees."""
 
@@ -59,6 +60,8 @@ class SinumerikRenderer(BlockRenderer):
         self._add("X", f"{0.0 if self.target.incremental else position[column]:.{self.target.decimals[column]}f}")
 
     def _polar_stays(self, end: FloatArray) -> bool:
+        if self.layout.partial_polar or self.target.code in ARCS:
+            return False
         near = np.abs(end - self.target.nominal) < self.half
         return len(self.target.ends) == 1 and bool(near[self._plane_columns()].all())
 
@@ -97,11 +100,7 @@ class SinumerikRenderer(BlockRenderer):
 
     def _has_words(self, column: int) -> bool:
         """With a vector for the direction of the tool, rotary axes have no words of their own."""
-        return not (self.layout.points and self.target.rotary[column])
-
-    def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
-        if self._has_words(column):
-            super()._absent_axis(position, column, end)
+        return super()._has_words(column) and not (self.layout.points and self.target.rotary[column])
 
     # -- the direction of the tool ------------------------------------------------------------------------------------
 
@@ -214,7 +213,7 @@ class SinumerikRenderer(BlockRenderer):
         """Centre words count from the start, but for those that say `AC`."""
         word = self.layout.centre.get(CENTRE_LETTERS[index])
         if word is None or self._form(word) != ABSOLUTE:
-            bare = self.layout.angle is not None or self.target.code in TANGENTIAL
+            bare = self.layout.angle is not None or bool(self.layout.polar) or self.target.code in TANGENTIAL
             return super()._centre_word(index, base, (had_centre and not bare) or word is not None)
         value, column = float(self.target.centre[index]), self.target.spatial[index]
         written = self._value(word, float(self.target.original_centre[index]))

@@ -8,7 +8,7 @@ coordinates of the program, since in a turned frame one unknown coordinate would
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import AT_START, Control, Unknown
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.program.rs274.modal import Modal
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Setup
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
@@ -102,6 +103,22 @@ class Sinumerik(Control):
         self._frame = -1
         if self.rotation != before:
             self.hide_in_turned_frame()
+        self.places.watch(self.anchors())
+
+    def anchors(self) -> list[Hashable]:
+        """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
+        frames, tool = self.frames, zeros() if self.tcp else self.offsets.tool
+        return [
+            (frames.name, frames.settable.shift[i], frames.swivel.shift[i], tool[i], self.spatial_anchor(i))
+            for i in range(len(LETTERS))
+        ]
+
+    def spatial_anchor(self, index: int) -> Hashable:
+        """Turns, the tip of the tool, and the edge that is in force across the plane."""
+        if index not in GEOMETRY:
+            return None
+        edge = (self.tools.offset, self.edge) if self.tcp or index == Z else None
+        return self.rotation[index], self.tcp, edge
 
     def hide_in_turned_frame(self) -> None:
         """Coordinates of a frame that has just been turned are known if all of them are."""
@@ -220,19 +237,27 @@ class Sinumerik(Control):
         refusal: str = "",
         passing: str = "",
         arc: Arc | None = None,
+        settles: int | None = None,
     ) -> None:
-        """A motion to `end`, with the reason for which it is refused or passed."""
+        """A motion to `end`, with the reason for which it is refused or passed; `settles` as in `Control.move`."""
         axes = words.axes
         if words.values.keys() & {"AP", "RP"}:
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
+        if settles is None:
+            settles = 0 if passing else axes & ~mask_of(self._counted(words))
         self.lost = end.lost
         refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(end.target)
         if not passing and not refusal:
             self.ask_for_length()
         self._note_heading(kind, end, arc, follows=not passing and not refusal)
-        self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc)
+        self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
         self.whole = False
         self.forget_settled()
+
+    def _counted(self, words: Words) -> list[int]:
+        """The axes whose words count from where they stand."""
+        forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
+        return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
 
     def _note_heading(self, kind: Kind, end: End, arc: Arc | None, *, follows: bool) -> None:
         """Keep the direction in which a motion ends: CT goes on in it."""

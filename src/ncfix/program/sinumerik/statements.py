@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ncfix.program.moves import Kind
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
-from ncfix.program.sinumerik.destination import End, Words, set_pole
+from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, OTHERS, VECTOR
-from ncfix.program.sinumerik.plans import Calling, Letting, Plan
+from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates, plain_text
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
 from ncfix.program.sinumerik.unit import Unit
-from ncfix.program.sinumerik.values import Evaluate
+from ncfix.program.sinumerik.values import Evaluate, number
 from ncfix.program.sinumerik.vocabulary import (
-    ASYNCHRONOUS,
     DRILLING,
     ENDS,
     HARMLESS,
     MADE_BY_THE_CONTROL,
     MOTIONS,
+    TURNS_OF_THE_TOOL,
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
 )
@@ -36,7 +36,7 @@ Find = Callable[[str], Unit | None]
 CONFLICT = "NCF208"
 UNKNOWN_CYCLE = "NCF252"
 FRAME_STAYS = "NCF255"
-AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
+AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
     G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
     G962 G972 G973 G290 G471 G472
@@ -52,9 +52,6 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((400, 410, 420), framing.compensation),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
-BY_THEMSELVES = frozenset(ASYNCHRONOUS) | {"pos"}
-"""What with an axis as index lets it move on its own, `POS[X]=100`."""
-
 MOVING = frozenset({"AP", "RP", *VECTOR, *ANGLES}) | OTHERS
 """Words that make a block move even where no axis is named."""
 
@@ -65,6 +62,10 @@ CIRCLE = frozenset({"I", "J", "K", "AR", "TURN"})
 """Those that do it while G2 or G3 is in force."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
+CALLED_BY_TEXT = frozenset({"call", "extcall"})
+FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
+"""A program named in a text, perhaps with a path."""
+
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
 POLES = frozenset({1100, 1110, 1120})
 TAKES_WORDS = frozenset({40, 740, 750, 250, 260, 580, 590}) | POLES
@@ -112,14 +113,18 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         control.modal.motion = MOTIONS[name]
     elif name in ("diamon", "diam90", "diamof"):
         framing.diameter(control, name)
+    elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
+        return
     elif name in UNFOLLOWED:
         control.suspended["coordinates"] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
     elif name in ANGLE_KINDS:
         control.modes.angles = name
-    elif name.startswith("ori"):
+    elif name in TURNS_OF_THE_TOOL:
         control.modes.orientation = name
+    elif name == "orireset":
+        control.lose_all(AFTER_RESET)
     elif name in HARMLESS:
         return
     elif name == "cycle800":
@@ -181,11 +186,23 @@ def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
     for place in range(1, len(step.written), 2):
         variable, value = step.written[place], step.written[place + 1]
         assert isinstance(variable, NamedParameter | Call)
-        control.variables.define(kind, variable.name)
-        if isinstance(variable, Call) and value is not None:
+        control.variables.define(kind, variable.name, sizes_of(control, variable))
+        if isinstance(value, Call) and value.name in LISTS:
+            values = [each(control) for each in evaluates(value.arguments)]
+            start = (0.0,) * len(control.variables.scopes[-1].sizes[variable.name])
+            control.variables.fill(variable.name, start, values, repeated=value.name == "rep")
+        elif isinstance(variable, Call) and value is not None:
             control.variables.forget(variable.name)
         elif value is not None:
             control.variables.assign(variable.name, step.arguments[place + 1](control))
+
+
+def sizes_of(control: Sinumerik, variable: NamedParameter | Call) -> tuple[int, ...]:
+    """How many elements an array has; none for a plain variable, and where that is known only at run time."""
+    if isinstance(variable, NamedParameter):
+        return ()
+    found = [number(part(control)) for part in evaluates(variable.arguments)]
+    return tuple(int(size) for size in found if size is not None) if None not in found else ()
 
 
 def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
@@ -211,22 +228,6 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
 }
 
 
-def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
-    """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
-    name = step.index[0](control) if step.index else None
-    known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
-    gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.machine
-    if not gone:
-        return
-    why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
-    if step.name in ("pos", "posa"):
-        still = Words(turn.words.block, {}, {}, sum(1 << index for index in gone))
-        lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
-        control.go(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why)
-    else:
-        control.refusal = control.refusal or f"{why} is not followed"
-
-
 def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     """A subprogram, or a cycle of the machine's builder."""
     if turn.modal:
@@ -241,6 +242,16 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
     control.lose_all(AFTER_CYCLE)
+
+
+def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
+    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`: whether the program is at hand."""
+    found = FILE.search(plain_text(step.written[0]) or "") if step.written else None
+    unit = find(found["name"]) if found else None
+    if unit is None:
+        return False
+    turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
+    return True
 
 
 def call_word(turn: Turn, find: Find) -> None:

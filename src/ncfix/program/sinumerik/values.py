@@ -13,6 +13,7 @@ from typing import Protocol
 from ncfix.program.rs274.arithmetic import UNARY
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.build import BRACKET
+from ncfix.program.sinumerik.texts import TEXT_FUNCTIONS, of_texts
 from ncfix.program.tree import (
     Binary,
     Call,
@@ -228,6 +229,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
 
 def called(name: str, arguments: tuple[Evaluate, ...]) -> Evaluate:
     """A function; what is none of ours gives a value that only the control knows."""
+    if name in TEXT_FUNCTIONS:
+        return lambda scope: of_texts(name, tuple(argument(scope) for argument in arguments))
     function, count = FUNCTIONS.get(name, (None, 0))
     if function is None:
         return nothing

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 from ncfix.program.sinumerik.values import Key, Value, number
 
@@ -18,10 +19,12 @@ class Local:
     """The variables that one program has defined.
 
     kinds   name -> type
+    sizes   array -> how many elements it has in each direction
     values  what they are
     """
 
     kinds: dict[str, str] = field(default_factory=dict)
+    sizes: dict[str, tuple[int, ...]] = field(default_factory=dict)
     values: dict[Key, Value] = field(default_factory=dict)
 
 
@@ -66,12 +69,27 @@ class Variables:
         """The innermost program that has defined a name, the main program at last."""
         return next((scope for scope in (self.scopes[-1], self.scopes[0]) if name in scope.kinds), None)
 
-    def define(self, kind: str, name: str) -> None:
+    def define(self, kind: str, name: str, sizes: tuple[int, ...] = ()) -> None:
         """`DEF`: the variable begins anew."""
         scope = self.scopes[-1]
-        scope.kinds[name] = kind
+        scope.kinds[name], scope.sizes[name] = kind, sizes
         for key in [key for key in scope.values if name_of(key) == name]:
             del scope.values[key]
+
+    def fill(self, name: str, index: tuple[Value, ...], values: Sequence[Value], *, repeated: bool) -> None:
+        """`NAME[index]=SET(values)` from an element on; repeated: `REP(value)` or `REP(value, count)`."""
+        scope = self.scope_of(name)
+        sizes = () if scope is None else scope.sizes.get(name, ())
+        cells = list(product(*(map(float, range(size)) for size in sizes)))
+        if scope is None or not sizes or index not in cells:
+            self.forget(name)
+            return
+        cells = cells[cells.index(index) :]  # type: ignore[arg-type]
+        if repeated:
+            count = number(values[1]) if len(values) > 1 else len(cells)
+            values = [values[0]] * len(cells[: int(count or 0)])
+        for cell, value in zip(cells, values, strict=False):
+            self.assign((name, cell), value)
 
     def forget(self, name: str) -> None:
         """All elements of an array are known only at run time from here on."""

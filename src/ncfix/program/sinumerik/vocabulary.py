@@ -5,12 +5,17 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming": tables of statements. All 
 
 from __future__ import annotations
 
+import re
+
 _SETTERS = """
     ar ap rp cr turn rnd rndm chf chr frc frcm ang offn lead tilt theta psi phi nut disr discl disc adis adispos
     ovr ovrra fl fb fz fprda spos sposa meas meaw meawa measa po pl pw sd prio rpl lims disrp dism
 """
 SETTERS = frozenset(_SETTERS.split())
 """Names that take a value as an address does: `CR=5`. They are words, other names that get a value are variables."""
+
+POLAR = frozenset({"AP", "RP"})
+"""Polar coordinates: angle and radius about the pole."""
 
 ABSOLUTE, INCREMENTAL = "ac", "ic"
 TURNING = frozenset({"dc", "acp", "acn"})
@@ -52,7 +57,13 @@ _HARMLESS = """
     cancel cycle832 group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
     coupdef coupdel coupon coupof couponc coupofs waitc ctabdef ctabend ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
+    oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
     drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
+    workpiece setpiece norm kont sons cprecon cprecof diamcycof spath lftxt lfwp lfpos clearm init start isvar
+    tangof tangdel tlift cut3dcc cut3dccd cut2dd cut2dfd cut3dcd cut3dfd rmbbl rmibl rmebl rmnbl
+    osof osc oss osse osd ost
+    towstd towmcs towwcs towbcs towtcs towkcs walcs4 walcs5 walcs6 walcs7 walcs8 walcs9 walcs10
+    iptrlock iptrunlock actblocno extopen extclose protdef cprot cprotdef nprot nprotdef
 """
 HARMLESS = frozenset(_HARMLESS.split())
 """Names that move no geometry axis and change no coordinates: passed over."""
@@ -96,6 +107,7 @@ UNFOLLOWED = {
     "ptpg0": "motion from point to point (PTPG0)",
     "ptpwoc": "motion from point to point (PTPWOC)",
     "extcall": "a program from elsewhere (EXTCALL)",
+    "call": "a program that is named by a text (CALL)",
     "isocall": "a program in another language (ISOCALL)",
     **dict.fromkeys(("diamona", "diamofa", "diam90a", "diamchan", "diamchana"), "diameters axis by axis (DIAMONA)"),
 }
@@ -106,11 +118,29 @@ ENDS = frozenset({"trafoof", "torotof", "parotof", "cp"})
 
 ASYNCHRONOUS = {
     "posa": "a positioning axis that the program does not wait for (POSA)",
+    "posp": "a positioning axis that goes in steps (POSP)",
+    "ax": "an axis that is named by a variable (AX)",
     "os": "an axis that oscillates (OS)",
     "mov": "an axis that is started (MOV)",
     "oscill": "an axis that oscillates (OSCILL)",
 }
 """Names that with an axis as index, `OS[Z]=1`, let it move by itself."""
+
+UNSEEN = {
+    "fxs": "travel to a fixed stop (FXS)",
+    "g": "a G code that is named by its group (G[..])",
+}
+"""Names that with an index change what motions after them do, in a way that is not followed."""
+
+OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_dp|tc_carr|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$")
+"""Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
+
+TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})
+TURNS_OF_THE_TOOL |= {"oriconcw", "oriconccw", "oriconio", "oriconto"}
+"""How the tool turns between two blocks: the names of one group of G codes."""
+
+PROBING = frozenset({"measa", "meawa", "meac"})
+"""Names that with an axis as index let the motion of the block measure."""
 
 DRILLING = frozenset({*(f"cycle{number}" for number in range(81, 90)), "cycle840"})
 """Cycles whose first arguments are RTP, RFP, SDIS, DP, DPR and that drill where the axes stand."""

@@ -1,0 +1,47 @@
+"""Names that get a value and are no variables: axes that move by themselves, probing, data of the control."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.coordinates import INDEX
+from ncfix.program.sinumerik.destination import End, Words
+from ncfix.program.sinumerik.plans import Letting
+from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.vocabulary import ASYNCHRONOUS, OF_THE_CONTROL, PROBING, UNSEEN
+
+if TYPE_CHECKING:
+    from ncfix.program.sinumerik.statements import Turn
+
+AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
+GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
+BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE
+"""What with an axis as index lets it move on its own, `POS[X]=100`."""
+
+
+def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
+    """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
+    name = step.index[0](control) if step.index else None
+    known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
+    gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.machine
+    if not gone:
+        return
+    why = ASYNCHRONOUS.get(step.name, "a positioning axis (POS)")
+    if step.name in GO_SOMEWHERE:
+        still = Words(turn.words.block, {}, {}, sum(1 << index for index in gone))
+        lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
+        control.go(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why)
+    else:
+        control.refusal = control.refusal or f"{why} is not followed"
+
+
+def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:
+    """A name that gets a value and is no variable, or one with which the control changes."""
+    if OF_THE_CONTROL.match(step.name):
+        why = f"the program sets {step.name.upper()}, which may change coordinates or tool lengths"
+        control.refusal = control.refusal or why
+    elif step.name in PROBING:
+        turn.special.add("meas")
+    elif step.name in UNSEEN and step.index:
+        control.refusal = control.refusal or f"{UNSEEN[step.name]} is not followed"
