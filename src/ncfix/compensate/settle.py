@@ -17,6 +17,7 @@ from ncfix.compensate.budget import Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.idle import without_idle
 from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
@@ -107,6 +108,10 @@ def settle(
     done = None if before is None else before.position
     while True:
         emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done)
+        moving = without_idle(moves, agreed.plan.pieces, emission, 0 if done is None else 1)
+        if moving is not agreed.plan.pieces:
+            agreed = replace(agreed, plan=replace(agreed.plan, pieces=moving))
+            continue
         if not emission.conflicts:
             return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons)
         if emission.conflicts.keys() <= agreed.reasons.keys():
