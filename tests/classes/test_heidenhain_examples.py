@@ -140,13 +140,20 @@ def test_cycle_19_is_understood_by_where_the_axes_stand(root: Path) -> None:
         ("PLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX COORD ROT", True),
         ("PLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX TABLE ROT", False),
         ("L C+10 FMAX\nPLANE SPATIAL SPA+0 SPB+0 SPC+30 TURN FMAX", False),
-        ("L C+10 FMAX\nPLANE RESET TURN FMAX", False),
-        ("L C+10 FMAX\nPLANE RESET TURN FMAX\nL B+0 C+0 FMAX\nL X+5 Y+6 Z+7 FMAX", True),
+        ("L C+10 FMAX\nPLANE RESET TURN FMAX", True),
+        ("L C+10 FMAX\nPLANE RESET STAY\nL B+0 C+0 FMAX\nL X+5 Y+6 Z+7 FMAX", True),
     ],
 )
 def test_an_axis_that_is_free_to_turn_stands_where_nobody_knows(root: Path, way: str, known: bool) -> None:
     moves = moves_of(root, program(way, "L X+5 Y+6 Z+7 FMAX"))
     assert bool(moves.rule[-1] == 0) is known
+
+
+@pytest.mark.parametrize("word", ["TURN FMAX", "MOVE DIST50 F1000", "TURN MB MAX FMAX"])
+def test_the_rotary_axes_go_to_zero_where_plane_reset_turns_them(root: Path, word: str) -> None:
+    moves = moves_of(root, program("L B+40 C+30 FMAX", f"PLANE RESET {word}", "L X+5 Y+6 Z+7 FMAX"))
+    assert moves.rule[-1] == 0
+    assert moves.end[-1][moves.rotary].tolist() == [0, 0]
 
 
 def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: Path) -> None:

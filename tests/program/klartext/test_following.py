@@ -157,7 +157,7 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("CYCL DEF 8.0 M\nCYCL DEF 8.1 X\nCYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+30\nL X+1 Y+0 Z+0", "mirror and rotation"),
         ("CYCL DEF 26.0 S\nCYCL DEF 26.1 X 0.5 Y 1\nL X+1", "single axes"),
         ("CYCL DEF 7.0 D\nCYCL DEF 7.1 #5\nL X+1", "from a table"),
-        ("CYCL DEF 251 POCKET Q218=60\nL X+1 Y+1 M99", "cycle 251 makes a path"),
+        ("CYCL DEF 22 ROUGH-OUT Q10=5\nL X+1 Y+1 M99", "cycle 22 makes a path"),
         ("L X+Q1", "known only at run time"),
         ("FC DR+ R5 X+10", "free contour"),
         ("TOOL CALL 1 Y\nL X+1", "tool axis is Y"),

@@ -91,6 +91,39 @@ def test_a_table_of_datums_by_trans() -> None:
     assert found[2][0] == Rule.CORRECT
 
 
+POCKET = "CYCL DEF 251 POCKET ~\n Q218=+60 ~\n Q201=-20 ~\n Q200=+2 ~\n Q203=+5 ~\n Q204=+50"
+
+
+def test_a_pocket_is_corrected_at_its_place_and_bottom_which_is_said() -> None:
+    trace = follow(f"L X+1 Y+1 Z+90 FMAX\n{POCKET}\nL X+50 Y+40 FMAX M99\nL X+80 FMAX M99\nL X+5 Y+6 FMAX")
+    moves = trace.moves
+    assert moves.kind.tolist() == [Kind.RAPID, Kind.CYCLE, Kind.CYCLE, Kind.RAPID]
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
+    assert moves.end[1].tolist() == [50, 40, -15]
+    assert moves.end[3].tolist() == [5, 6, 55]
+    assert [message.code for message in trace.messages] == ["NCF280"]
+
+
+def test_a_pocket_is_written_as_a_hole_is() -> None:
+    lines = fixed(f"L X+1 Y+1 Z+90 FMAX\n{POCKET}\nL X+150 Y+140 FMAX M99").text.decode().splitlines()
+    at = next(k for k, line in enumerate(lines) if "M99" in line)
+    assert lines[at].startswith("L X+150.0")
+    assert lines[at - 1].startswith("FN 1: Q203 = +Q203 + ")
+    assert lines[at + 1].startswith("FN 2: Q203 = +Q203 - ")
+
+
+@pytest.mark.parametrize("call", ["L X+50 Y+40 FMAX M99", "CYCL CALL POS X+50 Y+40 Z+0 FMAX"])
+def test_a_cycle_begins_with_a_rapid_so_it_does_not_matter_where_from(call: str) -> None:
+    drilling = POCKET.replace("251", "200")
+    assert fates(f"L X+1 Y+1 Z+90 FMAX\n{drilling}\nTCH PROBE 0.0 PLANE Q5 X-\n{call}")[-1] == (Rule.CORRECT, "")
+
+
+def test_the_depth_of_an_old_cycle_counts_from_a_height_that_has_to_be_known() -> None:
+    drilling = "CYCL DEF 1.0 PECKING\nCYCL DEF 1.1 SET UP 2\nCYCL DEF 1.2 DEPTH -8"
+    found = fates(f"L X+1 Y+1 Z+90 FMAX\n{drilling}\nTCH PROBE 0.0 PLANE Q5 X-\nL X+50 Y+40 FMAX M99")
+    assert found[-1] == (Rule.REFUSE, "where the axis Z stands after a probing cycle is known only at run time")
+
+
 def test_statements_that_move_nothing() -> None:
     body = 'FUNCTION FEED DWELL TIME0.5\nMONITORING HEATMAP START AS "A"\nSECTION MONITORING STOP\nL X+5 FMAX'
     moves = follow(body).moves

@@ -10,7 +10,7 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.klartext.calculate import Parameters, Scope
 from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
-from ncfix.program.moves import Kind, Kinematics
+from ncfix.program.moves import Kind, Kinematics, Rule
 from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import control as base
 from ncfix.program.rs274 import tcp
@@ -223,6 +223,10 @@ class Control(base.Control):
             self.modal.compensated = before or 41
         super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc)
         self.modal.compensated = before
+
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
+        """As for the RS274 family; a cycle begins with a rapid, so it does not matter where from."""
+        return super()._verdict(Kind.RAPID if kind == Kind.CYCLE else kind, unknown, refusal, passing)
 
     def is_led(self, unknown: Unknown) -> bool:
         """What is not known is so because the control itself has led the axes somewhere."""

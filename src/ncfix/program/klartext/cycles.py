@@ -1,14 +1,15 @@
 """CYCL DEF and what executes cycles: CYCL CALL, M99, M89.
 
-Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom, which is corrected; cycles
-that make a path of their own are refused.
+Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom, which is corrected. Of a
+pocket, a stud or a thread, which the control makes about the place of the call, that place and the bottom are; other
+cycles that make a path of their own are refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.program.klartext.control import BY_DEPTH, FROM_START, PRESET, Control
+from ncfix.program.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, PRESET, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
@@ -21,6 +22,13 @@ from ncfix.program.rs274.faults import Fault
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
 """Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
+
+MILLING = frozenset({251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267})
+"""Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201. A round slot (254) may
+have its place in the cycle."""
+
+MOVED_AS_A_WHOLE = "NCF280"
+AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
 
 OLD_DRILLING = frozenset({1, 2, 17, 18})
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
@@ -42,7 +50,7 @@ BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
 
 NO_PRESET = "the number of the preset is known only at run time"
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
-AFTER_CYCLE = "where the axis {} stands after cycle {number} is not followed"
+AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
 PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
 IN_PLANE = 1 << X | 1 << Y
@@ -163,7 +171,7 @@ def call(control: Control, step: Step) -> None:
     control.use()
     if cycle.number == CALLING:
         control.refusal = control.refusal or CALLED
-    if cycle.number not in DRILLING | OLD_DRILLING:
+    if cycle.number not in DRILLING | MILLING | OLD_DRILLING:
         own_path(control, step)
         return
     control.settle(tuple(control.unknown))
@@ -172,9 +180,12 @@ def call(control: Control, step: Step) -> None:
     axes = polar_axes(control, step.words) if is_polar else step.words.axes
     height = where.inner[Z]
     bottom, clear, refusal = levels(control, height)
-    if cycle.number in OLD_DRILLING and "IZ" in step.words.values:
+    old, by_height = cycle.number in OLD_DRILLING, step.name == "cycl call pos"
+    if (old or by_height) and Z in where.unknown:
+        refusal = refusal or where.unknown[Z].format("Z")
+    if old and "IZ" in step.words.values:
         refusal = refusal or FROM_INCREMENT
-    if step.name == "cycl call pos" and cycle.number in DRILLING:
+    if by_height and not old:
         bottom, clear = bottom + height, clear + height
     drill(control, where, axes, (bottom, clear, refusal))
 
@@ -184,7 +195,7 @@ def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> No
     control.use()
     if control.cycle.number == 0:
         raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
-    if places is None or control.cycle.number not in DRILLING:
+    if places is None or control.cycle.number not in DRILLING | MILLING:
         reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
         control.refuse_here(reason)
         return
@@ -210,7 +221,11 @@ def drill(control: Control, where: Where, axes: int, heights: tuple[float, float
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
     if refusal == DEPTH_AT_RUN_TIME:
-        over.unknown[Z] = AFTER_CYCLE.replace("{number}", str(control.cycle.number))
+        over.unknown[Z] = AFTER_HOLE
+    if control.cycle.number in MILLING:
+        over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
+        if not refusal:
+            control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
     control.position, control.unknown = command_of(control, over, axes | 1 << Z)
     control.path.tangent = None
 
@@ -241,7 +256,5 @@ def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
 
 def own_path(control: Control, step: Step) -> None:
     """A cycle that is not followed: the position is, and then nothing is known."""
-    number = control.cycle.number
-    refuse(control, OWN_PATH.format(number))
-    lost = AFTER_CYCLE.replace("{number}", str(number))
-    control.lose(range(3), lost)
+    refuse(control, OWN_PATH.format(control.cycle.number))
+    control.lose(range(3), AFTER_CYCLE)

@@ -30,6 +30,7 @@ POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control 
 TURNED = "the control positions the rotary axes (PLANE)"
 WAY = "NCF279"
 WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
+HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"
 RUNTIME = "the tilted plane depends on a Q parameter that is known only at run time"
 NO_KINEMATICS = "the tilted plane is given by the positions of rotary axes (PLANE AXIAL, cycle 19)"
 CALCULATED = ("Q120", "Q121", "Q122")
@@ -108,7 +109,8 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
     control.suspended.pop(TILTED, None)
     if refusal:
         control.suspended[TILTED] = refusal
-    way = None if refusal else chosen_way(control, tilt, flags)
+    home = tilt is None and flags & {"turn", "move"}
+    way = None if refusal else way_home(control) if home else chosen_way(control, tilt, flags)
     for letter, name in zip("ABC", CALCULATED, strict=True):
         known = way is not None and INDEX[letter] in way
         angle = way[INDEX[letter]] - control.offset[INDEX[letter]] if way is not None and known else 0.0
@@ -147,6 +149,16 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
     return ways[0] if ways else None
 
 
+def way_home(control: Control) -> dict[int, float] | None:
+    """PLANE RESET with TURN or MOVE: the rotary axes go to their basic position, zero; None where zero is shifted."""
+    turning = [index for index in control.machine if control.rotary[index]]
+    if any(control.offset[index] for index in turning):
+        return None
+    if any(index in control.unknown or abs(control.position[index]) > NONE for index in turning):
+        control.warn(WAY, HOME, "state the rotary axes in the next block")
+    return dict.fromkeys(turning, 0.0)
+
+
 def way_at_pole(control: Control, way: dict[int, float]) -> dict[int, float] | None:
     """The way to a plane to which the tool is square wherever the axis next to the workpiece stands.
 
@@ -166,10 +178,10 @@ def turn_axes(control: Control, way: dict[int, float] | None) -> None:
     if control.tcp:
         tcp.switch(control, control.offsets.tool, False)
         control.refresh()
-    target = control.position[:]
+    target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle
-    control.move(Kind.RAPID, 0, target, dict(control.unknown), 0, passing=TURNED)
+    control.move(Kind.RAPID, 0, target, unknown, 0, passing=TURNED)
 
 
 def rotary_letters(control: Control) -> str:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from ncfix.program.flatten import TOO_LONG, FlatLine
 from ncfix.program.klartext.calculate import Scope, compiled
 from ncfix.program.klartext.control import Control
-from ncfix.program.klartext.cycles import DRILLING
+from ncfix.program.klartext.cycles import DRILLING, MILLING
 from ncfix.program.klartext.interpreter import Interpreter
 from ncfix.program.klartext.number_text import Style
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
@@ -78,7 +78,7 @@ class Recorder:
                 for place in control.cycle.places
             ]
             return [f"{texts[0]} {codes}".rstrip(), *texts[1:]]
-        if plan.name not in PATTERN_CYCLES or control.cycle.number not in DRILLING:
+        if plan.name not in PATTERN_CYCLES or control.cycle.number not in DRILLING | MILLING:
             return []
         parameters = replace(control.scope.parameters, values=dict(control.scope.parameters.values))
         scope = replace(control.scope, parameters=parameters)
