@@ -1,7 +1,7 @@
 """Whether compiled kernels are to be used: the `fast` extra (numba), from a size of task at which it pays.
 
-Importing numba and its kernels takes longer than a small program. So nothing is compiled until someone who knows that
-there is much to do says `engage`. `NCFIX_NO_FAST=1` forces the plain way; what comes out is the same.
+Loading them takes longer than a small program (see `kernel`). So none is used until someone who knows that there is
+much to do says `engage`. `NCFIX_NO_FAST=1` forces the plain way; what comes out is the same.
 """
 
 from __future__ import annotations

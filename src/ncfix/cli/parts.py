@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 LONG = 4
 """Parts from which on a program is long; a shorter one is read as a whole."""
-COMPILED = 12
+COMPILED = 4
 """Parts from which on compiled kernels save more time than it takes to load them."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""
@@ -41,7 +41,7 @@ def long_from() -> int:
 
 
 def compiled_from() -> int:
-    """Bytes from which on compiled kernels pay: loading them takes most of a second."""
+    """Bytes from which on compiled kernels pay: loading them takes a tenth of a second."""
     return COMPILED * part_bytes()
 
 

@@ -3,21 +3,21 @@
 They do what their plain forms do, operation by operation, so that the results are the same; a test holds them together.
 """
 
-# numba finds out the types.
-# mypy: disable-error-code="untyped-decorator"
-
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ncfix.kernel import Library
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+LIBRARY = Library(__file__)
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@LIBRARY.helper
 def deviation(fraction: Array, command: Array, follow: Array, a: int, b: int) -> float:
     """The largest deviation of the straight piece from node a to node b: as `Grid.deviations`."""
     most = 0.0
@@ -34,10 +34,14 @@ def deviation(fraction: Array, command: Array, follow: Array, a: int, b: int) ->
     return most
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def fewest(counts: Ints, fraction: Array, command: Array, follow: Array, tolerance: float) -> tuple[Mask, Array]:
-    """Which nodes end a piece, and the largest deviation of each motion's pieces: as `split.fewest`."""
-    ends, worst = np.zeros(len(fraction), np.bool_), np.zeros(len(counts))
+@LIBRARY.kernel("i8[:]", "f8[:]", "f8[:,:]", "f8[:,:,:]", "f8", "b1[:]", "f8[:]")
+def fewest(
+    counts: Ints, fraction: Array, command: Array, follow: Array, tolerance: float, ends: Mask, worst: Array
+) -> None:
+    """Mark in `ends`, all False, which nodes end a piece; put down the largest deviation of each motion's pieces.
+
+    As `split.fewest`.
+    """
     first = 0
     for motion in range(len(counts)):
         at, stop, usual = first, first + counts[motion] - 1, 1
@@ -64,4 +68,3 @@ def fewest(counts: Ints, fraction: Array, command: Array, follow: Array, toleran
             worst[motion] = max(worst[motion], reached)
             usual, at = max(near - at - 1, 1), near
         first += counts[motion]
-    return ends, worst

@@ -80,10 +80,10 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
     if fast.engaged() and isinstance(grid, Grid):
         from ncfix.compensate import kernels
 
-        found: tuple[Mask, Array] = kernels.fewest(
-            grid.counts, grid.fraction, grid.command, np.ascontiguousarray(grid.follow), tolerance
-        )
-        return found
+        nodes, motions = np.zeros(len(grid.fraction), dtype=bool), np.zeros(len(grid.counts))
+        follow = np.ascontiguousarray(grid.follow)
+        kernels.fewest(grid.counts, grid.fraction, grid.command, follow, tolerance, nodes, motions)
+        return nodes, motions
     first = offsets(grid.counts)
     ends = np.zeros(int(first[-1]), dtype=bool)
     worst = np.zeros(len(grid.counts))

@@ -4,45 +4,25 @@ The operations and their order are those of the plain way, so that the results a
 holds the two together.
 """
 
-# numba finds out the types.
-# mypy: disable-error-code="untyped-decorator"
-
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-from numba import njit
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from ncfix.kernel import Library
 from ncfix.machine import aim_loops, loops, steps
 
 Array = NDArray[np.float64]
 
-for function in (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS):
-    register_jitable(function)
-# Without the runtime that keeps account of arrays, which would take most of the time: loops make none.
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+LIBRARY = Library(__file__, (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS))
+ROUTE = "i8[:]", "f8[:]"
+COLUMNS = loops.Columns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
+
+tips = LIBRARY.kernel(*ROUTE, COLUMNS, "f8[:,:]", "f8[:,:]")(loops.tips)
+aim = LIBRARY.kernel(ROUTE, ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:,:]")(aim_loops.aim)
 
 
-def kept(loop: Callable[..., None]) -> Any:
-    """A loop compiled, and kept on the disk until a file that it is made of changes: numba looks at its own only."""
-    kernel = njit(**OPTIONS)(loop)
-    file = getattr(kernel._cache, "_cache_file", None)
-    if file is not None:
-        states = (Path(str(module.__file__)).stat() for module in (steps, loops, aim_loops))
-        file._source_stamp = tuple((state.st_mtime, state.st_size) for state in states)
-    return kernel
-
-
-tips = kept(loops.tips)
-aim = kept(aim_loops.aim)
-
-
-@njit(inline="always")
+@LIBRARY.helper
 def small_turn(u: float, v: float, w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """By how much a small rotation vector moves the end of an arm: as `transport.rotated_by`."""
     s = (u * u + v * v) + w * w
@@ -53,10 +33,9 @@ def small_turn(u: float, v: float, w: float, x: float, y: float, z: float) -> tu
     return first * ox + second * tx, first * oy + second * ty, first * oz + second * tz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weight: Array) -> Array:
+@LIBRARY.kernel("f8[:]", "f8[:]", "f8[:]", "f8[:]", "f8[:,:,:]", "f8[:]", "f8[:,:,:]")
+def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weight: Array, out: Array) -> None:
     """Columns (3, m, n) of weights (m,) after a rotary axis with direction d through p has turned."""
-    out = np.empty_like(moved)
     dx, dy, dz = d[0], d[1], d[2]
     for i in range(moved.shape[1]):
         px, py, pz = p[0] * weight[i], p[1] * weight[i], p[2] * weight[i]
@@ -69,13 +48,11 @@ def advanced(d: Array, p: Array, sine: Array, versine: Array, moved: Array, weig
             out[0, i, k] = (x + s * ox) + v * tx
             out[1, i, k] = (y + s * oy) + v * ty
             out[2, i, k] = (z + s * oz) + v * tz
-    return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def forth(r: Array, t: Array, c: Array, moved: Array, weight: Array) -> Array:
+@LIBRARY.kernel("f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:,:]", "f8[:]", "f8[:,:,:]")
+def forth(r: Array, t: Array, c: Array, moved: Array, weight: Array, out: Array) -> None:
     """Columns (3, m, n) after small motions r, t (3, n) about c (3, n): as `SmallMotion.forth`."""
-    out = np.empty_like(moved)
     for i in range(moved.shape[1]):
         w = weight[i]
         for k in range(moved.shape[2]):
@@ -84,13 +61,11 @@ def forth(r: Array, t: Array, c: Array, moved: Array, weight: Array) -> Array:
             out[0, i, k] = (x + dx) + t[0, k] * w
             out[1, i, k] = (y + dy) + t[1, k] * w
             out[2, i, k] = (z + dz) + t[2, k] * w
-    return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def back(r: Array, t: Array, c: Array, moved: Array, weight: Array) -> Array:
+@LIBRARY.kernel("f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:,:]", "f8[:]", "f8[:,:,:]")
+def back(r: Array, t: Array, c: Array, moved: Array, weight: Array, out: Array) -> None:
     """The inverse: as `SmallMotion.back`."""
-    out = np.empty_like(moved)
     for i in range(moved.shape[1]):
         w = weight[i]
         for k in range(moved.shape[2]):
@@ -99,13 +74,11 @@ def back(r: Array, t: Array, c: Array, moved: Array, weight: Array) -> Array:
             out[0, i, k] = x + dx
             out[1, i, k] = y + dy
             out[2, i, k] = z + dz
-    return out
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def turned(r: Array, first: float, second: float, c: Array, moved: Array, weight: Array) -> Array:
+@LIBRARY.kernel("f8[:]", "f8", "f8", "f8[:]", "f8[:,:,:]", "f8[:]", "f8[:,:,:]")
+def turned(r: Array, first: float, second: float, c: Array, moved: Array, weight: Array, out: Array) -> None:
     """Columns (3, m, n) after one rotation r with its factors about c: as `SmallMotion.forth` without translation."""
-    out = np.empty_like(moved)
     u, v, w = r[0], r[1], r[2]
     for i in range(moved.shape[1]):
         cx, cy, cz = c[0] * weight[i], c[1] * weight[i], c[2] * weight[i]
@@ -117,4 +90,3 @@ def turned(r: Array, first: float, second: float, c: Array, moved: Array, weight
             out[0, i, k] = x + (first * ox + second * tx)
             out[1, i, k] = y + (first * oy + second * ty)
             out[2, i, k] = z + (first * oz + second * tz)
-    return out

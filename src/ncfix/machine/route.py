@@ -83,8 +83,8 @@ class Route:
         n = poses.positions.shape[1]
         given = self.terms.given(poses)
         others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
-        positions, length = np.ascontiguousarray(poses.positions), np.ascontiguousarray(poses.tool_length)
-        return Columns(positions, *turns, others, length)
+        rows = (np.ascontiguousarray(each) for each in (poses.positions, *turns, others, poses.tool_length))
+        return Columns(*rows)
 
     def turns(self, poses: Poses) -> Turns:
         """Sines and versines by columns, (n_axes + k, n): of the rotary axes, and of the k held by their ranges."""

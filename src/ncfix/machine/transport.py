@@ -48,7 +48,9 @@ def advance(axis: Axis, position: Array, moved: Array, weight: Weight = 1.0) -> 
         from ncfix.machine import kernels
 
         constants = np.array(axis.direction, dtype=np.float64), np.array(axis.point, dtype=np.float64)
-        return kernels.advanced(*constants, np.sin(position), versine(position), moved, _weights(moved, weight))
+        out = np.empty_like(moved)
+        kernels.advanced(*constants, np.sin(position), versine(position), moved, _weights(moved, weight), out)
+        return out
     arm = moved - np.asarray(axis.point)[:, None, None] * weight
     once = cross_with(axis.direction, arm)
     result: Array = moved + np.sin(position) * once + versine(position) * cross_with(axis.direction, once)
@@ -112,7 +114,9 @@ class SmallMotion:
         if self._varies_like(moved):
             from ncfix.machine import kernels
 
-            return kernels.forth(*self._rows, moved, _weights(moved, weight))
+            out = np.empty_like(moved)
+            kernels.forth(*self._rows, moved, _weights(moved, weight), out)
+            return out
         if self.rotation is not None:
             moved = _turned(self.rotation, self.center, moved, weight)
         return moved if self.translation is None else moved + self.translation * weight
@@ -122,7 +126,9 @@ class SmallMotion:
         if self._varies_like(moved):
             from ncfix.machine import kernels
 
-            return kernels.back(*self._rows, moved, _weights(moved, weight))
+            out = np.empty_like(moved)
+            kernels.back(*self._rows, moved, _weights(moved, weight), out)
+            return out
         if self.translation is not None:
             moved = moved - self.translation * weight
         if self.rotation is not None:
@@ -152,7 +158,9 @@ def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array
 
         first, second = (factor.item() for factor in se3.rotation_factors((vector * vector).sum(0)))
         weights = _weights(moved, weight)
-        return kernels.turned(vector.ravel(), first, second, center.ravel(), moved, weights)
+        out = np.empty_like(moved)
+        kernels.turned(vector.ravel(), first, second, center.ravel(), moved, weights, out)
+        return out
     return moved + rotated_by(vector, moved - center * weight)
 
 

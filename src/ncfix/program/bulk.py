@@ -100,28 +100,37 @@ class Bulk:
     def _compiled(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
         """The same, compiled."""
         from ncfix.program import writing_kernels
+        from ncfix.program.writing_kernels import ROOM
 
         stop = int(self.stop[row])
         if stop == row:
             return None
         program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
-        commands, start, end, length, data, lines = writing_kernels.write(
+        ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), line_end(program.source)
+        axes, edits = len(here), (stop - row) * (len(here) + 1)
+        commands, data = np.empty_like(ends), np.empty(len(ends) * (axes * ROOM + len(end_of_line)), dtype=np.uint8)
+        start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
+        counts = np.zeros(3, dtype=np.int64)
+        done = writing_kernels.write(
             np.frombuffer(program.source, dtype=np.uint8),
             (program.blocks, self.moves.block[row:stop], program.first_number, program.template),
             (program.numbers, program.number_spans),
             (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
-            self.pieces.end[pieces[0] : pieces[-1]],
+            ends,
             pieces - pieces[0],
-            position,
+            here,
             (frame.frame.offset, frame.scale),
             (decimals, _halves(decimals)),
-            np.frombuffer(line_end(program.source), dtype=np.uint8),
+            np.frombuffer(end_of_line, dtype=np.uint8),
+            (commands, start, end, length, data),
+            (np.empty(axes), np.empty(axes), np.empty(axes, dtype=np.bool_), counts),
         )
-        if not len(commands):
+        if not done:
             return None
-        self.parts.append(Splices(start, end, length, data.tobytes()))
+        edits, size, lines = counts.tolist()
+        self.parts.append(Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes()))
         self.added += lines
-        return np.asarray(commands)
+        return commands[:done]
 
 
 def _halves(decimals: IntArray) -> FloatArray:

@@ -3,31 +3,32 @@
 It finds what `shapes.scan` finds, to the last bit; a test holds the two together.
 """
 
-# numba finds out the types.
-# mypy: disable-error-code="untyped-decorator"
-
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ncfix.kernel import Library
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Tables = tuple[Bytes, Mask, Mask, Mask]
+
+LIBRARY = Library(__file__)
 
 POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
 OFFSET, PRIME = np.uint64(14695981039346656037), np.uint64(1099511628211)
 """Of the hash FNV-1a."""
 UNTOUCHED = -1
-"""Instead of the number of blocks scanned: there is one that must be taken as it is."""
+"""Instead of the number of shapes: there is a block that must be taken as it is."""
 NONE, BROKEN = -1, -2
 LITERAL, NUMERIC, SIGN, COMMENT, ODD = range(5)
 """Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
     """Where the last character before a place is that is no blank: as `numbers.last_before`."""
     at = place - 1
@@ -37,7 +38,7 @@ def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
     return at
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def run_of(text: Bytes, place: int, stop: int) -> tuple[int, int, int, int, np.uint64]:
     """A run of digits and points: where it ends, its points, digits, decimals, and its digits as a whole number."""
     begin, points, point, mantissa = place, 0, stop, np.uint64(0)
@@ -55,14 +56,14 @@ def run_of(text: Bytes, place: int, stop: int) -> tuple[int, int, int, int, np.u
     return place, points, place - begin - points, decimals, mantissa
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def takes_sign(text: Bytes, at: int, unsigned_after: Mask, blank: Mask, blanks: int) -> bool:
     """Whether the sign at a place belongs to the number after it."""
     further = before(text, at, blank, blanks)
     return not unsigned_after[text[further] if further >= 0 else np.uint8(0)]
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def comment_end(text: Bytes, place: int, stop: int, kinds: Bytes) -> int:
     """Where the comment that begins at a place ends; `NONE` if none does, `BROKEN` if there is something odd in it."""
     tail = text[place] == TAIL
@@ -76,7 +77,7 @@ def comment_end(text: Bytes, place: int, stop: int, kinds: Bytes) -> int:
     return stop if tail else NONE
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def is_last(text: Bytes, place: int, stop: int, blank: Mask) -> bool:
     """Whether nothing but blanks follows in the block."""
     while place < stop and blank[text[place]]:
@@ -84,16 +85,7 @@ def is_last(text: Bytes, place: int, stop: int, blank: Mask) -> bool:
     return place == stop
 
 
-@njit(cache=True, nogil=True)
-def size_of_table(n: int) -> int:
-    """The size of a table of hashes for n shapes: a power of two."""
-    size = 1
-    while size < 2 * n:
-        size *= 2
-    return size
-
-
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def entry(table: Ints, code: np.uint64, shapes: Bytes, begin: int, end: int, starts: Ints) -> np.int64:
     """Where in a table of hashes the shape from `begin` to `end` is, or is to be entered (-1 stands there)."""
     mask = len(table) - 1
@@ -110,26 +102,46 @@ def entry(table: Ints, code: np.uint64, shapes: Bytes, begin: int, end: int, sta
     return at
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.kernel(
+    "u1[:]",
+    "i8[:,:]",
+    ("u1[:]", "b1[:]", "b1[:]", "b1[:]"),
+    ("i8", "i8"),
+    ("i8", "i8", "i8"),
+    "f8[:]",
+    ("i8[:]", "i8[:]", "i8[:]"),
+    ("i8[:,:]", "f8[:]"),
+    ("u1[:]", "i8[:]", "i8[:]"),
+)
 def scan(
-    text: Bytes, blocks: Ints, tables: Tables, blanks: int, digits_most: int, marks: tuple[int, int, int]
-) -> tuple[int, Ints, Ints, Ints, Ints, NDArray[np.float64], Bytes, Ints]:
-    """Scan the blocks of a text.
+    text: Bytes,
+    blocks: Ints,
+    tables: Tables,
+    most: tuple[int, int],
+    marks: tuple[int, int, int],
+    powers: Floats,
+    columns: tuple[Ints, Ints, Ints],
+    numbers: tuple[Ints, Floats],
+    found: tuple[Bytes, Ints, Ints],
+) -> int:
+    """Scan the n blocks of a text; how many shapes there are, or `UNTOUCHED`.
 
     tables  of the 256 bytes: their kinds, and fixed, unsigned_after, blank (see `numbers` and `shapes`)
-    blanks, digits_most   see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
+    most    see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
     marks   of a number, of one without a point, of the comment that ends a block
+    powers  of ten
 
-    Returns how many blocks were scanned, or `UNTOUCHED`; which shape each has, where its last comment begins, and its
-    first number; spans and values of the numbers; the shapes one after the other, and where each begins.
+    Room for results:
+
+    columns  which shape each block has, where its last comment begins (-1: it has none), and (n + 1,) its first number
+    numbers  spans and values
+    found    the shapes one after the other, where each begins, and a table of hashes, all -1, whose size is a power of
+             two
     """
     (kinds, fixed, unsigned_after, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
-    n = len(blocks)
-    group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
-    spans, values = np.empty((len(text) // 2 + 1, 2), np.int64), np.empty(len(text) // 2 + 1)
-    shapes, starts = np.empty(len(text) + 1, np.uint8), np.zeros(n + 1, np.int64)
-    table = np.full(size_of_table(n), -1, np.int64)
-    powers = 10.0 ** np.arange(digits_most + 1)
+    (blanks, digits_most), (group, comment, first), (spans, values) = most, columns, numbers
+    shapes, starts, table = found
+    n, starts[0] = len(blocks), 0
     count, known, end = 0, 0, 0
     for block in range(n):
         first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
@@ -143,7 +155,7 @@ def scan(
                 leader = text[at] if at >= 0 else np.uint8(0)
                 if not fixed[leader]:
                     if points > 1 or digits == 0 or digits > digits_most:
-                        return UNTOUCHED, group, comment, first, spans, values, shapes, starts
+                        return UNTOUCHED
                     start, value = place, float(mantissa) / powers[decimals]
                     if kinds[leader] == SIGN and takes_sign(text, at, unsigned_after, blank, blanks):
                         start, value = at, -value if leader == MINUS else value
@@ -160,7 +172,7 @@ def scan(
             elif kind == SIGN:
                 code_at_sign, end_at_sign = code, end
             if kind == ODD:
-                return UNTOUCHED, group, comment, first, spans, values, shapes, starts
+                return UNTOUCHED
             while True:
                 shapes[end] = character
                 code = (code ^ np.uint64(character)) * PRIME
@@ -168,11 +180,11 @@ def scan(
                 if place >= past:
                     break
                 character = text[place]
-        found = entry(table, code, shapes, begin, end, starts)
-        if table[found] < 0:
-            table[found] = known
+        slot = entry(table, code, shapes, begin, end, starts)
+        if table[slot] < 0:
+            table[slot] = known
             known += 1
             starts[known] = end
-        group[block] = table[found]
+        group[block] = table[slot]
     first[n] = count
-    return n, group, comment, first, spans[:count], values[:count], shapes, starts[: known + 1]
+    return known

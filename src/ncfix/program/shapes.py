@@ -20,6 +20,7 @@ from ncfix.program.numbers import (
     EXACT_DIGITS,
     NUMERIC,
     POINT,
+    POWERS,
     SIGN,
     UNSIGNED_AFTER,
     fill,
@@ -123,15 +124,26 @@ def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless:
     for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (ODD, kernels.ODD)):
         kinds[members] = kind
     kinds[list(b"(;")] = kernels.COMMENT
-    tables = kinds, FIXED, UNSIGNED_AFTER, BLANK
-    marks = NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK
-    done, group, comment, first, spans, values, shapes, starts = kernels.scan(
-        text, blocks, tables, BLANKS, EXACT_DIGITS, marks
+    n, most = len(blocks), len(text) // 2 + 1
+    group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
+    spans, values = np.empty((most, 2), np.int64), np.empty(most)
+    shapes, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)
+    known = kernels.scan(
+        text,
+        np.ascontiguousarray(blocks),
+        (kinds, FIXED, UNSIGNED_AFTER, BLANK),
+        (BLANKS, EXACT_DIGITS),
+        (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
+        POWERS,
+        (group, comment, first),
+        (spans, values),
+        (shapes, starts, np.full(1 << (2 * n).bit_length(), -1)),
     )
-    if done == kernels.UNTOUCHED:
+    if known == kernels.UNTOUCHED:
         return None
-    keys: list[bytes | None] = [shapes[slice(*edges)].tobytes() for edges in pairwise(starts.tolist())]
-    return Scan(keys, comment, first, spans, values, group)
+    edges, count = starts[: known + 1].tolist(), int(first[n])
+    keys: list[bytes | None] = [shapes[slice(*each)].tobytes() for each in pairwise(edges)]
+    return Scan(keys, comment, first, spans[:count], values[:count], group)
 
 
 def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:

@@ -101,7 +101,9 @@ def spliced(source: bytes, splices: Splices) -> bytes:
         from ncfix.program import writing_kernels
 
         text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
-        return bytes(writing_kernels.spliced(text, start, stop, splices.length, data))
+        out = np.empty(len(source) + len(data) - int((stop - start).sum()), dtype=np.uint8)
+        writing_kernels.spliced(text, start, stop, splices.length, data, out)
+        return out.tobytes()
     kept = ~_cover(len(source), start, stop)
     ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
     out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)

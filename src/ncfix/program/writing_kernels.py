@@ -4,15 +4,12 @@ What `bulk.Stretch` does by columns, with the same operations on each number, so
 holds the two together.
 """
 
-# numba finds out the types.
-# mypy: disable-error-code="untyped-decorator"
-
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ncfix.kernel import Library
 from ncfix.program.number_text import LARGEST, LONGEST, MINUS, MOST_DECIMALS, PLUS, TENS, TIE, ZERO
 from ncfix.program.numbers import POINT, POWERS
 
@@ -24,13 +21,15 @@ Mask = NDArray[np.bool_]
 Changes = tuple[Ints, Ints, Ints]
 """Start, stop and length of edits, as in `Splices`."""
 
+LIBRARY = Library(__file__)
+
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
 ROOM = LONGEST + MOST_STEPS + 4
 """Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
     """Copy some bytes to `at`; where the next one goes."""
     for place in range(start, stop):
@@ -38,7 +37,7 @@ def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
     return at + stop - start
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, bool]:
     """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that."""
     first = start + (text[start] == PLUS or text[start] == MINUS)
@@ -54,7 +53,7 @@ def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, 
     return decimals, point >= 0, text[start] == PLUS, stop - first - decimals - (point >= 0), clear
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def steps_of(value: float, decimals: int) -> int:
     """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
     if decimals > MOST_STEPS:
@@ -65,7 +64,7 @@ def steps_of(value: float, decimals: int) -> int:
     return int(np.rint(steps))
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, point: bool) -> int:
     """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero."""
     whole, fraction = steps // TENS[decimals], steps % TENS[decimals]
@@ -88,7 +87,7 @@ def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, 
     return at + decimals
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def put_in_style(
     data: Bytes, at: int, text: Bytes, start: int, stop: int, value: float, decimals: int
 ) -> tuple[int, float]:
@@ -113,7 +112,7 @@ def put_in_style(
     return put(data, at, steps, most, sign, least, point), read
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> tuple[int, float]:
     """Write a missing word: what stands before its number, and the number with all decimals; -1 if not clear."""
     steps = steps_of(value, decimals)
@@ -127,7 +126,7 @@ def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> t
     return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def put_line(
     data: Bytes,
     at: int,
@@ -159,14 +158,14 @@ def put_line(
     return at if begun == 0 else -1
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def note(changes: Changes, edits: int, start: int, stop: int, length: int) -> int:
     """Note an edit; how many there are."""
     changes[0][edits], changes[1][edits], changes[2][edits] = start, stop, length
     return edits + 1
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def rewrite_words(
     data: Bytes,
     size: int,
@@ -202,7 +201,7 @@ def rewrite_words(
     return edits, size
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def add_words(
     data: Bytes,
     size: int,
@@ -229,7 +228,7 @@ def add_words(
     return edits, size
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def to_numbers(commands: Floats, frame: tuple[Floats, Floats], out: Floats) -> None:
     """What a program writes for commands, (axes,)."""
     offset, scale = frame
@@ -237,7 +236,7 @@ def to_numbers(commands: Floats, frame: tuple[Floats, Floats], out: Floats) -> N
         out[axis] = (commands[axis] - offset[axis]) / scale[axis]
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.helper
 def to_commands(now: Floats, told: Mask, here: Floats, frame: tuple[Floats, Floats], out: Floats) -> None:
     """Commands (axes,) of the numbers `now` of axes that were told to move; the others stay `here`."""
     offset, scale = frame
@@ -245,7 +244,20 @@ def to_commands(now: Floats, told: Mask, here: Floats, frame: tuple[Floats, Floa
         out[axis] = now[axis] * scale[axis] + offset[axis] if told[axis] else here[axis]
 
 
-@njit(cache=True, nogil=True)
+@LIBRARY.kernel(
+    "u1[:]",
+    ("i8[:,:]", "i4[:]", "i8[:]", "i4[:]"),
+    ("f8[:]", "i8[:,:]"),
+    ("i8[:,:]", "i8[:,:]", "i8[:]", "i8[:,:]", "u1[:,:,:]"),
+    "f8[:,:]",
+    "i8[:]",
+    "f8[:]",
+    ("f8[:]", "f8[:]"),
+    ("i8[:]", "f8[:]"),
+    "u1[:]",
+    ("f8[:,:]", "i8[:]", "i8[:]", "i8[:]", "u1[:]"),
+    ("f8[:]", "f8[:]", "b1[:]", "i8[:]"),
+)
 def write(
     text: Bytes,
     blocks: tuple[Ints, Rows, Ints, Rows],
@@ -253,33 +265,30 @@ def write(
     layouts: tuple[Ints, Ints, Ints, Ints, Bytes],
     ends: Floats,
     pieces: Ints,
-    position: Floats,
+    here: Floats,
     frame: tuple[Floats, Floats],
     digits: tuple[Ints, Floats],
     end_of_line: Bytes,
-) -> tuple[Floats, Ints, Ints, Ints, Bytes, int]:
-    """Write motions up to the first one that is not clear.
+    found: tuple[Floats, Ints, Ints, Ints, Bytes],
+    room: tuple[Floats, Floats, Mask, Ints],
+) -> int:
+    """Write motions up to the first one that is not clear; how many pieces are written.
 
     blocks    of the program: their spans, which of them are written (k,), the first number and the shape of each
     numbers   of the program: values and spans
     layouts   slots, by_place, by_letter, anchors, heads of `Layouts`
     ends      (m, axes) commands at the ends of their pieces
     pieces    (k + 1,) the first piece of each motion, and m
-    position  (axes,) where the control stands before
+    here      (axes,) where the control stands before; afterwards where it stands then
     frame     offset and scale (axes,): a command is `offset + scale * number`
     digits    decimals that the least increment needs, and half output steps (axes,)
-
-    Returns the commands at the ends of the pieces written, what changes in the source, as in `Splices`, and how many
-    lines were added.
+    found     room for the commands at the ends of the pieces written, and what changes in the source, as in `Splices`
+    room      for three rows (axes,), and for counts: edits, bytes, and lines that were added
     """
     (edges, rows, first, shapes), (_, spans) = blocks, numbers
     slots, by_place, by_letter, anchors, heads = layouts
-    axes = len(position)
-    most = len(rows) * (axes + 1)
-    changes = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most, np.int64)
-    data = np.empty(len(ends) * (axes * ROOM + len(end_of_line)), np.uint8)
-    commands, here, now = np.empty((len(ends), axes)), position.copy(), np.empty(axes)
-    wanted, told = np.empty(axes), np.empty(axes, np.bool_)
+    (commands, start, stop, length, data), (now, wanted, told, counts) = found, room
+    axes, changes = len(here), (start, stop, length)
     edits, size, done, lines = 0, 0, 0, 0
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
@@ -329,18 +338,16 @@ def write(
         done = last_piece + 1
         for axis in range(axes):
             here[axis] = commands[last_piece, axis]
-    start, stop, length = changes
-    return commands[:done], start[:edits], stop[:edits], length[:edits], data[:size], lines
+    counts[0], counts[1], counts[2] = edits, size, lines
+    return done
 
 
-@njit(cache=True, nogil=True)
-def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes) -> Bytes:
-    """A text with many edits made: as `writer.spliced`."""
-    out = np.empty(len(source) + len(data) - (stop - start).sum(), np.uint8)
+@LIBRARY.kernel("u1[:]", "i8[:]", "i8[:]", "i8[:]", "u1[:]", "u1[:]")
+def spliced(source: Bytes, start: Ints, stop: Ints, length: Ints, data: Bytes, out: Bytes) -> None:
+    """Put a text into `out` with many edits made: as `writer.spliced`."""
     at, done, taken = 0, 0, 0
     for edit in range(len(start)):
         at = copied(out, at, source, done, start[edit])
         at = copied(out, at, data, taken, taken + length[edit])
         done, taken = stop[edit], taken + length[edit]
     copied(out, at, source, done, len(source))
-    return out

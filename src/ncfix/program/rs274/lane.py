@@ -126,10 +126,10 @@ def followed_compiled(
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     incremental = control.modal.incremental
-    path, feed = lane_kernel.followed(
-        numbers, first, shapes, tables.axes, tables.feed, position, (offset, scale), incremental
-    )
-    return path, feed
+    found = np.empty((len(first) + 1, N_LETTERS)), np.empty(len(first))
+    frame = offset, scale
+    lane_kernel.followed(numbers, first, shapes, tables.axes, tables.feed, position, frame, incremental, found)
+    return found
 
 
 def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> FloatArray:
