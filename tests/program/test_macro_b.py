@@ -78,7 +78,7 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
         [[5, 3, 0]],
     ),
     "a subprogram shares them": ("#1=5.\nM98P1L2\nG0X#1\nM30\nO1\n#1=#1+1\nM99", [[7, 0, 0]]),
-    "repeats before the program number": ("M98P30001\nG0X#100\nM30\nO1\n#100=#100+1\nM99", [[3, 0, 0]]),
+    "repeats before the program number": ("#100=0\nM98P30001\nG0X#100\nM30\nO1\n#100=#100+1\nM99", [[3, 0, 0]]),
     "calls within calls": (
         "M98P1\nG0Y1.\nM30\nO1\nM98P2\nG0X2.\nM99\nO2\nG0X1.\nM99",
         [[1, 0, 0], [2, 0, 0], [2, 1, 0]],

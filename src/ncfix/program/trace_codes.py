@@ -230,6 +230,12 @@ TRACE_CODES: dict[str, Code] = {
         "one a control takes depends on its parameters and on its travels; here it is the nearest.",
         "State the rotary axes in the program if they are others.",
     ),
+    "NCF244": Code(
+        "Variable that the program has not set",
+        "Common variables (#100 ... #199, #500 ...) keep what another program or the operator has put there, and those "
+        "of a macro are set by its caller: what stands in them is known only at run time.",
+        'Give the value in the setup file (`variables."#500" = 5.0`), or correct the program that calls the macro.',
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

@@ -13,12 +13,12 @@ from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.corners import CORNER
 from ncfix.program.fanuc.flow import BAD_JUMP, MacroFlow
-from ncfix.program.fanuc.lengths import lone_number
+from ncfix.program.fanuc.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.coordinates import INCH, LETTERS
+from ncfix.program.rs274.coordinates import INCH, LETTERS, Z
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import NON_MODAL, ROTATION
@@ -38,11 +38,18 @@ DRILLING = frozenset("KLQ")
 """K and L may be the repeats of a cycle, Q is the depth of its pecks."""
 SCALED = frozenset("XYZABCUVWIJKRQ")
 NO_UNIT = "NCF215"
+NOT_SET = "NCF244"
 ANGLE = ",A"
 BY_ANGLE = "a line that is given by its angle (,A) is not followed"
 AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
 COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
 NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
+
+
+def is_called(program: Program) -> bool:
+    """Whether a text is no program of its own: it returns (M99) and never ends (M2, M30)."""
+    codes = {code for template in program.templates for code in template.m_codes}
+    return RETURN in codes and codes.isdisjoint(PROGRAM_ENDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +88,8 @@ class MacroInterpreter(Interpreter):
         control.parameters.persistent = lambda number: None
         control.parameters.live = system.getters(control)
         control.parameters.position = self.position_read
+        control.parameters.unset = self.not_set
+        control.parameters.inherits = is_called(self.main.program)
         return MacroFlow(control, self.main, self.find)
 
     def takes_stretches(self) -> bool:
@@ -92,6 +101,11 @@ class MacroInterpreter(Interpreter):
         """The program reads where the machine stands, which compensation changes."""
         text = f"the program reads the position #{number}: on the machine it finds the corrected one there"
         self.control.warn(POSITION_READ, text, "motions that are computed from it are refused")
+
+    def not_set(self, number: int) -> None:
+        """The program reads a variable that somebody else may have set."""
+        text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
+        self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
 
     # -- one block ----------------------------------------------------------------------------------------------------
 
@@ -176,8 +190,12 @@ class MacroInterpreter(Interpreter):
 
     def settings(self, codes: Codes, block: Block) -> None:
         """What a block sets before its motion; H alone sets something, too."""
+        before = self.control.offsets.tool[Z]
         super().settings(codes, block)
         lone_number(self.control, block, codes)
+        changed = self.control.offsets.tool[Z] != before and not codes.takes
+        if changed and self.control.modal.incremental and "Z" in block.values:
+            self.control.lose((Z,), LENGTH_IN_STEPS)
 
     def is_angle(self, letter: str, codes: Codes | None) -> bool:
         """Whether the number of a word counts degrees though its address is none of a rotary axis."""
@@ -215,11 +233,11 @@ class MacroInterpreter(Interpreter):
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""
         before = self.control.builder.count
-        if not self.unit_said:
-            text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
-            self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
         super().move(block, codes, motion)
         self.moved = self.control.builder.count > before
+        if self.moved and not self.unit_said:
+            text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
+            self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
 
     # -- calls and ends -----------------------------------------------------------------------------------------------
 

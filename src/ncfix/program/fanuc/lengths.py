@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 LENGTH_ALONE = "NCF214"
 ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
+LENGTH_IN_STEPS = "where the axis {} stands after a tool length together with an increment (G91) is not certain"
 NO_NUMBER = "NCF217"
 SPINDLE = "a tool length without H is taken as that of the tool in the spindle"
 TURNED = "NCF218"

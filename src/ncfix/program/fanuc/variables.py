@@ -38,11 +38,15 @@ class Variables(Parameters):
     setters   what happens when the program sets a variable of the control
     assigned  called with the number of a variable of the control that was set and that nothing follows
     position  called when the program reads where the machine stands
+    unset     called with the number of a common variable, or one that a caller gives, that is read and was never set
+    inherits  the program is called by another one: so are its local variables set
     """
 
     setters: dict[int, Callable[[float, bool], None]] = field(default_factory=dict)
     assigned: Callable[[int], None] = lambda index: None
     position: Callable[[int], None] = lambda index: None
+    unset: Callable[[int], None] = lambda index: None
+    inherits: bool = False
 
     def numbered(self, index: int) -> float:
         """The value of `#index`, vacant if it has none; raises `Fault`."""
@@ -53,9 +57,17 @@ class Variables(Parameters):
         store = self.store_of(index)
         if index in self.live:
             return self.from_control(index)
+        if index not in store.values and self.is_left_over(index):
+            self.unset(index)
+            self.touched = True
+            return 0.0
         if index in store.runtime or (is_system(index) and index not in store.values):
             self.touched = True
         return store.values.get(index, 0.0 if is_system(index) else VACANT)
+
+    def is_left_over(self, index: int) -> bool:
+        """Whether a variable that the program has not set may have a value from another program."""
+        return any(index in numbers for numbers in COMMON) or (self.inherits and len(self.scopes) == 1)
 
     def from_control(self, index: int) -> float:
         """A value that the control computes; a position is not what it will be when the program is corrected."""
