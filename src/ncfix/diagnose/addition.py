@@ -8,9 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
-from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.groups import Group
 from ncfix.machine import Effect, Machine
@@ -69,9 +67,9 @@ def fitted(court: Court, members: Sequence[Member], share: float, stay: Mask | N
     widths = [part.shape[1] for part in parts_of]
     own = [np.full(width, m.size**-2) for m, width in zip(members, widths, strict=True)]
     prior = np.concatenate([np.full(n, WIDE**-2), *own])
-    factor = cho_factor(court.background.covariance(share))
-    z, spread = _solved(columns, y, factor, prior)
-    alone, _ = _solved(base, y, factor, prior[:n])
+    precision = court.background.precision(share)
+    z, spread = _solved(columns, y, precision, prior)
+    alone, _ = _solved(base, y, precision, prior[:n])
     parts = [slice(a, b) for a, b in pairwise(n + np.cumsum([0, *widths]))]
     numbers = tuple(z[part] for part in parts)
     shown = tuple(part @ own_numbers for part, own_numbers in zip(parts_of, numbers, strict=True))
@@ -116,13 +114,13 @@ def firm(court: Court, members: Sequence[Member], share: float, joint: Joint) ->
     A constant that the data hardly see takes any value that helps a little, and would do harm at other poses.
     """
     stay = np.abs(moved(court, joint)) <= FIRM * joint.sigmas
-    held, factor = fitted(court, members, share, stay), cho_factor(court.background.covariance(share))
-    worse, count = _misfit(held.after, factor) - _misfit(joint.after, factor), int(stay.sum())
+    held, precision = fitted(court, members, share, stay), court.background.precision(share)
+    worse, count = _misfit(held.after, precision) - _misfit(joint.after, precision), int(stay.sum())
     return joint if worse > count + FIRM * np.sqrt(2 * count) else held
 
 
-def _misfit(residual: Array, factor: tuple[Array, bool]) -> float:
-    return float(residual @ cho_solve(factor, residual))
+def _misfit(residual: Array, precision: Array) -> float:
+    return float(residual @ precision @ residual)
 
 
 def _lengths(columns: Array) -> Array:
@@ -131,15 +129,11 @@ def _lengths(columns: Array) -> Array:
     return np.where(size > 0, size, 1.0)
 
 
-def _solved(columns: Array, y: Array, factor: tuple[Array, bool], prior: Array) -> tuple[Array, Array]:
-    weighed = cho_solve(factor, columns)
+def _solved(columns: Array, y: Array, precision: Array, prior: Array) -> tuple[Array, Array]:
+    weighed = precision @ columns
     spread = np.linalg.inv(columns.T @ weighed + np.diag(prior))
-    return spread @ (weighed.T @ y), spread
-
-
-def likeliest_share(null: Array) -> float:
-    """The share of everything that the members leave."""
-    return SHARES[int(null.argmax())]
+    found: Array = spread @ (weighed.T @ y)
+    return found, np.asarray(spread)
 
 
 def machine_with(court: Court, members: Sequence[Member], joint: Joint) -> tuple[Machine, list[tuple[Effect, ...]]]:

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import eigh, solve_triangular
 
 from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
@@ -27,7 +28,8 @@ SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
 PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
-NONE = 1e-9
+SOME = 0.35
+"""The same while it is asked how much the instrument wanders."""
 WEAK = 1.0
 """Degrees of freedom of what is known of the noise where nothing is."""
 KNOWN = 200.0
@@ -45,8 +47,8 @@ class Background:
     sigma     um, standard deviation of one plain value before anything was looked at
     freedom   degrees of freedom of that; the data have n of their own
     wander    size of the instrument's wandering against the noise
-    everything  (m, p) columns of a little of everything, in units of each value's noise
-    slow      (m, m) correlation of the wandering in the same units
+    everything  (m, m) covariance of a little of everything at 1 um, um^2
+    slow      (m, m) correlation of the wandering, in units of each value's noise
     """
 
     view: View
@@ -58,13 +60,17 @@ class Background:
     wander: float
     everything: Array
     slow: Array | None
+    precisions: dict[float, Array] = field(default_factory=dict)
 
-    def covariance(self, share: float) -> Array:
-        """Covariance of all values with this share of everything, um^2, (m, m)."""
-        inner = np.eye(len(self.relative)) + share**2 * (self.everything @ self.everything.T)
-        if self.slow is not None:
-            inner = inner + self.wander**2 * self.slow
-        return self.sigma**2 * self.relative[:, None] * inner * self.relative
+    def precision(self, share: float) -> Array:
+        """The inverse of the covariance of all values with this share of everything, um^-2, (m, m); computed once."""
+        if share not in self.precisions:
+            inner = np.eye(len(self.relative)) + share**2 * in_noise(self.everything, self.relative)
+            if self.slow is not None:
+                inner = inner + self.wander**2 * self.slow
+            scale = self.sigma * self.relative
+            self.precisions[share] = np.linalg.inv(inner) / scale[:, None] / scale
+        return self.precisions[share]
 
     def seen(self, columns: Array) -> Array:
         """Columns (m, p) or values (m,) um in the coordinates, in units of `sigma`."""
@@ -76,30 +82,30 @@ class Background:
         return 1.0 + share**2 * self.spectrum
 
 
-def background(view: View, groups: Sequence[Group], relative: Array, wanders: bool = True) -> Background:
+def in_noise(covariance: Array, relative: Array) -> Array:
+    """A covariance in units of each value's noise."""
+    scaled: Array = covariance / relative[:, None] / relative
+    return scaled
+
+
+def background(view: View, everything: Array, relative: Array) -> Background:
     """Estimate how much the instrument wanders and find the coordinates."""
     sigma, freedom = _noise(view)
     left = _contrasts(view.base / relative[:, None])
-    everything = _everything(view, groups, relative)
-    y = left.T @ (view.y / relative) / sigma
-    inner = left.T @ everything
-    inner = inner @ inner.T
-    slow, wander, chosen = (_wandering(view, relative) if wanders else None), 0.0, np.eye(left.shape[1])
+    slow, wander = _wandering(view, relative), 0.0
+    little = in_noise(everything, relative)
+    inner = left.T @ little @ left
     if slow is not None:
-        seen = left.T @ slow @ left
-        wander = max(WANDER, key=lambda size: _likelihood(y, chosen + size**2 * seen + _some(inner), freedom))
+        seen, own = left.T @ slow @ left, np.eye(left.shape[1]) + SOME**2 * inner
+        y = left.T @ (view.y / relative) / sigma
+        wander = max(WANDER, key=lambda size: _likelihood(y, own + size**2 * seen, freedom))
     if wander and slow is not None:
-        factor = np.linalg.cholesky(chosen + wander**2 * seen)
-        left = np.linalg.solve(factor, left.T).T
-        inner = left.T @ everything
-        inner = inner @ inner.T
-    spectrum, vectors = np.linalg.eigh(inner)
+        factor = np.linalg.cholesky(np.eye(left.shape[1]) + wander**2 * seen)
+        left = solve_triangular(factor, left.T, lower=True).T
+        inner = left.T @ little @ left
+    spectrum, vectors = eigh(inner, driver="evd")
     rotation = (left @ vectors) / relative[:, None]
     return Background(view, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, wander, everything, slow)
-
-
-def _some(inner: Array) -> Array:
-    return 0.35**2 * inner
 
 
 def _noise(view: View) -> tuple[float, float]:
@@ -117,15 +123,17 @@ def _contrasts(base: Array) -> Array:
     return contrasts
 
 
-def _everything(view: View, named: Sequence[Group], relative: Array) -> Array:
-    """A little of every candidate: columns whose sum of squares is that of 1 um, each name with the same share.
+def everything_of(view: View, named: Sequence[Group]) -> Array:
+    """The covariance of a little of every candidate, of 1 um together, each name with the same share, um^2, (m, m).
 
     But nothing of the constants that the machine file lacks: those are looked for, not taken for granted.
     """
     groups = [group for group in named if not group.owner.constant]
     forms = Counter(group.owner.name for group in groups)
     parts = [group.columns / np.sqrt(forms[group.owner.name] * len(forms)) for group in groups]
-    return apart(view, np.concatenate([np.zeros((len(relative), 0)), *parts], axis=1), named) / relative[:, None]
+    columns = apart(view, np.concatenate([np.zeros((len(view.y), 0)), *parts], axis=1), named)
+    covariance: Array = columns @ columns.T
+    return covariance
 
 
 def _wandering(view: View, relative: Array) -> Array | None:
@@ -136,14 +144,13 @@ def _wandering(view: View, relative: Array) -> Array | None:
     own = time[np.maximum(view.row, 0)]
     alike = (view.component[:, None] == view.component) & (view.row[:, None] >= 0)
     lasting = np.where(alike, np.exp(-np.abs(own[:, None] - own) / LASTING), 0.0)
-    slow: Array = lasting / relative[:, None] / relative
-    return slow
+    return in_noise(lasting, relative)
 
 
 def _likelihood(y: Array, covariance: Array, freedom: float) -> float:
     """Log likelihood with the scale integrated out."""
     factor = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(factor, y)
+    white = solve_triangular(factor, y, lower=True)
     return marginal(float(white @ white), 2 * float(np.log(np.diag(factor)).sum()), len(y), freedom)
 
 

@@ -45,13 +45,15 @@ def _nothing(machine: Machine) -> Selection:
 
 def sensible(measurements: Sequence[Measurement], machine: Machine) -> None:
     """Refuse what no mistake explains. Raises `UsageError` NCF654, NCF655."""
-    now = misfit(measurements, machine, tight_um=AS_IT_STANDS_UM)
-    if now.free > STRANGE_UM:
-        text = f"{now.free:.0f} um rms are left after the set-up was fitted"
+    now = misfit(measurements, machine)
+    free = now.free
+    if free > STRANGE_UM:
+        text = f"{free:.0f} um rms are left after the set-up was fitted"
         raise UsageError.of("NCF654", text, hint="a measurement of another machine, or exchanged columns?")
-    bare = misfit(measurements, machine.replace(effects=()))
-    if not machine.is_perfect and now.tight > WORSE * bare.tight and bare.tight > 2 * bare.noise:
-        text = f"with its errors the file leaves {now.tight:.1f} um rms, without any {bare.tight:.1f} um"
+    left, bare = now.left(AS_IT_STANDS_UM), misfit(measurements, machine.replace(effects=()))
+    without = bare.left()
+    if not machine.is_perfect and left > WORSE * without and without > 2 * bare.noise:
+        text = f"with its errors the file leaves {left:.1f} um rms, without any {without:.1f} um"
         raise UsageError.of("NCF655", text, hint="calibrate the machine anew before anything is added")
 
 
@@ -89,11 +91,15 @@ def agreeing(view: View, residual: Array, sigma: float) -> None:
 
 
 def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
-    """What the user should know: directions that never change, names that do not exist."""
+    """What the user should know: directions that never change or are not said, names that do not exist."""
     found = []
+    for axis in view.machine.axes:
+        if silent := view.unstated(axis):
+            text = f"{', '.join(silent)} does not say from where {axis.name} came, other files do"
+            found.append(Message("NCF658", f"{text}: its backlash and play are not among the candidates"))
     stated = {name for each in view.measurements for name in each.columns if name.startswith("dir_")}
     fixed = [axis.name for axis in view.machine.axes if view.reach.moved(axis) and f"dir_{axis.name}" in stated]
-    fixed = [name for name in fixed if f"dir_{name}" not in view.reach.columns]
+    fixed = [name for name in fixed if np.ptp(view.column(f"dir_{name}")) == 0]
     if fixed:
         text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
         found.append(Message("NCF653", f"{text} cannot show"))

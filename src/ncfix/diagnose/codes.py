@@ -49,4 +49,10 @@ CODES = {
         "a name that the catalogue does not have",
         "`--without` names an effect that is not in the catalogue of this machine; nothing was left out for it.",
     ),
+    "NCF658": Code(
+        "a file does not say from where an axis came",
+        "Some of the files have the direction of approach of an axis, another one that moved it has not. What depends "
+        "on the direction would be wrong for that file's rows, so it is not looked for.",
+        "Give that file the column `dir_` of the axis, or diagnose the others without it.",
+    ),
 }

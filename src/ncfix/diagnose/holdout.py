@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from ncfix.diagnose.addition import WIDE
 from ncfix.diagnose.background import Background
@@ -37,33 +36,34 @@ def held_out(court: Court, members: Sequence[Member], share: float) -> HeldOut:
     ground = court.background
     view = ground.view
     cell = cells(scaled(view))[np.maximum(view.row, 0)]
-    base = view.base / np.where((s := np.sqrt((view.base**2).mean(axis=0))) > 0, s, 1.0)
-    free = WIDE**2 * base @ base.T
+    base = WIDE * view.base / np.where((s := np.sqrt((view.base**2).mean(axis=0))) > 0, s, 1.0)
     shown = [court.groups[m.group].columns * m.size for m in members]
-    parts = [each @ each.T for each in shown]
-    models = [[], list(range(len(parts))), *([k for k in range(len(parts)) if k != out] for out in range(len(parts)))]
-    cover = ground.covariance(share)
-    errors = [np.full(len(view.y), np.nan) for _ in models]
-    for fold in range(FOLDS):
-        test = (cell % FOLDS == fold) & (view.row >= 0)
-        for error, chosen in zip(errors, models, strict=True):
-            signal = free + sum((parts[k] for k in chosen), np.zeros_like(free))
-            error[test] = _predicted(ground, signal, cover, test)
+    models = [[], shown, *([*shown[:out], *shown[out + 1 :]] for out in range(len(shown)))]
+    tests = [(cell % FOLDS == fold) & (view.row >= 0) for fold in range(FOLDS)]
+    errors = [_predicted(ground, np.concatenate([base, *model], axis=1), share, tests) for model in models]
     return HeldOut(errors[0], errors[1], tuple(errors[2:]), cell)
 
 
-def _predicted(ground: Background, signal: Array, cover: Array, test: NDArray[np.bool_]) -> Array:
-    """Errors of the predictions of the held-out values."""
-    if not test.any() or test.all():
-        return np.full(int(test.sum()), np.nan)
-    train, y = ~test, ground.view.y
-    both = signal[np.ix_(train, train)] + cover[np.ix_(train, train)]
-    cross = signal[np.ix_(test, train)]
-    weights = cho_solve(cho_factor(both), np.column_stack([y[train], cross.T]))
-    error: Array = y[test] - cross @ weights[:, 0]
-    variance = np.diag(signal)[test] - np.einsum("ij,ji->i", cross, weights[:, 1:])
-    error[variance > (BLIND * ground.sigma) ** 2] = np.nan
-    error[ground.relative[test] > 0.1 * ASIDE] = np.nan
+def _predicted(ground: Background, signal: Array, share: float, tests: Sequence[NDArray[np.bool_]]) -> Array:
+    """Errors of the predictions of each fold from the others, for a signal whose columns are there at unit size.
+
+    With Q the inverse of the covariance of all values, the block of Q of a fold says what the others tell of it: with
+    the fold's values so replaced, Q y are the weights of the others, and the signal alone is carried over to the fold.
+    """
+    precision, y = ground.precision(share), ground.view.y
+    weighed = precision @ signal
+    inner = np.eye(signal.shape[1]) + signal.T @ weighed
+    inverse = precision - weighed @ np.linalg.solve(inner, weighed.T)
+    solved, error = inverse @ y, np.full(len(y), np.nan)
+    for test in tests:
+        if test.any() and not test.all():
+            spread = np.linalg.inv(inverse[np.ix_(test, test)])
+            missed = np.where(test, 0.0, y)
+            missed[test] = y[test] - spread @ solved[test]
+            others = np.where(test, 0.0, inverse @ missed)
+            told = np.diag(spread) < (BLIND * ground.sigma * ground.relative[test]) ** 2
+            error[test] = np.where(told, y[test] - signal[test] @ (signal.T @ others), np.nan)
+    error[ground.relative > 0.1 * ASIDE] = np.nan
     return error
 
 

@@ -25,31 +25,42 @@ STEPS = 4
 
 @dataclass(frozen=True)
 class Misfit:
-    """Root mean squares of residual values, um, without the largest.
+    """A machine file against data.
 
-    tight   constants nearly fixed, what they moved counted as misfit; free: constants free; noise: of the instrument
-    loose   coefficients of the effects that were free besides
+    problem   what is fitted: the set-up, constants of the file, and effects that are `loose` besides
+    relative  (m,) standard deviation of each value against that of a plain one
+    noise     of the instrument, um
+    loose     how many coefficients are free besides
     """
 
-    tight: float
-    free: float
+    problem: Problem
+    relative: Array
     noise: float
-    loose: Array
+    loose: int
+
+    def left(self, prior_um: float = TIGHT_UM) -> float:
+        """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
+        return _fitted(self.problem, self.relative, self.noise, prior_um, self.loose)[0]
+
+    @property
+    def free(self) -> float:
+        """The same with constants free."""
+        return self.left(FREE_UM)
+
+    @property
+    def coefficients(self) -> Array:
+        """Those that are loose."""
+        every = _fitted(self.problem, self.relative, self.noise, TIGHT_UM, self.loose)[1]
+        return every[len(every) - self.loose :]
 
 
-def misfit(
-    measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = (), tight_um: float = TIGHT_UM
-) -> Misfit:
-    """Fit and look."""
+def misfit(measurements: Sequence[Measurement], machine: Machine, loose: Sequence[Effect] = ()) -> Misfit:
+    """Ready to be asked."""
     selection = Selection((*machine.effects, *loose), tuple(map(is_free, (*machine.effects, *loose))))
     problem = Problem.of(measurements, machine, selection)
-    free = sum(effect.basis.size for effect in loose)
     known = [each.sigma for each in problem.observations if each.noise_known]
     sigma = UM * float(np.median(np.concatenate(known) if known else problem.sigma))
-    relative = relative_noise(problem)
-    tight, coefficients = _fitted(problem, relative, sigma, tight_um, free)
-    wide, _ = _fitted(problem, relative, sigma, FREE_UM, free)
-    return Misfit(tight, wide, sigma, coefficients[len(coefficients) - free :] if free else np.zeros(0))
+    return Misfit(problem, relative_noise(problem), sigma, sum(effect.basis.size for effect in loose))
 
 
 def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, free: int) -> tuple[float, Array]:

@@ -64,31 +64,32 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     """The mistake that explains nearly everything, if one does."""
     data = tuple(measurements)
     now = misfit(data, machine)
-    agrees = now.tight < SUSPECT * now.noise or now.tight < now.noise + SUSPECT_UM
+    left = now.left()
+    agrees = left < SUSPECT * now.noise or left < now.noise + SUSPECT_UM
     if agrees and not any(_looks_typed(effect) for effect in machine.effects):
         return None
     names = {plain(name) for name in refused}
-    tried = [_tried(each, now) for each in _offered(data, machine) if plain(each.name) not in names]
+    tried = [_tried(each, left) for each in _offered(data, machine) if plain(each.name) not in names]
     least = min((each.after_um for each in tried), default=np.inf)
     alike = [each for each in tried if each.after_um <= AS_SIMPLE * least]
     typed = [each for each in alike if each.likely]
-    if typed and least <= now.tight:
+    if typed and least <= left:
         return typed[0]
-    if not alike or not _explains(least, now):
+    if not alike or not _explains(least, left, now):
         return None
     same = tuple(each.name for each in alike[1:] if each.name.split()[0] == alike[0].name.split()[0])
     return replace(alike[0], aliases=tuple(name for name in same if name != alike[0].name))
 
 
-def _tried(mistake: Mistake, now: Misfit) -> Mistake:
+def _tried(mistake: Mistake, before: float) -> Mistake:
     """The mistake with what undoing it leaves."""
-    undone = misfit(mistake.measurements, mistake.machine)
-    return replace(mistake, before_um=now.tight, after_um=undone.tight)
+    return replace(mistake, before_um=before, after_um=misfit(mistake.measurements, mistake.machine).left())
 
 
-def _explains(left: float, now: Misfit) -> bool:
-    plausible = left < AS_GOOD * max(now.noise, min(now.free, 2 * now.noise))
-    return left < BETTER * now.tight and left < now.tight - BETTER_UM and plausible
+def _explains(left: float, before: float, now: Misfit) -> bool:
+    if left >= BETTER * before or left >= before - BETTER_UM:
+        return False
+    return left < AS_GOOD * max(now.noise, min(now.free, 2 * now.noise))
 
 
 def _offered(data: tuple[Measurement, ...], machine: Machine) -> Iterator[Mistake]:
@@ -161,7 +162,7 @@ def _pivot(data: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mista
     located = [Effect(f"E{letter}0{axis.name}", (0.0,)) for letter in "XYZ"]
     moved, point = machine, np.asarray(axis.point)
     for _ in range(3):
-        shift = misfit(data, moved, loose=located).loose
+        shift = misfit(data, moved, located).coefficients
         way = np.asarray(axis.error_axes).T @ shift
         way -= np.asarray(axis.direction) * (way @ np.asarray(axis.direction))
         point = point + way

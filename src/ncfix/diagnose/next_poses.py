@@ -7,13 +7,16 @@ all rivals still imitates the effect, no measurement of this kind tells them apa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
+from ncfix.diagnose.selection import ALIKE, Selected, aliases
+from ncfix.diagnose.weighing import Members, Scale
+from ncfix.machine import Machine
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.kinds import STATES
 from ncfix.measure.measurement import Array, Measurement
@@ -26,6 +29,9 @@ PASSES = 4
 STARTS = 60
 CLIMBED = 3
 """Of so many random dozens, so many are improved."""
+NEAR = 10.0
+"""Log odds within which another name is near enough to ask for poses that tell them apart."""
+RIVALS_MOST = 3
 FORMS = 3
 """Forms of a name that may imitate."""
 LONGER = 1.8
@@ -35,6 +41,9 @@ TOLD = 6.0
 BETTER = 1.2
 WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
+ROUNDED = 1e-3
+"""mm, degree: by which a pose may be rounded beyond a travel."""
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,6 +63,7 @@ class Proposal:
     before   how well the worst rival can be told from the effect, squared noise units; after with the new poses
     reason   why the data so far do not tell them apart
     rivals   the names that are told apart
+    beyond   axes that have to go beyond the travels measured so far
     """
 
     plan: Measurement | None
@@ -61,6 +71,7 @@ class Proposal:
     after: float
     reason: str
     rivals: tuple[str, ...]
+    beyond: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,9 +111,47 @@ class Contest:
         return found
 
 
+def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
+    """Poses that tell the first name from those that come near it; None where none does."""
+    name, court = selected.named[0], scale.court
+    runners = selected.runners[name]
+    reach = ALIKE if aliases(selected, name) else NEAR
+    near = [n for n in sorted(runners, key=lambda n: -runners[n]) if runners[n] > selected.odds[name] - reach]
+    owners = {group.owner.name: group.owner for group in court.groups}
+    near = [n for n in near if not owners[n].grows][:RIVALS_MOST]
+    if not near or owners[name].grows:
+        return None
+    others = {key: member for key, member in selected.members.items() if key != name}
+    sides = [_side(scale, others, each) for each in (name, *near)]
+    return propose(court, sides[0], sides[1:], sigma)
+
+
+def _side(scale: Scale, others: Members, name: str) -> Side:
+    """A name as it would be beside the others."""
+    court = scale.court
+    members = scale.heard(others).likeliest(court.forms[name], FORMS)
+    everyone = [*others.values(), members[0]]
+    forms = tuple((court.groups[member.group], member.size) for member in members)
+    return Side(forms[0][0], court.numbers(everyone, court.share(everyone))[-1], forms)
+
+
 def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) -> Proposal:
-    """The poses that tell `chosen` from the rivals, whichever of them is true."""
-    offered = _offered(court)
+    """The poses that tell `chosen` from the rivals, whichever of them is true.
+
+    Within the travels measured if that is enough; else within those of the machine, and that is said.
+    """
+    spans = court.background.view.reach.spans
+    near = _within(court, chosen, rivals, sigma, spans)
+    travels = _travels(court.background.view.machine, spans)
+    if near.after >= TOLD or travels == spans:
+        return near
+    far = _within(court, chosen, rivals, sigma, travels)
+    return far if far.plan is not None and far.after > BETTER * near.after else near
+
+
+def _within(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ranges: Mapping[str, Span]) -> Proposal:
+    """The best poses of those that lie within these ranges."""
+    offered = _offered(court, ranges)
     new = observe(offered, court.background.view.machine)
     pairs = [pair for rival in rivals for pair in ((chosen, rival), (rival, chosen))]
     contests = [_contest(court, new, true, other, sigma) for true, other in pairs]
@@ -112,18 +161,49 @@ def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) ->
     index, after = _exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
     before = min(each.told([]) for each in useful or contests)
     plan = offered.rows(index) if useful and after > BETTER * before else None
-    return Proposal(plan, before, after, _reason(court, chosen.group, [rival.group for rival in rivals]), names)
+    reason = _reason(court, chosen.group, [rival.group for rival in rivals])
+    if plan is None:
+        return Proposal(None, before, after, reason, names)
+    beyond = _beyond(plan, court.background.view.reach.spans)
+    return Proposal(_marked(plan, beyond), before, after, reason, names, beyond)
 
 
-def _offered(court: Court) -> Measurement:
-    """Poses within what was measured, with the tools that there are and one more if there is one only."""
+def _travels(machine: Machine, spans: Mapping[str, Span]) -> dict[str, Span]:
+    """The ranges of the machine where it has them, else what was measured."""
+    found = {}
+    for axis in machine.axes:
+        low, high = (limit / axis.unit for limit in axis.range)
+        first, last = spans[axis.name]
+        bounded = np.isfinite([low, high]).all()
+        found[axis.name] = (min(low, first), max(high, last)) if bounded else (first, last)
+    return found
+
+
+def _beyond(plan: Measurement, spans: Mapping[str, Span]) -> tuple[str, ...]:
+    """The axes of which poses lie beyond what was measured."""
+    return tuple(
+        name
+        for name, (low, high) in spans.items()
+        if plan.column(name).min() < low - ROUNDED or plan.column(name).max() > high + ROUNDED
+    )
+
+
+def _marked(plan: Measurement, beyond: Sequence[str]) -> Measurement:
+    """With a line that says which axes go further than before."""
+    if not beyond:
+        return plan
+    return plan.with_header("note", f"{', '.join(beyond)} beyond the travels measured so far, mind the clearance")
+
+
+def _offered(court: Court, ranges: Mapping[str, Span]) -> Measurement:
+    """Poses within these ranges, with the tools that there are and one more if there is one only."""
     view = court.background.view
     lengths = sorted(set(np.round(view.column("tool_length"), 4).tolist()))
     if len(lengths) == 1:
         lengths = [lengths[0], round(LONGER * lengths[0], 1) if lengths[0] > 0 else 100.0]
     loads = view.column("load_kg")
     inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
-    room = Room(ranges=view.reach.spans, tool_lengths=lengths, inputs=inputs)
+    room = Room(ranges=ranges, tool_lengths=lengths, inputs=inputs)
     plan = candidates(view.machine, "tcp", OFFERED, room)
     known = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}
     held = {name: np.full(len(plan), view.column(name)[-1]) for name in known if name not in plan.columns}

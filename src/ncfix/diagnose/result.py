@@ -76,7 +76,8 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
     if found.proposal is None:
         return None
     p = found.proposal
-    return {"rivals": p.rivals, "reason": p.reason, "told_apart": {"now": p.before, "after": p.after}}
+    told = {"now": p.before, "after": p.after}
+    return {"rivals": p.rivals, "reason": p.reason, "told_apart": told, "beyond_travels_measured": list(p.beyond)}
 
 
 def _outliers(found: Diagnosis) -> list[dict[str, Any]]:

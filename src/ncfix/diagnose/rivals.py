@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnose.catalogue import Candidate, shapes
-from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Reach, stacked, weighed, zero
+from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Reach, weighed, zero
 from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
@@ -69,7 +69,7 @@ def rivals(view: View, named: Sequence[Group]) -> tuple[Group, ...]:
     if not np.abs(tip).max() > 0:
         return ()
     found = [_at_tip(view, owner, way, kernel) for way in _frames(view, tip) for owner, kernel in _kernels(view)]
-    found += [_of_joint(view, axis, forms) for axis in _moved(view.reach) for forms in _sorts(view.reach, axis)]
+    found += _of_joints(view)
     seen = [group for group in found if group is not None]
     if not any(group.owner.constant for group in named):
         return tuple(seen)
@@ -153,21 +153,22 @@ def _moved(reach: Reach) -> tuple[Axis, ...]:
     return (*reach.linear, *reach.rotary)
 
 
-def _sorts(reach: Reach, axis: Axis) -> Iterator[list[list[Part]]]:
+def _sorts(reach: Reach, axis: Axis) -> Iterator[tuple[str, list[list[Part]]]]:
     """What each component may do: by position, direction, another axis, time."""
     names = [f"E{letter}{axis.name}" for letter in LETTERS + TURNS]
     options, loading = _curve(reach, axis)
-    yield [[(name, options, loading)] for name in names]
+    yield "its position", [[(name, options, loading)] for name in names]
     if f"dir_{axis.name}" in reach.columns:
         play = {"basis": Backlash(degree=(0, 1, 2, 3)), **reach.scaled(axis)}
-        yield [[(name, play, weighed(PLAY))] for name in names]
+        yield "its direction", [[(name, play, weighed(PLAY))] for name in names]
     others = [other for other in _moved(reach) if other is not axis]
-    if others:
-        yield [[(name, options | reach.factor(other), loading) for other in others] for name in names]
+    for other in others:
+        yield f"its position and {other.name}", [[(name, options | reach.factor(other), loading)] for name in names]
     driven = _driven(reach)
     if driven:
         product: tuple[dict[str, Any], ...] = (reach.factor(axis), {})
-        yield [[(name, each | more, size) for each, size in driven for more in product] for name in names]
+        parts = [[(name, each | more, size) for each, size in driven for more in product] for name in names]
+        yield "time, heat or load", parts
 
 
 def _curve(reach: Reach, axis: Axis) -> tuple[dict[str, Any], Array]:
@@ -190,15 +191,28 @@ def _driven(reach: Reach) -> list[tuple[dict[str, Any], Array]]:
     return found
 
 
-def _of_joint(view: View, axis: Axis, components: Sequence[Sequence[Part]]) -> Group | None:
-    """All errors of a joint together, each with the same share."""
-    title = f"something of {axis.name} that has no name in the catalogue"
-    owner = Candidate(f"unknown of {axis.name}", title, axis.name, UNNAMED, (), ())
-    effects = [Effect(name, (), **options) for component in components for name, options, _ in component]
-    loadings = [stacked(*[loading for _, _, loading in component]) for component in components]
-    ends = np.cumsum([len(loading) for loading in loadings])[:-1]
-    designs = np.split(view.design(zero(effects)), ends, axis=1)
-    return _group(view, owner, [design @ loading for design, loading in zip(designs, loadings, strict=True)])
+def _of_joints(view: View) -> Iterator[Group | None]:
+    """Of every joint, by all it may depend on: its six errors with the same share each, and each alone."""
+    sorts = [(axis, *sort) for axis in _moved(view.reach) for sort in _sorts(view.reach, axis)]
+    parts = [part for _, _, components in sorts for component in components for part in component]
+    designs = _designs(view, [Effect(name, (), **options) for name, options, _ in parts])
+    shown = iter([design @ loading for design, (_, _, loading) in zip(designs, parts, strict=True)])
+    for axis, what, components in sorts:
+        own = [np.concatenate([next(shown) for _ in component], axis=1) for component in components]
+        yield _group(view, _something(axis, f"something of {axis.name}", what), own)
+        for component, part in zip(components, own, strict=True):
+            yield _group(view, _something(axis, component[0][0], what), [part])
+
+
+def _designs(view: View, effects: Sequence[Effect]) -> list[Array]:
+    """What each effect's coefficients show."""
+    ends = np.cumsum([effect.basis.size for effect in effects])
+    return np.split(view.design(zero(effects)), ends[:-1], axis=1)
+
+
+def _something(axis: Axis, error: str, what: str) -> Candidate:
+    title = f"{error} by {what} that has no name in the catalogue"
+    return Candidate(f"unknown of {axis.name}", title, axis.name, UNNAMED, (), ())
 
 
 def _group(view: View, owner: Candidate, parts: Sequence[Array]) -> Group | None:

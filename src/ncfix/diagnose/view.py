@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ncfix.diagnose.catalogue.candidate import Reach
 from ncfix.machine import Effect, Machine
+from ncfix.machine.axis import Axis
 from ncfix.machine.effect import SPINDLE
 from ncfix.machine.smooth import Constant, Polynomial
 from ncfix.measure.calibrate import Problem
@@ -155,10 +156,23 @@ class View:
             zip(self.machine.axis_names, zip(places.min(0).tolist(), places.max(0).tolist(), strict=True), strict=True)
         )
         shared = set.intersection(*(set(each.columns) for each in self.measurements))
-        stated = shared | {f"dir_{name}" for name in self.machine.axis_names}
-        moving = {name for name in stated if np.ptp(self.column(name)) > 0}
+        shared = {name for name in shared if not name.startswith("dir_")}
+        stated = {f"dir_{axis.name}" for axis in self.machine.axes if not self.unstated(axis)}
+        moving = {name for name in shared | stated if np.ptp(self.column(name)) > 0}
         time = self.column("time_s")
         return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())))
+
+    def unstated(self, axis: Axis) -> list[str]:
+        """The files that moved an axis and do not say from where it came, where others do."""
+        index = self.machine.axis_names.index(axis.name)
+        if not self.directions[:, index].any():
+            return []
+        own = [(each, each.q[:, index], each.state.direction) for each in self.problem.observations]
+        return [
+            each.measurement.path
+            for each, q, direction in own
+            if np.ptp(q) > 0 and not np.broadcast_to(direction, each.q.shape)[:, index].any()
+        ]
 
     @property
     def _ends(self) -> list[Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ncfix.diagnose.addition import Moved
 from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, Finding
+from ncfix.diagnose.next_poses import Proposal
 
 SAID = {
     NOTHING: "nothing is missing that stands out of the noise",
@@ -96,7 +97,14 @@ def _next(found: Diagnosis) -> list[str]:
     poses = (
         f"{len(p.plan)} more poses raise what tells them apart from {p.before:.1f} to {p.after:.1f} squared noise units"
     )
-    return ["", f"to tell it from {', '.join(p.rivals)} ({p.reason}): {poses}; --next FILE writes them"]
+    return ["", f"to tell it from {', '.join(p.rivals)} ({p.reason}): {poses}{beyond(p)}; --next FILE writes them"]
+
+
+def beyond(proposal: Proposal) -> str:
+    """That poses lie where nothing was measured yet."""
+    if not proposal.beyond:
+        return ""
+    return f", {', '.join(proposal.beyond)} beyond the travels measured so far (within those, none would)"
 
 
 def why(found: Diagnosis, finding: Finding) -> str:

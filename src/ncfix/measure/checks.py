@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -76,24 +76,35 @@ def component_of(axis: str, component: str) -> str | None:
 
 
 def _twice(measurement: Measurement) -> Iterator[Message]:
-    """Rows of one state in one set: repeats if a column says so, else worth a word."""
+    """Rows of one state in one set: repeats if a column says so, else worth a word, once for all of a file."""
     if "repeat" in measurement.labels or "run" in measurement.columns:
         return
     commanded = [name for name in measurement.columns if name not in measurement.measured]
     first: dict[tuple[object, ...], int] = {}
+    again: list[tuple[int, int]] = []
+    copied: list[tuple[int, int]] = []
     for row in range(len(measurement)):
         numbers = tuple(float(measurement.columns[name][row]) for name in commanded)
         key = (measurement.sets[row], *(each[row] for each in measurement.labels.values()), *numbers)
         before = first.setdefault(key, row)
         if before != row:
-            yield _repeated(measurement, before, row)
+            (copied if _alike(measurement, before, row) else again).append((before, row))
+    yield from _repeated(measurement, again, "taken as a repeat")
+    yield from _repeated(measurement, copied, "with the same values: was it copied?")
 
 
-def _repeated(measurement: Measurement, before: int, row: int) -> Message:
-    where = measurement.place(before).line
-    same = all(measurement.columns[n][row] == measurement.columns[n][before] for n in measurement.measured)
-    what = "with the same values: was it copied?" if same and measurement.measured else "taken as a repeat"
-    return Message("NCF613", f"the pose of line {where} once more, {what}", measurement.place(row))
+def _alike(measurement: Measurement, first: int, second: int) -> bool:
+    """Whether the very same was measured."""
+    names = measurement.measured
+    return bool(names) and all(measurement.columns[n][first] == measurement.columns[n][second] for n in names)
+
+
+def _repeated(measurement: Measurement, pairs: Sequence[tuple[int, int]], what: str) -> Iterator[Message]:
+    if pairs:
+        before, row = pairs[0]
+        more = f" ({len(pairs) - 1} more rows likewise)" if len(pairs) > 1 else ""
+        text = f"the pose of line {measurement.place(before).line} once more, {what}{more}"
+        yield Message("NCF613", text, measurement.place(row))
 
 
 def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnose.diagnosis import Diagnosis, Finding
-from ncfix.diagnose.words import SAID, carried, constants, odd, rest, why
+from ncfix.diagnose.words import SAID, beyond, carried, constants, odd, rest, why
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
 RUNNERS = 6
@@ -110,11 +110,11 @@ def _next(found: Diagnosis) -> Section:
         return Section("To tell names apart", [])
     head = Text(f"{', '.join(proposal.rivals)}: {proposal.reason}.")
     if proposal.plan is None:
-        words = "No measurement of this kind within the same travels would tell them apart."
+        words = "No measurement of this kind within the travels of the machine would tell them apart."
         return Section("To tell names apart", [head, Text(words)])
     names = [name for name in proposal.plan.columns if not name.startswith(("temp_", "time_s"))]
     rows = [[f"{proposal.plan.columns[name][k]:g}" for name in names] for k in range(len(proposal.plan))]
-    return Section("To tell names apart", [head, Text("These poses would:"), Table(names, rows)])
+    return Section("To tell names apart", [head, Text(f"These poses would{beyond(proposal)}:"), Table(names, rows)])
 
 
 def _unseen(found: Diagnosis) -> Section:

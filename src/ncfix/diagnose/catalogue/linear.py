@@ -41,7 +41,7 @@ def _curves(reach: Reach, axis: Axis) -> Iterator[Candidate]:
         own = shift if component in LETTERS else tilt
         loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
         yield Candidate(
-            name, catalogue.title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN
+            name, catalogue.title(name, axis), axis.name, f"{axis.name} geometry", parts, loadings, (), WORN, lead=1
         )
 
 
