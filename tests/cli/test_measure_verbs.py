@@ -98,6 +98,8 @@ def test_a_plan_says_what_it_cannot_do(ncfix, root, tmp_path):
     done = ncfix(*plan, "--effects", "load-X,EXX", *limits)
     assert done.code == 0, done.err
     assert ",load_kg" in (tmp_path / "p.csv").read_text()
+    done = ncfix(*plan, "--kind", "length", "--force")
+    assert (done.code, "nearly open is a combination of" in done.err) == (0, True)
 
 
 def test_ball_bars_and_direct_readings_have_figures_of_their_standards(ncfix, root, tmp_path):

@@ -138,6 +138,15 @@ def test_inputs_that_can_be_set_are_planned():
         plan(known, "tcp", 30, room, "EXX,load-X", existing=_random(known, 30, 1))
 
 
+def test_a_plan_says_what_it_leaves_nearly_open():
+    many = plan(machine("three_axis"), "length", 40)
+    assert many.worst_um > 100
+    assert {"EZZ u^2", "EXZ u^2"} <= set(many.open) <= set(many.seen)
+    few = plan(machine("three_axis"), "length", 40, effects="EC0Y,EA0Z,EB0Z,EXX,EYY")
+    assert few.worst_um < 10
+    assert few.open == ()
+
+
 def test_a_plan_can_be_too_large():
     with pytest.raises(UsageError) as caught:
         plan(machine("three_axis"), "tcp", 0)

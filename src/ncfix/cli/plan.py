@@ -71,14 +71,20 @@ def plan(
     if program:
         program.write(skeleton(found.plan, machine).encode())
     figures = {"worst_um": found.worst_um, "mean_um": found.mean_um, "determined": len(found.seen)}
+    listed = {"unseen": found.unseen, "open": found.open}
     if as_json:
-        console.put_json(kind=kind, count=count, **figures, unseen=found.unseen, output=output)
+        console.put_json(kind=kind, count=count, **figures, **listed, output=output)
     if not as_json or output != STREAM:
         target.write(text.encode())
     if found.unseen:
         console.say(f"no pose of this kind tells {', '.join(found.unseen)} from the rest")
     if not separate:
         console.say(f"tip error known to {found.worst_um:.2f} um at worst per um of noise, {found.mean_um:.2f} um rms")
+    if found.open:
+        console.say(f"nearly open is a combination of {', '.join(found.open)}")
+        console.say(
+            "more poses may tell it, another kind of measurement or another tool; or seek fewer effects (--effects)"
+        )
 
 
 def _room(

@@ -91,14 +91,19 @@ def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
 
 
 def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
-    """The candidate that, added to the others, leaves the smallest worst variance, and that variance."""
+    """The candidate that, added to the others, leaves the smallest worst variance, and that variance.
+
+    With the rows B of a candidate and the information M without it, a target t gains |L^-1 B M^-1 t|^2, where
+    L L' = 1 + B M^-1 B'.
+    """
+    n, r, p = pool.blocks.shape
     inverse = np.linalg.inv(information(pool, others))
-    projected = pool.targets @ inverse
-    present = np.einsum("tp,tp->t", projected, pool.targets)
-    small = np.einsum("nip,pq,njq->nij", pool.blocks, inverse, pool.blocks, optimize=True)
-    small += np.eye(pool.blocks.shape[1])
-    cross = np.einsum("tp,nip->nti", projected, pool.blocks, optimize=True)
-    gain = np.einsum("nti,nij,ntj->nt", cross, np.linalg.inv(small), cross, optimize=True)
+    projected = inverse @ pool.targets.T
+    present = np.einsum("tp,pt->t", pool.targets, projected)
+    small = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p) @ np.swapaxes(pool.blocks, 1, 2)
+    white = np.linalg.solve(np.linalg.cholesky(small + np.eye(r)), pool.blocks)
+    cross = white.reshape(n * r, p) @ projected
+    gain = np.square(cross, out=cross).reshape(n, r, -1).sum(axis=1)
     worst = (present - gain).max(axis=1)
     worst[others] = np.inf
     best = int(worst.argmin())

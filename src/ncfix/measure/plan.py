@@ -16,7 +16,7 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.library import library
 from ncfix.measure.candidates import Room, candidates
-from ncfix.measure.exchange import Pool, choose, variances
+from ncfix.measure.exchange import Pool, choose, information, variances
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
@@ -24,6 +24,10 @@ from ncfix.measure.selection import Selection, form, select
 from ncfix.measure.solve import NUISANCE_RANK, solve
 
 CANDIDATES = 800
+POOR = 10.0
+"""um per um of noise from which on a plan says next to nothing of some combination of coefficients."""
+SHARED = 0.3
+"""Of the largest share in that combination: what has less is not named."""
 PLACES = 1000
 """Poses at which the predictions are judged."""
 
@@ -35,6 +39,7 @@ class Planned:
     plan      the poses, in an order in which none follows a pattern in time
     worst_um  the largest standard deviation of the predicted tip error over the volume for a noise of 1 um, mean_um
     seen      labels of the coefficients that it determines; unseen: those that no candidate can
+    open      labels of those that make up what is known least, where that is POOR or worse
     """
 
     plan: Measurement
@@ -42,6 +47,7 @@ class Planned:
     mean_um: float
     seen: tuple[str, ...]
     unseen: tuple[str, ...]
+    open: tuple[str, ...] = ()
 
 
 def plan(
@@ -78,13 +84,24 @@ def plan(
     order = np.random.default_rng(seed).permutation(chosen)
     variance = variances(pool, [*range(fixed), *chosen])
     labels = selection.labels
+    poor = not separate and np.sqrt(variance.max()) >= POOR
     return Planned(
         every.rows(order),
         float(np.sqrt(variance.max())),
         float(np.sqrt(variance.mean())),
         tuple(labels[k] for k in kept),
         tuple(label for k, label in enumerate(labels) if k not in set(kept.tolist())),
+        tuple(labels[kept[k]] for k in _least_known(pool, [*range(fixed), *chosen], len(kept))) if poor else (),
     )
+
+
+def _least_known(pool: Pool, rows: Sequence[int], count: int) -> Index:
+    """Which of the first `count` columns make up the combination that the worst predicted target suffers from."""
+    inverse = np.linalg.inv(information(pool, rows))
+    worst = pool.targets[variances(pool, rows).argmax()]
+    variance, ways = np.linalg.eigh(inverse)
+    combination = np.abs(ways[:count, int(((ways.T @ worst) ** 2 * variance).argmax())])
+    return np.flatnonzero(combination > SHARED * combination.max())
 
 
 def _can_be_set(machine: Machine, selection: Selection, room: Room, existing: Measurement | None) -> None:
