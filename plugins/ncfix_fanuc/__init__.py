@@ -56,6 +56,7 @@ FANUC = Dialect(
     ),
     refuses=(
         "G43.5, G68.3, G68.4, G68.2 P2 ... P4, G51, G12.1 while in force, threads, lines by their angle (,A)",
+        "G29, and pockets and texts that the control mills by itself (Haas: G12, G13, G47, G150)",
         "a block that names one axis of the plane only, the first after G68 or G69",
         "what is computed from positions (#5001 ...), inputs and clocks: compensation or the machine changes it",
         "everything after a G code, a command or a setting (G10 L50, #5201) that is not known",
@@ -75,7 +76,9 @@ HAAS = replace(
     semantics="haas",
 )
 
-MITSUBISHI = replace(FANUC, name="mitsubishi", title="Mitsubishi (M700/M800, ISO)", suffixes=(), signature=())
+MITSUBISHI = replace(
+    FANUC, name="mitsubishi", title="Mitsubishi (M700/M800, ISO)", suffixes=(), signature=(), semantics="mitsubishi"
+)
 
 
 @hookimpl

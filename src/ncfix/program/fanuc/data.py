@@ -21,7 +21,16 @@ from ncfix.program.rs274.systems import (
 
 WORK_OFFSETS = 6
 FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
-AFTER_ENGRAVING = "where the axis {} stands after engraving (G47) is not followed"
+AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
+MADE = {
+    470: "engraving of text (G47)",
+    120: "a circular pocket (G12)",
+    130: "a circular pocket (G13)",
+    1500: "a pocket (G150)",
+    290: "return from the reference point (G29)",
+}
+"""Motions that the control makes up."""
+
 LENGTHS = (10,)
 UNFOLLOWED = {
     11: "tool wear (G10 L11)",
@@ -39,10 +48,11 @@ def extended(control: Control, block: Block, code: int) -> None:
     extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
 
 
-def engrave(control: Control, block: Block, code: int) -> None:
-    """G47 of Haas: the control writes a text by itself."""
-    unknown = control.unknown | {i: AFTER_ENGRAVING for i in (X, Y, Z) if i in control.machine}
-    control.move(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal="engraving of text (G47)")
+def made(control: Control, block: Block, code: int) -> None:
+    """A text or a pocket that the control mills by itself, and the way back from a reference point."""
+    gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
+    unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
+    control.move(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code])
 
 
 def set_data(control: Control, block: Block, code: int) -> None:

@@ -9,7 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.rs274.unit import Unit
-from ncfix.program.tree import Flow, Literal
+from ncfix.program.tree import Comment, Flow, Literal, Opaque, Span, Template
+
+
+def named_programs(unit: Unit) -> dict[int, str]:
+    """The blocks that begin a program with a name: `<NAME>` stands alone there."""
+    program = unit.program
+    heads = {shape: span for shape, t in enumerate(program.templates) if (span := head_of(t)) is not None}
+    named = (block for block, shape in enumerate(unit.template) if shape in heads) if heads else ()
+    return {block: program.slice(block, heads[unit.template[block]]).strip("<> \t") for block in named}
+
+
+def head_of(template: Template) -> Span | None:
+    """Where the name stands that begins a program, if the block is nothing else."""
+    items = [item for item in template.items if not isinstance(item, Comment)]
+    alone = len(items) == 1 and isinstance(items[0], Opaque) and items[0].kind == "text word"
+    return items[0].span if alone else None
 
 
 @dataclass(slots=True, eq=False)
@@ -31,7 +46,13 @@ class Outline:
     def __post_init__(self) -> None:
         self.numbers = self.unit.program.column("N")
         open_loops: list[tuple[str, int]] = []
-        for block in self.unit.flows:
+        names = named_programs(self.unit)
+        for block in sorted({*self.unit.flows, *names}):
+            if block in names:
+                self.programs.setdefault(names[block], block)
+                self.starts.append(block)
+                open_loops = []
+                continue
             flow = next(item for item in self.unit.program.items_of(block) if isinstance(item, Flow))
             if flow.keyword == "program":
                 self.programs.setdefault(str(flow.label), block)

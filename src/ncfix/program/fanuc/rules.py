@@ -21,7 +21,7 @@ MACRO = "macro call"
 FOREIGN = frozenset(
     {
         *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923),
-        *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, *groups.THREADS, 431, 432, 411, 421, 890),
+        *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, 331, 760, 431, 432, 411, 421, 890),
     }
 )
 """Codes of LinuxCNC that mean nothing, or something else, on these controls."""
@@ -34,6 +34,7 @@ FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} 
     491: groups.LENGTH,
     531: groups.NON_MODAL,
     270: groups.NON_MODAL,
+    290: groups.NON_MODAL,
     682: groups.ROTATION,
     683: groups.ROTATION,
     684: groups.ROTATION,
@@ -67,6 +68,7 @@ FANUC = Rules(
         150: polar.switch,
         160: polar.switch,
         270: references.check,
+        290: data.made,
         300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
         500: unfollowed,
@@ -81,7 +83,7 @@ FANUC = Rules(
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
     cycles=ALL_CYCLES,
-    takes=frozenset({40, 100, 270, 531, 650, 660, 661, 670}),
+    takes=frozenset({40, 100, 270, 290, 531, 650, 660, 661, 670}),
     system=is_system,
     compiled=compiled,
 )
@@ -89,15 +91,28 @@ FANUC = Rules(
 HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
 """G154 P, and its first twenty by their own names G110 to G129."""
 
+HAAS_MADE = (120, 130, 470, 1500)
+"""Circular pockets, engraving, pockets: G12, G13, G47, G150."""
+
 HAAS = replace(
     FANUC,
-    g_groups=FANUC_G | {470: groups.NON_MODAL} | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
-    steps={**FANUC.steps, 470: data.engrave, **dict.fromkeys(HAAS_OFFSETS, data.extended)},
-    takes=FANUC.takes | {470},
+    g_groups=FANUC_G | dict.fromkeys(HAAS_MADE, groups.NON_MODAL) | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
+    steps={**FANUC.steps, **dict.fromkeys(HAAS_MADE, data.made), **dict.fromkeys(HAAS_OFFSETS, data.extended)},
+    takes=FANUC.takes | set(HAAS_MADE),
     repeats="L",
     adds_rotations=True,
 )
-"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), engraves texts, and pecks by I J K."""
+"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
+and pecks by I J K."""
 
-RULES = {"fanuc": FANUC, "haas": HAAS}
+MITSUBISHI_MADE = (120, 130)
+MITSUBISHI = replace(
+    FANUC,
+    g_groups=FANUC_G | dict.fromkeys(MITSUBISHI_MADE, groups.NON_MODAL),
+    steps={**FANUC.steps, **dict.fromkeys(MITSUBISHI_MADE, data.made)},
+    takes=FANUC.takes | set(MITSUBISHI_MADE),
+)
+"""Mitsubishi mills circles by itself, too."""
+
+RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
 """By `Dialect.semantics`."""
