@@ -6,17 +6,17 @@ their sum is never off by more than half a step: the rounding error is carried a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.settings import choice
 from ncfix_fanuc.increments import curves, pitch_of
 from ncfix_fanuc.pitch_text import (
     MOST,
@@ -27,8 +27,8 @@ from ncfix_fanuc.pitch_text import (
     read_increments,
     read_records,
 )
+from ncfix_fanuc.units import DEGREE, SIGN, SIGNS, UNITS, sense_of, units_of
 
-DEGREE = np.pi / 180
 PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
 ORDER = "XYZABCUVW"
 FIRST_NUMBER = 1
@@ -76,9 +76,8 @@ class FanucPitch(Control):
         ),
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": Option(None, "correction: values are added to the command; error: they are taken off it"),
-        "detection_unit_um": Option("0.1", "detection unit of linear axes, um"),
-        "detection_unit_deg": Option("0.0001", "detection unit of rotary axes, degree"),
+        "sign": SIGN,
+        **UNITS,
     }
     steps = (
         "Settle PITCH-1 on the machine.",
@@ -92,10 +91,8 @@ class FanucPitch(Control):
     def write(self, request: Request) -> Written:
         """The increments of every axis that has something to correct, and the parameters."""
         settings = self.settings(request.settings)
-        sense = {"correction": 1, "error": -1}.get(settings["sign"], 0)
-        if not sense:
-            raise UsageError.of("NCF485", f"sign={settings['sign']}", hint="correction or error")
-        units = (_unit(settings["detection_unit_um"]) / 1000, _unit(settings["detection_unit_deg"]) * DEGREE)
+        sense = sense_of(choice(settings, "sign", SIGNS))
+        units = units_of(settings)
         axes = _axes(request)
         tables, notes = curves(request), []
         found: list[Pitch] = []
@@ -128,10 +125,10 @@ class FanucPitch(Control):
     def _read(self, files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
         head = Remarks.of(SETTINGS, files.get(SETTINGS, b""))
         words = files.get(SETTINGS, b"").decode("latin-1").split()
-        if len(words) != 4 or words[0] not in ("correction", "error"):
+        if len(words) != 4 or words[0] not in SIGNS:
             head.refuse(0, "should hold the sign, two detection units and the axes", "PITCH-1")
             return (), [head]
-        sense = 1 if words[0] == "correction" else -1
+        sense = sense_of(words[0])
         parameters = Remarks.of(PARAMETERS, files.get(PARAMETERS, b""))
         values = {record.number: dict(record.values) for record in read_records(parameters)}
         remarks, terms = [head, parameters], []
@@ -145,16 +142,6 @@ class FanucPitch(Control):
                     unit = float(words[2]) * DEGREE if axis in "ABC" else float(words[1]) / 1000
                     terms.append(Term((_grid(pitch, sense * unit),)))
         return tuple(terms), remarks
-
-
-def _unit(text: str) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not 1e-6 <= found <= 10:
-        raise UsageError.of("NCF485", f"a detection unit of {text}", hint="from 0.000001 to 10")
-    return found
 
 
 def _axes(request: Request) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,14 @@ class Style:
     order     the axes from the one whose number runs fastest
     largest   value of a point
     template  a line of the text file; "" for none
+    home_minus  the axes whose reference position return goes towards minus
     """
 
     first: int = 1
     order: str = "XYZ"
     largest: int = 127
     template: str = ""
+    home_minus: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,7 @@ def json_text(volc: Volc) -> bytes:
         "order": volc.style.order,
         "largest": volc.style.largest,
         "template": volc.style.template,
+        "home_minus": volc.style.home_minus,
     }
     lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
     records = ",\n".join(f"  {json.dumps(record)}" for record in _records(volc.rows, volc.style.first))
@@ -152,6 +155,9 @@ def _volc(found: Mapping[str, Any], remarks: Remarks) -> Volc | None:
     counts = tuple(int(count) for count in found["counts"])
     rows: list[int] = []
     style = Style(int(found["first_number"]), str(found["order"]), int(found["largest"]), str(found["template"]))
+    style = replace(style, home_minus=str(found.get("home_minus", "")))
+    if not set(style.home_minus) <= set("XYZ"):
+        remarks.refuse(0, f"home_minus is {style.home_minus!r}", "axes of X, Y and Z")
     if sorted(style.order) != ["X", "Y", "Z"]:
         remarks.refuse(0, f"the order of the axes is {style.order!r}", "XYZ, ZYX, ...")
     for record in found["records"]:

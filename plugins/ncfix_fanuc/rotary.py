@@ -9,22 +9,25 @@ second lattice over the rotary axes of a table, whose angles turn the workpiece 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.exact import reversal_note
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import Mesh
+from ncfix.tables.neutral import NOTHING, Compensation
 from ncfix.tables.residual import residual
-from ncfix_fanuc.rotary_fill import PART, Filling, table_axes
-from ncfix_fanuc.rotary_records import DEGREE, LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
+from ncfix.tables.reversal import reversal_note
+from ncfix.tables.settings import choice, whole
+from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
+from ncfix_fanuc.rotary_fill import PART, LatticeFilling, table_axes
+from ncfix_fanuc.rotary_records import LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
+from ncfix_fanuc.units import DEGREE, SIGN, SIGNS, UNITS, units_of
 
 NAME, SECOND = "rotary.json", "rotary-axes.json"
 
@@ -37,12 +40,14 @@ class Turning:
     angles   about X, Y and Z, rad, under the names A, B and C
     table    the same two over the rotary axes, if there is a second lattice
     centre   about which angles of the second turn, as X, Y and Z of the tip, mm
+    play     what else is done when an axis turns round
     """
 
     lengths: Grid
     angles: Grid
     table: tuple[Grid, Grid] | None = None
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+    play: Compensation = NOTHING
     length: float = 0.0
 
     def for_tool(self, length: float) -> Turning:
@@ -52,7 +57,7 @@ class Turning:
     @property
     def grids(self) -> tuple[Grid, ...]:
         """All of them."""
-        return (self.lengths, self.angles, *(self.table or ()))
+        return (self.lengths, self.angles, *(self.table or ()), *self.play.grids)
 
     @property
     def axes(self) -> frozenset[str]:
@@ -62,15 +67,15 @@ class Turning:
     @property
     def points(self) -> int:
         """The points of the lattices; lengths and angles share them."""
-        return self.lengths.points + (self.table[0].points if self.table else 0)
+        return self.lengths.points + (self.table[0].points if self.table else 0) + self.play.points
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
         """See `Tables.at`: shifts, what the turned tool adds at its tip, and what the turned table adds there."""
         columns = [names.index(axis) for axis in LINEAR]
         tool = np.array([0.0, 0.0, -self.length])
         place = q[:, columns]
-        correction = np.zeros_like(q)
-        correction[:, columns] = self.lengths.at(place) + np.cross(self.angles.at(place), tool)
+        correction = self.play.at(names, q, direction)
+        correction[:, columns] += self.lengths.at(place) + np.cross(self.angles.at(place), tool)
         if self.table:
             turned = q[:, [names.index(axis) for axis in self.table[0].inputs]]
             lever = place + tool - np.array(self.centre)
@@ -92,7 +97,7 @@ class FanucRotary(Control):
         unit="detection unit times magnification; positions mm",
         quantum=(1e-4, 1e-4 * DEGREE),
         extrapolation="taken as held at the outermost nodes",
-        bidirectional=False,
+        bidirectional=True,
         max_points=SIDE**3,
         max_tables=2,
         combine="a lattice over X, Y and Z, and one over rotary axes",
@@ -130,18 +135,20 @@ class FanucRotary(Control):
             "it is written; --set rotary=no leaves it out",
             "Load lin = [100, 0, 0] at one angle only, and see whether X moves there.",
         ),
+        ASSUMPTION,
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": Option(None, "correction: values are added to the command; error: they are taken off it"),
-        "detection_unit_um": Option("0.1", "detection unit of linear axes, um"),
-        "detection_unit_deg": Option("0.0001", "detection unit of angles, degree"),
+        "sign": SIGN,
+        **UNITS,
         "rotary": Option("yes", "yes: a second lattice, over the rotary axes of a table (FROT-4); no: none"),
+        **OPTIONS,
         "rotary_points": Option("72", "most points along a rotary axis; how many the control takes is not public"),
     }
     steps = (
         "Settle FROT-1 to FROT-4 on the machine.",
         "Set numbers of points, intervals and magnifications as rotary.json, and rotary-axes.json if it is there, have "
         "them.",
+        STEP,
         "Write the records with cnc_wrrotvolc, switch power off and on, home all axes.",
         "Measure one line with a short and with a long tool: both errors must have become smaller.",
     )
@@ -150,51 +157,56 @@ class FanucRotary(Control):
     def write(self, request: Request) -> Written:
         """`rotary.json`, and `rotary-axes.json` for machines with a table that turns."""
         settings = self.settings(request.settings)
-        for key, allowed in (("sign", ("correction", "error")), ("rotary", ("yes", "no"))):
-            if settings[key] not in allowed:
-                raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=" or ".join(allowed))
+        sign, rotary = choice(settings, "sign", SIGNS), choice(settings, "rotary", ("yes", "no"))
         machine = request.machine
         if not set(LINEAR) <= set(machine.axis_names):
             raise RefusedError.of("NCF484", f"the grid is over X, Y and Z; the machine has {machine.axis_names}")
         if not np.allclose(machine.tool.direction, (0, 0, 1), atol=1e-9):
             raise RefusedError.of("NCF484", "the tool of this machine is not along Z", hint="use the control fanuc")
-        units = (_unit(settings["detection_unit_um"]) / 1000, _unit(settings["detection_unit_deg"]) * DEGREE)
-        most = _points(settings["rotary_points"])
-        filling = Filling(request, settings["sign"], units)
-        two = settings["rotary"] == "yes" and bool(table_axes(request))
+        units = units_of(settings)
+        most = whole(settings, "rotary_points", 2, MOST_ROTARY)
+        backlash = Backlash.of(request, settings, units[0])
+        filling = LatticeFilling(request, sign, units, backlash)
+        two = rotary == "yes" and bool(table_axes(request))
         lattices = [filling.linear(PART if two else 1.0)]
         if two and (second := filling.rotary(PART, most)):
             lattices.append(second)
         names = (NAME, SECOND)[: len(lattices)]
         files = {name: lattice.text() for name, (lattice, _) in zip(names, lattices, strict=True)}
-        return Written(files, tuple(_notes(request, lattices)))
+        files |= backlash.files()
+        return Written(files, tuple(_notes(request, lattices, backlash.tables(units[0]), backlash.notes(units[0]))))
 
     def read(self, files: Files) -> Turning:
         """As the control is taken to add them. Raises `ConfigError` NCF491."""
-        found = _read(files)
-        for _, remarks in found:
-            remarks.check()
-        first, *more = (lattice for lattice, _ in found if lattice is not None)
+        lattices, backlash, remarks = _read(files)
+        for each in remarks:
+            each.check()
+        first, *more = lattices
+        play = backlash.tables(first.scale.units[0])
         if not more:
-            return Turning(*first.grids())
-        return Turning(*first.grids(), more[0].grids(), more[0].centre)
+            return Turning(*first.grids(), play=play)
+        return Turning(*first.grids(), more[0].grids(), more[0].centre, play)
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Records that do not fit, and values beyond the range."""
-        return tuple(message for _, remarks in _read(files) for message in remarks.messages)
+        return tuple(message for remarks in _read(files)[2] for message in remarks.messages)
 
 
-def _read(files: Files) -> list[tuple[Lattice | None, Remarks]]:
-    """The lattices of a folder, each with remarks on its file; none if it cannot be used."""
+def _read(files: Files) -> tuple[list[Lattice], Backlash, list[Remarks]]:
+    """The lattices of a folder that can be used, play, and remarks on every file."""
     found = [read_lattice(NAME, files.get(NAME, b""), linear=True)]
     if SECOND in files:
         found.append(read_lattice(SECOND, files[SECOND], linear=False))
-        if len({lattice.scale.sign for lattice, _ in found if lattice is not None}) > 1:
-            found[1][1].refuse(0, f"the sign is another one than that of {NAME}")
-    return found
+    lattices = [lattice for lattice, _ in found if lattice is not None]
+    if len({lattice.scale.sign for lattice in lattices}) > 1:
+        found[1][1].refuse(0, f"the sign is another one than that of {NAME}")
+    backlash, more = read_backlash(files, lattices[0].home_minus if lattices else "")
+    return lattices, backlash, [*(remarks for _, remarks in found), *more]
 
 
-def _notes(request: Request, lattices: Sequence[tuple[Lattice, Mesh]]) -> Iterator[str]:
+def _notes(
+    request: Request, lattices: Sequence[tuple[Lattice, Mesh]], play: Compensation, said: Iterator[str]
+) -> Iterator[str]:
     """What the lattices are, and what is left with the first one and with both."""
     tables = None
     for lattice, mesh in lattices:
@@ -205,7 +217,7 @@ def _notes(request: Request, lattices: Sequence[tuple[Lattice, Mesh]]) -> Iterat
             f"by {1e6 * angle:.2f} urad."
         )
         tables = (
-            Turning(*lattice.grids())
+            Turning(*lattice.grids(), play=play)
             if tables is None
             else replace(tables, table=lattice.grids(), centre=lattice.centre)
         )
@@ -216,20 +228,5 @@ def _notes(request: Request, lattices: Sequence[tuple[Lattice, Mesh]]) -> Iterat
             yield f"Its share of the target of {1e3 * request.target:g} um is not reached with the points allowed."
     if len(lattices) == 1 and request.machine.rotary.any():
         yield "The lattice is that of rotary axes at zero; at other angles more is left."
-    yield from reversal_note(request.machine, request.space, request.tool_length)
-
-
-def _unit(text: str) -> float:
-    try:
-        found = float(text)
-    except ValueError:
-        found = math.nan
-    if not 1e-6 <= found <= 10:
-        raise UsageError.of("NCF485", f"a detection unit of {text}", hint="from 0.000001 to 10")
-    return found
-
-
-def _points(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 2 <= int(text) <= MOST_ROTARY):
-        raise UsageError.of("NCF485", f"rotary_points={text}", hint=f"a whole number from 2 to {MOST_ROTARY}")
-    return int(text)
+    yield from said
+    yield from reversal_note(request.machine, request.space, request.tool_length, play)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,21 +18,26 @@ from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.mesh import AIM, Mesh, search
 from ncfix.tables.volume import Volume, inputs_that_matter
+from ncfix_fanuc.backlash import Backlash
+from ncfix_fanuc.filling import LEVEL
 from ncfix_fanuc.rotary_records import ANGLES, LINEAR, SIDE, Lattice
 
 LENGTH = 100.0
 """mm: the tool with which angles are worked out."""
 PART = 0.6
 """Share of the target for either lattice, if there are two."""
+TRIES = ((False, False), (True, True))
+"""How a lattice is filled, until it will do: fitted to what is around points, with points only where it bends."""
 
 
 @dataclass(frozen=True, slots=True)
-class Filling:
+class LatticeFilling:
     """How lattices are filled."""
 
     request: Request
     sign: str
     units: tuple[float, float]
+    backlash: Backlash
 
     @property
     def machine(self) -> Machine:
@@ -39,33 +45,40 @@ class Filling:
         return self.request.machine
 
     def linear(self, share: float) -> tuple[Lattice, Mesh]:
-        """The lattice over X, Y and Z, exact at its points, or fitted to what is around them if those miss too much."""
-        found = []
-        for area in (False, True):
-            mesh = self._searched(share * AIM * self.request.target, area)
-            found.append((self._lattice(mesh.grid.counts, area), mesh))
+        """The lattice over X, Y and Z: exact at its points if that will do, or fitted to what is around them."""
+        target = share * AIM * self.request.target
+        found: list[tuple[Lattice, Mesh]] = []
+        for area, trimmed in TRIES:
+            volume = self._volume(self.request.tool_length, area)
+            for index in range(len(LINEAR)) if trimmed else ():
+                volume = volume.trimmed(index, LEVEL * self.request.target)
+            volume.written = partial(self._as_written, area=area, covered=volume.covered)
+            mesh = search(volume, target, [SIDE] * 3, SIDE**3)
+            found.append((self._lattice(mesh.grid.counts, area, volume.covered), mesh))
             if mesh.reached:
                 break
         return min(found, key=lambda each: each[1].left)
 
-    def _searched(self, target: float, area: bool) -> Mesh:
-        volume = Volume.of(self.machine, LINEAR, self.request.space, self.request.tool_length, area)
-        volume.written = lambda grid: self._as_written(grid, area)
-        return search(volume, target, [SIDE] * 3, SIDE**3)
+    def _volume(self, length: float, area: bool) -> Volume:
+        volume = Volume.of(self.machine, LINEAR, self.request.space, length, area)
+        shift = self.backlash.shift(self.units[0])[[LINEAR.index(axis) for axis in volume.outputs]]
+        exact = volume.exact
+        return replace(volume, exact=lambda places: exact(places) + shift)
 
-    def _lattice(self, counts: Sequence[int], area: bool) -> Lattice:
+    def _lattice(self, counts: Sequence[int], area: bool, covered: Array) -> Lattice:
         """Tools of two lengths tell lengths from angles."""
-        space = self.request.space
-        bare, long = (Volume.of(self.machine, LINEAR, space, length, area).grid(counts) for length in (0.0, LENGTH))
+        volumes = (replace(self._volume(length, area), covered=covered) for length in (0.0, LENGTH))
+        bare, long = (volume.grid(counts) for volume in volumes)
         order = [bare.outputs.index(axis) for axis in LINEAR]
         lever = (long.values - bare.values)[..., order] / LENGTH
         angles = np.stack([lever[..., 1], -lever[..., 0], np.zeros(lever.shape[:-1])], axis=-1)
         lengths = replace(bare, outputs=LINEAR, values=bare.values[..., order])
-        return Lattice.of((lengths, replace(bare, outputs=ANGLES, values=angles)), self.sign, self.units)
+        found = Lattice.of((lengths, replace(bare, outputs=ANGLES, values=angles)), self.sign, self.units)
+        return replace(found, home_minus=self.backlash.home_minus)
 
-    def _as_written(self, grid: Grid, area: bool) -> Grid:
+    def _as_written(self, grid: Grid, area: bool, covered: Array) -> Grid:
         """What whole numbers make of the grid with that many points."""
-        lengths, angles = self._lattice(grid.counts, area).grids()
+        lengths, angles = self._lattice(grid.counts, area, covered).grids()
         total = lengths.values + np.cross(angles.values, (0.0, 0.0, -self.request.tool_length))
         return replace(grid, values=total[..., [LINEAR.index(axis) for axis in grid.outputs]])
 

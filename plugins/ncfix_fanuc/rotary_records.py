@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
+from ncfix_fanuc.units import DEGREE, sense_of
 
 SIDE = 25
 MOST_ROTARY = 400
 LARGEST = 127
-DEGREE = np.pi / 180
 ANGLES = ("A", "B", "C")
 LINEAR = ("X", "Y", "Z")
 
@@ -38,7 +38,7 @@ class Scale:
     @property
     def factors(self) -> tuple[float, float]:
         """Correction in mm and in rad of a value of 1."""
-        sense = 1.0 if self.sign == "correction" else -1.0
+        sense = float(sense_of(self.sign))
         length, angle = (sense * unit * many for unit, many in zip(self.units, self.magnifications, strict=True))
         return length, angle
 
@@ -59,6 +59,7 @@ class Lattice:
     lin      (*counts, 3) lengths along X, Y and Z
     rot      (*counts, 3) angles about X, Y and Z
     centre   mm: where angles turn about, if they turn a table
+    home_minus  the linear axes whose reference position return goes towards minus
     """
 
     inputs: tuple[str, ...]
@@ -68,6 +69,7 @@ class Lattice:
     lin: NDArray[np.int64]
     rot: NDArray[np.int64]
     centre: tuple[float, ...] = ()
+    home_minus: str = ""
 
     @classmethod
     def of(
@@ -77,8 +79,7 @@ class Lattice:
         factors, whole = [], []
         for grid, unit in zip(grids, units, strict=True):
             factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST * unit) - 1e-9)))
-            sense = 1 if sign == "correction" else -1
-            whole.append(np.rint(sense * grid.values / (factors[-1] * unit)).astype(np.int64))
+            whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
         inputs = grids[0].inputs
         lines = [line / _unit(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
         low = tuple(round(float(line[0]), 6) for line in lines)
@@ -109,7 +110,7 @@ class Lattice:
             "detection_unit_deg": round(self.scale.units[1] / DEGREE, 9),
             "magnification": self.scale.magnifications[0],
             "angle_magnification": self.scale.magnifications[1],
-            **({} if linear else {"centre_mm": self.centre}),
+            **({"home_minus": self.home_minus} if linear else {"centre_mm": self.centre}),
         }
         lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
         order = [*reversed(range(len(self.inputs))), len(self.inputs)]
@@ -159,7 +160,10 @@ def _checked(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> Lattic
         remarks.refuse(0, "centre_mm should be three lengths")
     if not len(low) == len(step) == len(inputs) or not all(value > 0 for value in step):
         remarks.refuse(0, "a first position and an interval above zero are needed for each axis")
-    return None if remarks.wrong else Lattice(inputs, low, step, scale, parts[0], parts[1], centre)
+    home_minus = str(found.get("home_minus", ""))
+    if not set(home_minus) <= set(LINEAR):
+        remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
+    return None if remarks.wrong else Lattice(inputs, low, step, scale, parts[0], parts[1], centre, home_minus)
 
 
 def _check_records(records: list[Mapping[str, Any]], counts: tuple[int, ...], remarks: Remarks) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
+from ncfix_isg.leadscrew import MARK
 
 LETTERS = "XYZABC"
 HEAD = {"workpiece_axes": "0"}
@@ -35,19 +37,28 @@ def config_text(numbers: Mapping[str, int], folder: str, names: Sequence[str], f
     return "".join(f"{name:<24}{value}\n" for name, value in entries.items()).encode()
 
 
-def read_configuration(files: Files) -> tuple[dict[str, list[str]], Remarks]:
-    """The grid files that the list names, each with the axes that may be looked up; and remarks on the list."""
-    lists = [name for name in files if name.endswith(".lis")]
+@dataclass(frozen=True, slots=True)
+class Configuration:
+    """What the list says: the grid files in their order, and the logical number of each axis."""
+
+    files: tuple[str, ...] = ()
+    numbers: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
+    """The list, and remarks on it; lists of single axes are none of its business."""
+    lists = [name for name, content in files.items() if name.lower().endswith(".lis") and MARK not in content]
     path = lists[0] if len(lists) == 1 else "volcomp.lis"
     remarks = Remarks.of(path, files[path] if len(lists) == 1 else b"")
     if len(lists) != 1:
         remarks.refuse(0, f"{len(lists)} configuration lists instead of one")
-        return {}, remarks
+        return Configuration(), remarks
     entries = _entries(remarks)
     _check_switches(entries, remarks)
     axes = [name for name in entries if name in LETTERS]
     _check_axes(entries, axes, remarks)
-    return dict.fromkeys(_grid_files(entries, remarks, files), axes), remarks
+    numbers = {axis: entries[axis][1] for axis in axes}
+    return Configuration(tuple(_grid_files(entries, remarks, files)), numbers), remarks
 
 
 Entries = dict[str, tuple[int, str]]

@@ -4,7 +4,7 @@ Grids hold the error of each linear axis over the axes that matter, rotary ones 
 control is not needed: with `workpiece_axes 0` and no angles the control takes EXX, EXY and EXZ off the command of X,
 and so on. What the grids say together is therefore ncfix's exact correction with the opposite sign. Over more than
 three axes one grid takes more nodes than are worth it; then each linear axis has up to three grids, over fewer axes
-each.
+each. Play, of which grids know nothing, goes into the leadscrew compensation of the axes.
 """
 
 from __future__ import annotations
@@ -15,20 +15,26 @@ from typing import ClassVar
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.exact import reversal_note
 from ncfix.tables.faces import faces, searched
 from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import AIM, search
 from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.reversal import Reversal, reversal_note, reversals
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, read_configuration
 from ncfix_isg.csv_file import grid_text, parameters, read_grids
+from ncfix_isg.leadscrew import MOST, NAME, list_text, read_leadscrews
 
 TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
 LINEAR = "XYZ"
-CHOICES = {"fit": ("nodes", "area"), "steps": ("uneven", "even"), "grids": ("auto", "one", "sum")}
+CHOICES = {
+    "fit": ("nodes", "area"),
+    "steps": ("uneven", "even"),
+    "grids": ("auto", "one", "sum"),
+    "play": ("yes", "no"),
+}
 ONE = 3
 """Up to so many inputs a single grid does."""
 
@@ -46,7 +52,7 @@ class Isg(Control):
         unit="values mm, positions mm and degree",
         quantum=(1e-6, 1e-6),
         extrapolation="taken as held at the outermost nodes (ISG-2)",
-        bidirectional=False,
+        bidirectional=True,
         max_points=1_000_000,
         max_tables=50,
         combine="sum: EXX, EXY and EXZ are all in the direction of X",
@@ -82,6 +88,14 @@ class Isg(Control):
             "uneven",
             "The control reports error 70471 if it wants even steps: --set steps=even.",
         ),
+        Assumption(
+            "ISG-5",
+            "Leadscrew compensation (kw.ssfk) and VOLCOMP both change the setpoint, and their changes add up.",
+            "TF5200 documentation: leadscrew compensation changes the setpoint of its axis; TF5280 says the same of "
+            "VOLCOMP; of both together neither says anything",
+            "so; --set play=no writes no axis lists",
+            "Switch on one, then both, and read the setpoint of the drive while the axis stands still.",
+        ),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "folder": Option("C:\\vc", "where the control finds the grid file"),
@@ -90,17 +104,26 @@ class Isg(Control):
         "fit": Option("nodes", "nodes: exact at the nodes; area: least squares over what is around them"),
         "grids": Option("auto", "one: a grid over all axes that matter; sum: several over fewer axes each; or auto"),
         "steps": Option("uneven", "uneven: nodes where the error bends; even: evenly spaced (ISG-4)"),
+        "play": Option(
+            "yes", "yes: what the way of an axis changes goes into its leadscrew compensation; no: it is left"
+        ),
         "points": Option("20000", "most nodes in all; vol_comp[0].max_records must allow them"),
     }
     steps = (
         "Copy the grid files, volcomp0.csv and on, to the folder that volcomp.lis names.",
         "Enter volcomp.lis in the start-up list as vol_comp[0].file_name; vol_comp[0].max_records must be at least the "
         "number of nodes of all files.",
+        "Is there a leadscrew_*.lis? Enter its lines in the compensation list of that axis and set lr_param.ssfk 1 in "
+        "the axis parameters. If that list holds values already, do not replace them: add these to both ways, since "
+        "the machine was measured with them. Set no other backlash compensation for the same play.",
         "Start the control, home all axes, and switch on: #VOLCOMP ON [ID0].",
         "Read the compensation values at one pose and compare them with ncfix emulate.",
         "Measure one line again: the error must have become smaller, not twice as large.",
     )
-    switch_off = "#VOLCOMP OFF in the program, or take vol_comp[0] out of the start-up list."
+    switch_off = (
+        "#VOLCOMP OFF in the program, or take vol_comp[0] out of the start-up list; lr_param.ssfk 0 for axes with a "
+        "leadscrew_*.lis."
+    )
 
     def write(self, request: Request) -> Written:
         """`volcomp.lis` and the grids over the axes that matter."""
@@ -120,14 +143,17 @@ class Isg(Control):
         files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps)}
         for name, owners, grid in zip(names, made.owners, made.grids, strict=True):
             files[name] = grid_text(grid, owners)
-        return Written(files, tuple(_notes(made, request)))
+        play = _play(request, settings)
+        for each in play:
+            files[NAME.format(each.axis)] = list_text(each, numbers[each.axis])
+        return Written(files, tuple(_notes(made, request, play)))
 
     def read(self, files: Files) -> Compensation:
         """As the control would take them. Raises `ConfigError` NCF491."""
-        grids, remarks = self._read(files)
+        compensation, remarks = self._read(files)
         for each in remarks:
             each.check()
-        return grids
+        return compensation
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would report, and what is rarely meant."""
@@ -135,9 +161,10 @@ class Isg(Control):
         return tuple(message for each in remarks for message in each.messages)
 
     def _read(self, files: Files) -> tuple[Compensation, list[Remarks]]:
-        names, config = read_configuration(files)
-        grids, remarks = read_grids(names, files)
-        return Compensation(tuple(Term((grid,)) for grid in grids)), [config, *remarks]
+        listed, config = read_configuration(files)
+        grids, remarks = read_grids(listed.files, listed.numbers, files)
+        play, more = read_leadscrews(files, listed.numbers)
+        return Compensation((*(Term((grid,)) for grid in grids), *play)), [config, *remarks, *more]
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,12 +211,21 @@ def _whole(settings: Mapping[str, str], key: str, low: int) -> int:
     return int(text)
 
 
-def _notes(made: _Made, request: Request) -> Iterator[str]:
+def _play(request: Request, settings: Mapping[str, str]) -> tuple[Reversal, ...]:
+    if settings["play"] == "no":
+        return ()
+    return reversals(request.machine, request.space, request.tool_length, request.target, MOST)
+
+
+def _notes(made: _Made, request: Request, play: tuple[Reversal, ...]) -> Iterator[str]:
     for grid, owner in zip(made.grids, made.owners, strict=True):
         counts = " x ".join(f"{name} {count}" for name, count in zip(grid.inputs, grid.counts, strict=True))
         yield f"Grid {counts}: {grid.points} nodes for {', '.join(parameters(grid, owner))}."
     yield f"Together they miss {1e3 * made.left:.2f} um at most between the nodes."
     if made.left > request.target:
         yield f"The target of {1e3 * request.target:g} um is not reached with these nodes: --set points=N allows more."
-    yield from reversal_note(request.machine, request.space, request.tool_length)
+    for each in play:
+        yield f"Play of {each.axis}, {1e3 * each.whole:+.2f} um from minus to plus, is in {NAME.format(each.axis)}."
+    done = Compensation(tuple(term for each in play for term in each.terms()))
+    yield from reversal_note(request.machine, request.space, request.tool_length, done)
     yield "The orientation of the tool is not corrected."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def grid_text(grid: Grid, owner: str = "") -> bytes:
         " ".join([*(f"{place:g}" if place == round(place, 3) else f"{place:.6f}" for place in at), *_six(value)])
         for at, value in zip(places.tolist(), values.tolist(), strict=True)
     ]
-    comment = "// ncfix: errors in mm, positions in mm and degree; assumptions ISG-1 to ISG-3, see hand-over.md"
+    comment = "// ncfix: errors in mm, positions in mm and degree; assumptions ISG-1 to ISG-5, see hand-over.md"
     return "".join(f"{row}\n" for row in [comment, head, *rows]).encode()
 
 
@@ -48,12 +48,12 @@ def _six(values: Sequence[float]) -> list[str]:
     return [f"{value:.6f}" for value in values]
 
 
-def read_grids(names: Mapping[str, Sequence[str]], files: Files) -> tuple[list[Grid], list[Remarks]]:
-    """The grids of corrections in these files (name -> axes that may be arguments), with remarks on each file."""
+def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tuple[list[Grid], list[Remarks]]:
+    """The grids of corrections in these files, with remarks on each; axes: that may be arguments."""
     grids: list[Grid] = []
     remarks = []
     seen: dict[str, str] = {}
-    for name, axes in names.items():
+    for name in names:
         found = Remarks.of(name, files[name])
         remarks.append(found)
         rows = [(number, row.split("//", 1)[0].split()) for number, row in enumerate(found.rows, 1)]
@@ -70,7 +70,7 @@ def read_grids(names: Mapping[str, Sequence[str]], files: Files) -> tuple[list[G
 
 
 def _header(
-    remarks: Remarks, line: int, head: Sequence[str], axes: Sequence[str], seen: dict[str, str]
+    remarks: Remarks, line: int, head: Sequence[str], axes: Collection[str], seen: dict[str, str]
 ) -> tuple[list[str], list[str]]:
     inputs = [word for word in head if word in LETTERS]
     outputs = [word for word in head if word not in inputs]

@@ -43,6 +43,7 @@ def test_golden_records() -> None:
         "order": "XYZ",
         "largest": 127,
         "template": "",
+        "home_minus": "",
         "records": [record],
     }
     lines = exported().native["volume.csv"].splitlines()

@@ -140,6 +140,8 @@ def tell(made: Exported, as_json: bool, **more: object) -> None:
     if as_json:
         entries = {**more, "class": reaches, "files": sorted(made.files), "residual_um": figures}
         warnings = [message.as_dict() for message in made.messages]
+        if made.least:
+            entries["least_um"] = {"max": 1e3 * made.least.value, "why": made.least.why}
         console.put_json(**entries, limits=made.limits(), notes=made.notes, warnings=warnings)
         return
     rows = [(when, *(f"{figures[when][key]:.2f}" for key in ("max", "rms", "mean"))) for when in ("before", "after")]

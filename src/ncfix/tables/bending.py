@@ -81,6 +81,24 @@ class Bending:
         chord = np.repeat(ends[:, :-1], BETWEEN, axis=1) * (1 - share) + np.repeat(ends[:, 1:], BETWEEN, axis=1) * share
         return float(np.linalg.norm(values - chord, axis=2).max())
 
+    def ends(self, allowed: float) -> tuple[float, float]:
+        """The places between which corrections change: before and after them by no more than is allowed, mm."""
+        low, high = (self._level(values, allowed) for values in (self.values, self.values[:, ::-1]))
+        if low + high >= len(self.places) - 1:
+            return float(self.places[0]), float(self.places[-1])
+        return float(self.places[low]), float(self.places[len(self.places) - 1 - high])
+
+    @staticmethod
+    def _level(values: Array, allowed: float) -> int:
+        """The last place up to which corrections are as they are there, but for what is allowed."""
+        last = 0
+        for place in range(1, values.shape[1]):
+            change = np.linalg.norm(values[:, :place] - values[:, place : place + 1], axis=2)
+            if change.max() > allowed:
+                break
+            last = place
+        return last
+
     def uneven(self) -> dict[int, tuple[Array, float]]:
         """Number of nodes -> where they are best put, and the largest correction that they miss then, mm."""
         if not self._uneven:

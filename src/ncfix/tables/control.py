@@ -89,11 +89,29 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
+class Least:
+    """No tables of this kind leave less than `value` (mm) at the worst; `why`, in words."""
+
+    value: float
+    why: str
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        return f"No tables of this kind can leave less than {1e3 * self.value:.2f} um at the worst: {self.why}."
+
+
+@dataclass(frozen=True, slots=True)
 class Written:
-    """The files of a control. `notes`: what could not be done as asked, in words."""
+    """The files of a control.
+
+    notes  what could not be done as asked, in words
+    least  what no tables of this kind could do better, if that is known
+    """
 
     files: Files
     notes: tuple[str, ...] = ()
+    least: Least | None = None
 
 
 class Control(ABC):

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.tables.grid import Array
-from ncfix.tables.poses import random_poses, random_ways
 
 ARRIVED = 1e-7
 """mm: nearer to the intended tip than any control can resolve."""
 PASSES = 20
-WAYS = 1000
-"""Random poses at which it is seen what the way changes in which an axis moves."""
-SLIGHT = 1e-5
-"""mm: a change that is none."""
 ANEW = 5
 """Passes for which a Jacobian is good: each takes the gap down by the gradient of the errors, a thousandth or so."""
 
@@ -53,15 +46,6 @@ def exact_correction(machine: Machine, q: Array, state: State, start: Array | No
     raise RefusedError.of(
         "NCF482", "no correction found that brings the tip where it should be", hint="the error model may have a jump"
     )
-
-
-def reversal_note(machine: Machine, space: Array, tool_length: float) -> Iterator[str]:
-    """What to say of play, for tables that do not know which way an axis moves: what they cannot take off."""
-    q, ways = random_poses(space, WAYS, seed=21), random_ways(len(space), WAYS, seed=22)
-    either, mean = (exact_correction(machine, q, State(tool_length, way)) for way in (ways, np.zeros_like(ways)))
-    left = float(np.linalg.norm((either - mean)[:, linear_axes(machine)], axis=1).max())
-    if left > SLIGHT:
-        yield f"What the way changes in which an axis moves (play) is left: up to {1e3 * left:.2f} um."
 
 
 def own_rotary_error(machine: Machine, q: Array, state: State, axis: int) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
 from ncfix.tables import manifest as side
-from ncfix.tables.control import Control, Files, Request
+from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.grid import Array
 from ncfix.tables.manifest import Manifest
 from ncfix.tables.neutral import Tables
@@ -30,6 +30,7 @@ class Exported:
 
     native  the control's own files
     files   all: also the side file and the hand-over sheet
+    least   what no tables of this kind could do better, if that is known
     """
 
     native: Files
@@ -38,6 +39,7 @@ class Exported:
     left: Residual
     notes: tuple[str, ...]
     messages: tuple[Message, ...]
+    least: Least | None = None
 
     def limits(self) -> dict[str, Any]:
         """How much of what the control can hold is used."""
@@ -61,7 +63,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     messages = control.lint(written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
-    written = replace(written, notes=(*written.notes, *_remarks(control, request, left)))
+    written = replace(written, notes=(*written.notes, *_remarks(control, request, left, written)))
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
     more = {
@@ -69,7 +71,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
         f"{SHEET}.md": sheet.encode(),
         f"{SHEET}.html": as_html(sheet).encode(),
     }
-    return Exported(written.files, {**written.files, **more}, tables, left, written.notes, messages)
+    return Exported(written.files, {**written.files, **more}, tables, left, written.notes, messages, written.least)
 
 
 def emulate(
@@ -103,8 +105,10 @@ def emulate(
     return Exported(native, files, tables, left, (), messages)
 
 
-def _remarks(control: Control, request: Request, left: Residual) -> Iterator[str]:
-    """What holds for tables of any control: whether they do anything, and for which tool."""
+def _remarks(control: Control, request: Request, left: Residual, written: Written) -> Iterator[str]:
+    """What holds for tables of any control: whether they do anything, how little they could leave, for which tool."""
+    if written.least and written.least.value > request.target / 10:
+        yield written.least.sentence
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."

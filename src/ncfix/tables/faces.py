@@ -191,6 +191,7 @@ def _part(volume: Volume, face: Face, before: Sequence[Face]) -> Volume:
         volume,
         inputs=tuple(volume.inputs[axis] for axis in chosen),
         ranges=volume.ranges[chosen],
+        covered=volume.covered[chosen],
         units=tuple(volume.units[axis] for axis in chosen),
         outputs=tuple(volume.outputs[number] for number in face.outputs),
         exact=exact,

@@ -63,17 +63,21 @@ class Remainder:
         return found
 
 
-def least_worst(nodes: Sequence[Array], turns: Sequence[bool], values: Array, enough: float) -> Remainder:
+def least_worst(
+    nodes: Sequence[Array], turns: Sequence[bool], values: Array, enough: float, together: int = 2
+) -> Remainder:
     """What is left of values (*counts, n_outputs) by those functions of pairs that leave little at the worst.
 
     Of all that are tried those for which the product of the largest error and the rms is smallest: what lowers one by
     raising the other as much is no gain.
 
-    enough  as much may be left at the worst by the least-squares fit, which is then kept
+    enough    as much may be left at the worst by the least-squares fit, which is then kept
+    together  1: sums of functions of one axis each, instead of two
     """
     axes = values.ndim - 1
     pairs = [
-        tuple(axis for axis in range(axes) if axis not in pair) for pair in combinations(range(axes), min(2, axes))
+        tuple(axis for axis in range(axes) if axis not in pair)
+        for pair in combinations(range(axes), min(together, axes))
     ]
     weights = even = _shares(values.shape[:-1], turns)
     left = values

@@ -104,3 +104,7 @@ class Compensation:
     def points(self) -> int:
         """The nodes of all its tables."""
         return sum(grid.points for grid in self.grids)
+
+
+NOTHING = Compensation(())
+"""No tables at all."""

@@ -64,3 +64,8 @@ def even_poses(space: Array, count: int) -> Array:
     share = np.mod(0.5 + np.arange(1, count + 1)[:, None] * steps, 1.0)
     poses: Array = space[:, 0] + share * (space[:, 1] - space[:, 0])
     return poses
+
+
+def corners(space: Array) -> Array:
+    """The corners of the space, (2 ** n_axes, n_axes)."""
+    return np.stack(np.meshgrid(*space, indexing="ij"), axis=-1).reshape(-1, len(space))

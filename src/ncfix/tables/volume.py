@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ncfix.tables.bending import Bending
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.fit import WITHIN, between, fitted
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.poses import random_poses
+from ncfix.tables.poses import corners, even_poses, random_poses
 
 LINES = 32
 """Random lines along an axis on which its bending is judged."""
@@ -22,6 +22,8 @@ MATTERS = 1e-6
 """mm: a smaller change of the correction is none."""
 DIGITS = 6
 """Decimals of a node's position, mm or degree."""
+OTHERS = 24
+"""Poses of other axes, besides the corners of their ranges, over which a middle is taken."""
 CLOSE = 48
 """Up to here every count of even nodes is looked at, since they may come to lie on the kinks of a table; then some."""
 FAR = 130
@@ -47,6 +49,7 @@ class Volume:
     written  what a file makes of a grid: it is judged after that
     kinks    of each input, positions at which the corrections may have a corner
     uneven   nodes need not be evenly spaced
+    covered  (n_inputs, 2) where nodes are, mm and rad; beyond, but within the ranges, the values at the ends hold
     """
 
     inputs: tuple[str, ...]
@@ -58,8 +61,13 @@ class Volume:
     written: Callable[[Grid], Grid] = as_it_is
     kinks: tuple[Array, ...] = ()
     uneven: bool = False
+    covered: Array = field(default_factory=lambda: np.zeros((0, 2)))
     _bending: dict[int, Bending] = field(default_factory=dict, init=False)
     _checks: list[tuple[Array, Array]] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        if not len(self.covered):
+            self.covered = self.ranges
 
     @classmethod
     def of(
@@ -80,17 +88,47 @@ class Volume:
         kinks = tuple(machine.breakpoints(name) for name in inputs)
         return cls(inputs, space[columns], units, outputs, exact, area, kinks=kinks)
 
+    @classmethod
+    def over_all(
+        cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
+    ) -> Volume:
+        """The same, in the middle of what is asked for over the whole range of the other axes."""
+        found = cls.of(machine, inputs, space, tool_length, area)
+        columns = [machine.axis_names.index(name) for name in inputs]
+        rest = np.concatenate([corners(space), even_poses(space, OTHERS)])
+        rest[:, columns] = 0.0
+        rest = np.unique(rest, axis=0)
+
+        def exact(positions: Array) -> Array:
+            low = high = found.exact(positions)
+            for place in rest:
+                q = np.tile(place, (len(positions), 1))
+                q[:, columns] = positions
+                one = exact_correction(machine, q, State(tool_length))[:, linear_axes(machine)]
+                low, high = np.minimum(low, one), np.maximum(high, one)
+            return (low + high) / 2
+
+        return replace(found, exact=exact)
+
     def grid(self, counts: Sequence[int]) -> Grid:
         """The table with that many nodes along each input, at positions that files can say."""
         nodes = tuple(self._nodes(index, count) for index, count in enumerate(counts))
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
-        looked_at = tuple(between(line, within) for line in nodes) if self.area else nodes
+        looked_at = tuple(self._around(index, line, within) for index, line in enumerate(nodes)) if self.area else nodes
         places = np.stack(np.meshgrid(*looked_at, indexing="ij"), axis=-1)
         values = self.exact(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(self.outputs))
         return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
 
+    def _around(self, index: int, nodes: Array, within: int) -> Array:
+        """Places between the nodes, and those beyond them at which the ends hold."""
+        low, high = self.ranges[index].tolist()
+        step = (nodes[-1] - nodes[0]) / (len(nodes) - 1) / within
+        before = np.arange(low, nodes[0] - step / 2, step)
+        after = nodes[-1] + step * np.arange(1, int((high - nodes[-1]) / step + 0.5) + 1)
+        return np.concatenate([before, between(nodes, within), after])
+
     def _nodes(self, index: int, count: int) -> Array:
-        low, high = (self.ranges[index] / self.units[index]).tolist()
+        low, high = (self.covered[index] / self.units[index]).tolist()
         line: Array = np.linspace(low, high, count)
         if self.uneven:
             line = self._bends(index).uneven()[count][0] / self.units[index]
@@ -123,9 +161,15 @@ class Volume:
         bends = self._bends(index)
         return bends.uneven()[count][1] if self.uneven else bends.missed(count)
 
+    def trimmed(self, index: int, allowed: float) -> Volume:
+        """Nodes of one input only where the corrections change: at either end by no more than is allowed, mm."""
+        covered = self.covered.copy()
+        covered[index] = self._bends(index).ends(allowed)
+        return replace(self, covered=covered)
+
     def _bends(self, index: int) -> Bending:
         if index not in self._bending:
-            low, high = self.ranges[index].tolist()
+            low, high = self.covered[index].tolist()
             kinks = self.kinks[index] if self.kinks else np.zeros(0)
             spread = random_poses(self.ranges, LINES, seed=5)
             self._bending[index] = Bending.over(low, high, kinks, lambda line: self._along(spread, index, line))

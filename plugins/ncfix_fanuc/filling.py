@@ -1,0 +1,167 @@
+"""How the grid over X, Y and Z is filled: exact, fitted or in the middle, in whole numbers, play apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.diagnostics import RefusedError
+from ncfix.tables.control import Least, Request
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.least import of_even_nodes, of_functions
+from ncfix.tables.mesh import AIM, Mesh, search
+from ncfix.tables.reversal import reversal_note
+from ncfix.tables.settings import choice, number, whole, wrong
+from ncfix.tables.volume import Volume
+from ncfix_fanuc.backlash import Backlash
+from ncfix_fanuc.records import TEXT, Style, Volc
+from ncfix_fanuc.units import SIGNS, sense_of
+
+SIDE = 25
+MOST_MAGNIFICATION = 100
+AXES = ("X", "Y", "Z")
+TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
+MOST_NUMBER = 99_999_999
+FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
+ROTARY = ("zero", "middle")
+SAID = {
+    "zero": "The grid is that of rotary axes at zero; at other angles more is left (rotary=middle shares it out).",
+    "middle": "The grid lies in the middle of what all angles of the rotary axes ask for, and is exact at none.",
+}
+LEVEL = 0.1
+"""Of the target: where less changes towards an end of the travel, the edge of the grid may hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class GridFilling:
+    """What a grid is made of.
+
+    sign  "correction" or "error"
+    unit  detection unit, mm
+    """
+
+    request: Request
+    sign: str
+    unit: float
+    style: Style
+    backlash: Backlash
+    fit: str
+    rotary: str
+
+    @classmethod
+    def of(cls, request: Request, settings: Mapping[str, str]) -> GridFilling:
+        """From the settings; raises `UsageError` NCF485 and `RefusedError` NCF484."""
+        if not set(AXES) <= set(request.machine.axis_names):
+            text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
+            raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+        sign = choice(settings, "sign", SIGNS, f"{' or '.join(SIGNS)}; FANUC-1 says how to find out")
+        unit = number(settings, "detection_unit_um", 0.001, 10) / 1000
+        fit, rotary = choice(settings, "fit", tuple(FITS)), choice(settings, "rotary", ROTARY)
+        return cls(request, sign, unit, _style(settings), Backlash.of(request, settings, unit), fit, rotary)
+
+    def volc(self) -> tuple[Volc, Mesh]:
+        """The grid in whole numbers, and what it misses."""
+        mesh = self._searched()
+        order = [mesh.grid.outputs.index(axis) for axis in AXES]
+        values = mesh.grid.values[..., order]
+        magnification = _magnification(values, self.style.largest * self.unit)
+        if magnification > MOST_MAGNIFICATION:
+            text = f"a value of {float(np.abs(values).max()):.3f} mm needs a magnification of {magnification}"
+            hint = f"the control takes {MOST_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
+            raise RefusedError.of("NCF484", text, hint=hint)
+        whole = np.rint(sense_of(self.sign) * values / (magnification * self.unit)).astype(np.int64)
+        low = tuple(float(line[0]) for line in mesh.grid.nodes)
+        step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
+        return Volc(self.sign, low, step, self.unit, magnification, whole, self.style), mesh
+
+    def _searched(self) -> Mesh:
+        """Exact at its points if that will do, or fitted to what is around them, with points only where it bends."""
+        first, *more = FITS[self.fit]
+        found = [self._mesh(first, False)]
+        if not found[0].reached:
+            found.append(self._mesh(more[0] if more else first, True))
+        return found[-1] if found[-1].reached else min(found, key=lambda mesh: mesh.left)
+
+    def _mesh(self, area: bool, trimmed: bool) -> Mesh:
+        volume = self._volume(area)
+        for index in range(len(AXES)) if trimmed else ():
+            volume = volume.trimmed(index, LEVEL * self.request.target)
+        return search(volume, AIM * self.request.target, [SIDE] * 3, SIDE**3)
+
+    def _volume(self, area: bool = False) -> Volume:
+        request = self.request
+        of = Volume.over_all if self.rotary == "middle" else Volume.of
+        volume = of(request.machine, AXES, request.space, request.tool_length, area)
+        shift = self.backlash.shift(self.unit)[[AXES.index(axis) for axis in volume.outputs]]
+        exact = volume.exact
+        return replace(volume, exact=lambda places: exact(places) + shift, written=self._rounded)
+
+    def _rounded(self, grid: Grid) -> Grid:
+        """What whole numbers make of it."""
+        quantum = _magnification(grid.values, self.style.largest * self.unit) * self.unit
+        return replace(grid, values=np.rint(grid.values / quantum) * quantum)
+
+    def least(self) -> Least:
+        """What no grid over X, Y and Z could do better."""
+        request, play = self.request, any(self.backlash.amounts)
+        return of_functions(request.machine, request.space, request.tool_length, AXES, play)
+
+    def _even(self, mesh: Mesh) -> Iterator[str]:
+        """Of a target that is not reached, why, if it is for want of points."""
+        covered = np.array([[line[0], line[-1]] for line in mesh.grid.nodes])
+        for index, count in enumerate(mesh.grid.counts):
+            if count == SIDE:
+                yield of_even_nodes(replace(self._volume(), covered=covered), index, SIDE).sentence
+
+    def notes(self, volc: Volc, mesh: Mesh) -> Iterator[str]:
+        """What was made, and what is left."""
+        request, style = self.request, self.style
+        counts = " x ".join(map(str, mesh.grid.counts))
+        missed = f"it misses {1e3 * mesh.left:.2f} um at most, rounding included"
+        yield f"Grid {counts}: {mesh.grid.points} points; {missed}."
+        rounding = volc.magnification * self.unit / 2
+        yield f"Magnification {volc.magnification}: a value is rounded by up to {1e3 * rounding:.2f} um."
+        if rounding > request.target:
+            cure = f"values have {style.largest} steps only" if volc.magnification > 1 else "a smaller unit would help"
+            yield f"The rounding is larger than the target: {cure}."
+        if mesh.left > request.target:
+            yield f"The target of {1e3 * request.target:g} um is not reached with {SIDE} points an axis."
+            yield from self._even(mesh)
+        yield from self._outside(mesh)
+        yield from self.backlash.notes(self.unit)
+        done = self.backlash.tables(self.unit)
+        yield from reversal_note(request.machine, request.space, request.tool_length, done)
+        if request.machine.rotary.any():
+            yield SAID[self.rotary]
+        if style.template:
+            yield f"{TEXT} is a guess at the control's own file (FANUC-5): compare it with a punched one first."
+
+    def _outside(self, mesh: Mesh) -> Iterator[str]:
+        for axis, line in zip(mesh.grid.inputs, mesh.grid.nodes, strict=True):
+            low, high = self.request.space[self.request.machine.axis_names.index(axis)].tolist()
+            if line[0] > low + 1e-6 or line[-1] < high - 1e-6:
+                yield (
+                    f"The grid goes from {axis}{line[0]:g} to {axis}{line[-1]:g} only, since little changes beyond: "
+                    "there the control must hold the value of the edge (FANUC-4)."
+                )
+
+
+def _magnification(values: Array, largest: float) -> int:
+    return max(1, math.ceil(float(np.abs(values).max()) / largest - 1e-9))
+
+
+def _style(settings: Mapping[str, str]) -> Style:
+    if sorted(settings["order"]) != list(AXES):
+        raise wrong(settings, "order", "XYZ, ZYX, ...: each axis once")
+    first, largest = whole(settings, "first_number", 0, MOST_NUMBER), whole(settings, "largest", 1, MOST_NUMBER)
+    template = settings["template"]
+    try:
+        template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)
+    except (KeyError, ValueError, IndexError) as error:
+        raise wrong(settings, "template", f"like {TEMPLATE}") from error
+    if template and not all(f"{{{name}" in template for name in ("dx", "dy", "dz")):
+        raise wrong(settings, "template", "it needs {dx}, {dy} and {dz}")
+    return Style(first, settings["order"], largest, template, "".join(sorted(settings["home_minus"].upper())))

@@ -1,0 +1,29 @@
+"""Settings that several of Fanuc's compensations share: the sign, and detection units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ncfix.tables.control import Option
+from ncfix.tables.settings import number
+
+DEGREE = np.pi / 180
+SIGNS = ("correction", "error")
+SIGN = Option(None, "correction: values are added to the command; error: they are taken off it")
+UNITS: Mapping[str, Option] = {
+    "detection_unit_um": Option("0.1", "detection unit of linear axes, um"),
+    "detection_unit_deg": Option("0.0001", "detection unit of rotary axes and of angles, degree"),
+}
+
+
+def sense_of(sign: str) -> int:
+    """1 if values are added, -1 if they are taken off."""
+    return 1 if sign == SIGNS[0] else -1
+
+
+def units_of(settings: Mapping[str, str]) -> tuple[float, float]:
+    """Detection units, mm and rad."""
+    length, angle = (number(settings, key, 1e-6, 10) for key in UNITS)
+    return length / 1000, angle * DEGREE

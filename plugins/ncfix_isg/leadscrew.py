@@ -1,0 +1,128 @@
+"""Play as leadscrew compensation of single axes (`kw.ssfk`), one axis list for each axis that has some.
+
+What VOLCOMP holds does not know the way an axis moves. The leadscrew compensation of the control does, if it is
+bilateral: TF5200 documentation, whose own example says that values are actual position less setpoint, that is errors,
+in tenths of a micrometre, with straight lines between them. It changes the setpoint, and so does VOLCOMP.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from ncfix.tables.control import Files
+from ncfix.tables.grid import Grid
+from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Term
+from ncfix.tables.reversal import Reversal
+
+UNIT = 1e-4
+"""mm: of positions and values."""
+MOST = 1500
+"""Points of a table (P-COMP-00059)."""
+MARK = b"kw.ssfk"
+"""What tells these lists from that of VOLCOMP."""
+NAME = "leadscrew_{}.lis"
+HEAD = {"interval": "0", "unit": "1", "bilateral": "1"}
+LARGE = 10_000
+"""1 mm: no machine has so much."""
+POINT = re.compile(r"kw\.ssfk\.table\[(\d+)\]\.(setpoint|pos|neg)")
+WHOLE = re.compile(r"[-+]?\d+")
+
+
+def list_text(reversal: Reversal, number: int) -> bytes:
+    """The axis list: errors one way and the other, at the same positions."""
+    places = np.rint(reversal.nodes / UNIT).astype(np.int64).tolist()
+    errors = np.rint(-reversal.half / UNIT).astype(np.int64).tolist()
+    entries: dict[str, object] = {"kopf.achs_nr": number, "kopf.log_achs_name": reversal.axis}
+    entries |= {"kw.ssfk.interval": 0, "kw.ssfk.kw_startpos": places[0], "kw.ssfk.kw_nr_max": len(places)}
+    entries |= {"kw.ssfk.unit": 1, "kw.ssfk.bilateral": 1}
+    for index, (place, error) in enumerate(zip(places, errors, strict=True)):
+        table = f"kw.ssfk.table[{index}]"
+        entries |= {f"{table}.setpoint": place, f"{table}.pos": error, f"{table}.neg": -error}
+    return "".join(f"{name:<32}{value}\n" for name, value in entries.items()).encode()
+
+
+def read_leadscrews(files: Files, numbers: Mapping[str, str]) -> tuple[list[Term], list[Remarks]]:
+    """What the axis lists among the files do, with remarks on each; numbers: axis -> number in VOLCOMP's list."""
+    terms: list[Term] = []
+    remarks = []
+    for name, content in sorted(files.items()):
+        if MARK in content:
+            found = Remarks.of(name, content)
+            remarks.append(found)
+            terms += _terms(found, numbers)
+    axes = [term.outputs[0] for term in terms[::2]]
+    for axis in sorted({axis for axis in axes if axes.count(axis) > 1}):
+        remarks[0].refuse(0, f"two lists are for axis {axis}")
+    return terms, remarks
+
+
+def _terms(remarks: Remarks, numbers: Mapping[str, str]) -> Iterator[Term]:
+    entries = _entries(remarks)
+    axis = _axis(remarks, entries, numbers)
+    for name, value in HEAD.items():
+        line, found = entries.get(f"kw.ssfk.{name}", (0, ""))
+        if found != value:
+            remarks.refuse(line, f"kw.ssfk.{name} is {found or 'missing'}", f"ncfix writes and reads {value}")
+    points = _points(remarks, entries)
+    if remarks.wrong:
+        return
+    nodes = np.array([point["setpoint"] for point in points], dtype=np.float64) * UNIT
+    for key, way in (("pos", 1), ("neg", -1)):
+        values = np.array([-point[key] for point in points], dtype=np.float64) * UNIT
+        yield Term((Grid((axis,), (nodes,), (axis,), values[:, None]),), (axis, way))
+
+
+def _entries(remarks: Remarks) -> dict[str, tuple[int, str]]:
+    found: dict[str, tuple[int, str]] = {}
+    for number, row in enumerate(remarks.rows, 1):
+        words = row.split("#", 1)[0].split(None, 1)
+        if len(words) == 1:
+            remarks.refuse(number, f"{words[0]!r} has no value")
+        elif words:
+            if words[0] in found:
+                remarks.refuse(number, f"{words[0]} is there twice")
+            found[words[0]] = (number, words[1].strip())
+    return found
+
+
+def _axis(remarks: Remarks, entries: Mapping[str, tuple[int, str]], numbers: Mapping[str, str]) -> str:
+    line, axis = entries.get("kopf.log_achs_name", (0, ""))
+    if axis not in numbers or axis not in "XYZ":
+        remarks.refuse(line, f"kopf.log_achs_name is {axis or 'missing'}", "a linear axis of the configuration list")
+    line, number = entries.get("kopf.achs_nr", (0, ""))
+    if axis in numbers and number != numbers[axis]:
+        remarks.refuse(line, f"kopf.achs_nr is {number or 'missing'}, and the configuration says {numbers[axis]}")
+    return axis
+
+
+def _points(remarks: Remarks, entries: Mapping[str, tuple[int, str]]) -> list[dict[str, int]]:
+    points: dict[int, dict[str, int]] = {}
+    for name, (line, value) in entries.items():
+        match = POINT.fullmatch(name)
+        if match is None:
+            continue
+        if not WHOLE.fullmatch(value):
+            remarks.refuse(line, f"{name} is {value}", "a whole number of tenths of a micrometre")
+            continue
+        if match[2] != "setpoint" and abs(int(value)) > LARGE:
+            remarks.refuse(line, f"an error of {int(value) * UNIT:g} mm, which no machine has")
+        points.setdefault(int(match[1]), {})[match[2]] = int(value)
+    line, count = entries.get("kw.ssfk.kw_nr_max", (0, ""))
+    if count != str(len(points)) or sorted(points) != list(range(len(points))):
+        remarks.refuse(
+            line, f"kw_nr_max is {count or 'missing'}, and there are {len(points)} points", "numbered from 0"
+        )
+    if not 2 <= len(points) <= MOST:
+        remarks.refuse(0, f"{len(points)} points; 2 to {MOST} are possible")
+    ordered = [points[index] for index in sorted(points)]
+    if any(len(point) != 3 for point in ordered):
+        remarks.refuse(0, "a point without setpoint, pos and neg")
+        return []
+    if any(after["setpoint"] <= before["setpoint"] for before, after in pairwise(ordered)):
+        remarks.refuse(0, "the setpoints must ascend")
+    return ordered
