@@ -34,15 +34,18 @@ def test_lines() -> None:
     lines = key_lines(TEXT)
     expected = {
         ("name",): 1,
+        ("axis",): 3,
         ("axis", "X"): 3,
         ("axis", "X", "quoted key"): 4,
         ("axis", "X", "direction"): 5,
         ("axis", "X", "note"): 8,
         ("axis", "X", "range"): 12,
+        ("effect",): 14,
         ("effect", 0): 14,
         ("effect", 0, "name"): 15,
         ("effect", 1): 16,
         ("effect", 1, "name"): 17,
+        ("effect", 1, "inner"): 18,
         ("effect", 1, "inner", "key"): 18,
         ("effect", 1, "table"): 19,
         ("effect", 1, "table", "deep"): 20,

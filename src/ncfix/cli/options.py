@@ -62,7 +62,7 @@ def load_machine(path: str) -> Machine:
     """The machine that a file, or standard input, describes."""
     from ncfix.machine import load, loads
 
-    return load(path) if path != STREAM else loads(read(path).decode("utf-8", "replace"), shown(path))
+    return load(path) if path != STREAM else loads(read(path), shown(path))
 
 
 def read_program(path: str, dialect: str | None, machine: Machine | None = None) -> Program:

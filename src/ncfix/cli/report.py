@@ -47,7 +47,7 @@ def _sections(path: str) -> list[Section]:
     from ncfix.machine import loads
     from ncfix.report.machine import sections as of_machine
 
-    return of_machine(loads(text.decode("utf-8", "replace"), shown(path)), shown(path))
+    return of_machine(loads(text, shown(path)), shown(path))
 
 
 def _result(text: bytes, path: str) -> dict[str, Any]:

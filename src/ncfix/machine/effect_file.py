@@ -19,6 +19,8 @@ from ncfix.machine.library import Named
 from ncfix.machine.named_effect import read_named
 
 INPUT = re.compile(r"[a-z][a-z0-9_]*")
+SMALLEST_SCALE = 1e-9
+"""In the unit of what is scaled: mm, degree, K, s."""
 
 
 def read_effects(
@@ -52,7 +54,7 @@ def read_effect(section: Section, letters: tuple[str, ...], axes: Mapping[str, A
         _count(section, basis, coefficients)
     size = len(coefficients) if coefficients is not None else 0
     options = _options(section, letters, size)
-    if name is not None and basis is not None:
+    if name is not None and basis is not None and ("input" in options or not section.has("input")):
         _fits(section, Effect(name, coefficients or (), basis, **options), axes)
     if kind is not None:
         section.close()
@@ -69,11 +71,13 @@ def _name(section: Section, letters: tuple[str, ...]) -> str | None:
     if match and (match[3] in letters or match[3] == SPINDLE):
         return name
     joints = (*letters, SPINDLE)
-    names = [f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS]
-    why = f"{name!r} is not an effect of this machine"
     if match:
-        why += f": it has no axis {match[3]}"
-    section.note("NCF309", "name", why, did_you_mean(name, names) or "`ncfix effects` lists them")
+        hint = f"axes of this machine: {' '.join(letters)}, and {SPINDLE} for the spindle"
+        section.note("NCF309", "name", f"{name!r} is not an effect of this machine: it has no axis {match[3]}", hint)
+        return None
+    names = [f"E{component}{zero}{joint}" for joint in joints for zero in ("", "0") for component in COMPONENTS]
+    hint = did_you_mean(name, names) or "`ncfix effects` lists them"
+    section.note("NCF309", "name", f"{name!r} is not an effect of this machine", hint)
     return None
 
 
@@ -159,8 +163,8 @@ def _signal(section: Section, key: str, letters: tuple[str, ...]) -> str | None:
 
 def _scale(section: Section, key: str) -> float | None:
     value = section.number(key)
-    if value == 0:
-        section.note("NCF305", key, "the scale cannot be zero")
+    if value is not None and abs(value) < SMALLEST_SCALE:
+        section.note("NCF305", key, "the scale cannot be zero" if value == 0 else f"{value:g} is no scale")
     return value
 
 
@@ -172,7 +176,10 @@ def _positive(section: Section, key: str) -> float | None:
 
 
 def _covariance(section: Section, size: int) -> Matrix | None:
-    rows = section.rows("covariance", (size, size)) if size else None
+    if not size:
+        section.get("covariance")
+        return None
+    rows = section.rows("covariance", (size, size))
     if rows is None:
         return None
     matrix = np.array(rows)

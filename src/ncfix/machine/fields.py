@@ -15,15 +15,22 @@ from typing import Any, TypeGuard
 from ncfix.diagnostics import Message, Place
 from ncfix.machine.toml_lines import Path, line_of
 
+LARGEST = 1e12
+"""No quantity of a machine has a larger number, in whatever unit; beyond it arithmetic goes wrong."""
+
 
 @dataclass(slots=True)
 class Report:
-    """The faults found so far, with their places in the text."""
+    """The faults found so far, with their places in the text.
+
+    top  keys that stand above all tables: one that stands below a header is in that table
+    """
 
     path: str
     text: str
     lines: Mapping[Path, int]
     messages: list[Message] = field(default_factory=list)
+    top: set[str] = field(default_factory=set)
 
     def note(self, code: str, where: Path, text: str, hint: str = "") -> None:
         """Note a fault of the value at `where`."""
@@ -113,7 +120,8 @@ class Section:
             return None
         if isinstance(value, list) and all(_is_integer(item) for item in value):
             return tuple(value)
-        self._wrong(key, "a list of whole numbers", value)
+        odd = next((item for item in value if not _is_integer(item)), value) if isinstance(value, list) else value
+        self._wrong(key, "a list of whole numbers", odd)
         return None
 
     def rows(self, key: str, shape: tuple[int, int]) -> tuple[tuple[float, ...], ...] | None:
@@ -154,8 +162,13 @@ class Section:
         """Note the keys that nobody asked for."""
         for key in self.values:
             if key not in self.asked:
-                missing = self.asked - self.values.keys()
-                self.note("NCF302", key, f"unknown key {key!r}", _close(key, missing or self.asked, set()))
+                self.note("NCF302", key, f"unknown key {key!r}", self._meant(key))
+
+    def _meant(self, key: str) -> str:
+        """What an unknown key may be meant for: a key that is missing here, one that is there, or one of the file."""
+        if self.path and key in self.report.top:
+            return f"it belongs above the first table; here it is a key of {dotted(self.path)}"
+        return did_you_mean(key, self.asked - self.values.keys()) or did_you_mean(key, self.asked)
 
     def _finite(self, key: str, value: object, wanted: str) -> bool:
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -163,6 +176,9 @@ class Section:
             return False
         if not math.isfinite(value):
             self.note("NCF305", key, f"{value} is not a finite number")
+            return False
+        if abs(value) > LARGEST:
+            self.note("NCF305", key, f"{value:g} is more than anything that a machine has")
             return False
         return True
 
@@ -190,9 +206,10 @@ def _is_integer(value: object) -> TypeGuard[int]:
 
 
 def did_you_mean(word: str, words: Iterable[str]) -> str:
-    """A hint with the nearest of the words; empty if none is near."""
-    close = get_close_matches(word, list(words), 1, 0.6)
-    return f"did you mean {close[0]!r}?" if close else ""
+    """A hint with the nearest of the words, whatever their case; empty if none is near."""
+    small = {each.lower(): each for each in words}
+    close = get_close_matches(word.lower(), small, 1, 0.6)
+    return f"did you mean {small[close[0]]!r}?" if close else ""
 
 
 def _close(word: str, words: Iterable[str], known: set[str]) -> str:

@@ -5,6 +5,7 @@ docs/formats.md describes the file. Millimetres and degrees there are mm and rad
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -16,14 +17,18 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.machine import topology
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad, Vector
+from ncfix.machine.effect import Effect
 from ncfix.machine.effect_file import read_effects
 from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.library import Named, library
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
+from ncfix.machine.summary import at_the_ends
 from ncfix.machine.toml_lines import key_lines
 from ncfix.machine.topology import Topology
 
 SCHEMA = 1
+TOP = ("ncfix", "name", "topology", "control", "least_increment", "max_correction", "workpiece_offset")
+"""Keys that stand above the tables."""
 DEGREE = np.pi / 180
 EXACT = 1e-14
 """A vector this near to unit length is left as it is written."""
@@ -34,26 +39,36 @@ TILTED = 1e-6
 def load(path: str | Path) -> Machine:
     """The machine that a file describes. Raises `ConfigError` with every fault found (NCF300 to NCF319)."""
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        with open(path, "rb") as handle:
+            source = handle.read()
     except OSError as error:
-        raise ConfigError.of("NCF300", f"cannot read the machine file: {error.strerror}", Place(str(path))) from error
-    except UnicodeDecodeError as error:
-        raise ConfigError.of("NCF301", f"not a text in UTF-8 (byte {error.start})", Place(str(path))) from error
-    return loads(text, str(path))
+        text = f"cannot read the machine file: {error.strerror}"
+        raise ConfigError.of("NCF300", text, Place(str(path)), "give an existing file's path") from error
+    return loads(source, str(path))
 
 
-def loads(text: str, path: str = "<machine>") -> Machine:
+def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     """The machine that a text describes. Raises `ConfigError` with every fault found; `path` is for messages."""
+    text = source if isinstance(source, str) else _decoded(source, path)
     try:
         values = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError.of("NCF301", f"not TOML: {error}", _place(error, text, path)) from error
-    report = Report(path, text, key_lines(text))
+    report = Report(path, text, key_lines(text), top=set(TOP))
     machine = _machine(Section(values, (), report))
     if machine is None or report.messages:
         order = sorted(report.messages, key=lambda message: message.place.line if message.place else 0)
         raise ConfigError.collected(order)
     return machine
+
+
+def _decoded(source: bytes, path: str) -> str:
+    """The text of a file, without the mark that some editors put before it."""
+    try:
+        return source.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        text = f"not a text in UTF-8 (byte {error.start})"
+        raise ConfigError.of("NCF301", text, Place(path), "save it as UTF-8") from error
 
 
 def _machine(root: Section) -> Machine | None:
@@ -76,7 +91,19 @@ def _machine(root: Section) -> Machine | None:
         return None
     columns = tuple(axes[letter] for letter in order.axes)
     notes = dict(provenance.values) if provenance else {}
-    return Machine(name, str(order), columns, tool, effects, control, increment, correction, offset, notes)
+    machine = Machine(name, str(order), columns, tool, effects, control, increment, correction, offset, notes)
+    _check_sizes(machine, found, root.report)
+    return machine
+
+
+def _check_sizes(machine: Machine, found: list[tuple[Effect, ...]], report: Report) -> None:
+    """Note effects that are not finite at the ends of the travel: no machine has them, no arithmetic survives them."""
+    for index, effects in enumerate(found):
+        with np.errstate(all="ignore"):
+            finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in effects]
+        if not all(finite):
+            hint = "see center, scale and degree: a power of u = (x - center) / scale grows beyond all numbers"
+            report.note("NCF305", ("effect", index), "the effect is not finite at the ends of the travel", hint)
 
 
 def _physical(order: Topology | None, axes: dict[str, Axis], tool: Tool) -> Callable[[], Mapping[str, Named]]:
@@ -190,7 +217,7 @@ def _unit(section: Section, required: bool, default: Vector) -> Vector:
     values = section.numbers("direction", required, count=3)
     if values is None:
         return default
-    length = float(np.linalg.norm(values))
+    length = math.hypot(*values)
     if length < EXACT:
         section.note("NCF313", "direction", "a direction cannot be zero")
         return default

@@ -35,6 +35,17 @@ def extent(machine: Machine, effect: Effect) -> tuple[float, float] | None:
     return float(np.min(values)), float(np.max(values))
 
 
+def at_the_ends(machine: Machine, effect: Effect) -> Array:
+    """Values of an effect with all axes at their lowest and at their highest positions, mm or rad.
+
+    None of them where it depends on a signal that is no axis.
+    """
+    if any(signal is not None and signal.axis is None for signal in signals_of(machine.axes, effect)):
+        return np.empty(0)
+    ranges = machine.ranges
+    return _values(machine, effect, np.where(np.isfinite(ranges), ranges, [0.0, 2 * np.pi]).T, 1)
+
+
 def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
     _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
     found: Array = np.asarray(effect.coefficients) @ functions(machine.axes, effect, poses)

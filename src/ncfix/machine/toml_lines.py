@@ -30,11 +30,17 @@ def key_lines(text: str) -> Mapping[Path, int]:
             continue
         if header := HEADER.match(line):
             table = _opened(_keys(header[2]), header[1] == "[[", counts)
-            lines.setdefault(table, number)
+            _note(table, 0, number, lines)
         elif assignment := ASSIGNMENT.match(line):
-            lines.setdefault(table + _keys(assignment[1]), number)
+            _note(table + _keys(assignment[1]), len(table), number, lines)
         quote = _still_open(line)
     return lines
+
+
+def _note(path: Path, known: int, number: int, lines: dict[Path, int]) -> None:
+    """A path, and the tables that its dots make, beyond the `known` first of its keys."""
+    for depth in range(known + 1, len(path) + 1):
+        lines.setdefault(path[:depth], number)
 
 
 def line_of(path: Path, lines: Mapping[Path, int]) -> int:
