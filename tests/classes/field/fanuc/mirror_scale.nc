@@ -1,0 +1,14 @@
+O0010
+G21 G90 G17 G54
+G0 X0 Y0 Z10. (@ X0)
+G51.1 X5.
+G0 X1. Y2. (@ X9 Y2)
+G2 X2. Y3. R1. F100. (@ X8 Y3)
+G50.1 X0
+G0 X0 Y0 (@ X0 Y0)
+G51 X0 Y0 Z0 P2.
+G0 X3. Y4. Z5. (@ refused)
+G50
+G0 X0 Y0 Z10. (@ refused)
+G0 X0 Y0 Z10. A0 C0 (@ X0 Y0)
+M30

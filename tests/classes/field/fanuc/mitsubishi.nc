@@ -1,0 +1,11 @@
+%
+O100
+(@ dialect mitsubishi)
+G21 G90 G17 G54 G40 G80
+G00 X0. Y0. Z10. (@ X0 Y0 Z10)
+G61.1
+G05 P2
+G01 X5. F1000 (@ X5)
+G05 P0
+M30
+%

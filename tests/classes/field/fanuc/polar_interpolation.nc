@@ -1,0 +1,12 @@
+O0019
+G21 G90 G54 G17
+G0 X20. C0 Y0 Z5. A0 (@ X20)
+G12.1
+G1 X10. C5. F100. (@ refused)
+G13.1
+G0 X0 Y0 Z5. C0 A0 (@ X0 Y0)
+G112
+G1 X10. C5. F100. (@ refused)
+G113
+G0 X0 Y0 Z5. C0 A0 (@ X0)
+M30

@@ -1,0 +1,15 @@
+O0021
+G21 G90 G54 G17
+G0 X0 Y0 Z10. (@ X0)
+G31 X20. F50. (@ passed)
+#100=#5061
+G0 X0 Y0 Z10. (@ X0)
+G1 X[#100-1.] F100. (@ refused)
+G10 L2 P2 X[#100]
+G0 X0 Y0 (@ X0)
+G55 X0 (@ refused)
+G65 P9810 Z5. F1000.
+M30
+O9810
+G31 G90 Z#26 F#9 (@ passed)
+M99

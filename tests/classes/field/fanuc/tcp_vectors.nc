@@ -1,0 +1,9 @@
+O0013
+G21 G90 G17 G54
+T1 M6
+G0 A0 C0 (@ A0)
+G43.5 H1 X0 Y0 Z50. I0 J0 K1. (@ refused)
+G1 X10. I0 J-0.5 K0.8660254 F500. (@ refused)
+X20. (@ refused)
+G49
+M30

@@ -1,0 +1,10 @@
+O0028
+G21 G90 G54 G17
+G0 X0 Y0 Z5. (@ X0)
+G33 Z-10. F1.5 (@ refused)
+G0 X0 Y0 Z5. (@ X0)
+G63 (TAPPING MODE)
+G1 Z-5. F100. (@ Z-5)
+G64
+G0 Z5. (@ Z5)
+M30
