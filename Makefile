@@ -32,8 +32,9 @@ hidden:          ## the hidden-effect benchmark into docs/accuracy.md (two hours
 	$(PYTHON) -m tests.hidden --callable tests.diagnose.resident:resident --table docs/accuracy.md \
 		$(if $(FINAL),--final) $(foreach count,$(COUNT),--count $(count)) $(if $(RECORDS),--records $(RECORDS))
 
-metamorphic:     ## 500 pairs of programs for each relation of tests/metamorphic (an hour)
-	NCFIX_PAIRS=500 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/metamorphic
+metamorphic:     ## 500 pairs of programs for each relation, into docs/dialects.md (an hour); PAIRS=50 DIALECTS="siemens or haas"
+	NCFIX_PAIRS=$(or $(PAIRS),500) NCFIX_TABLE=docs/dialects.md OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q \
+		tests/metamorphic $(if $(DIALECTS),-k "$(DIALECTS)")
 
 refusals:        ## what becomes of the motion blocks of the corpus, all folders, also flat (half an hour)
 	NCFIX_CORPUS=1 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/classes/test_accounting.py

@@ -106,15 +106,25 @@ def ends(moves: Moves, machine: Machine) -> NDArray[np.float64]:
     return np.where(machine.rotary, np.degrees(q), q)
 
 
+_known: dict[tuple[str, str, str], NDArray[np.float64]] = {}
+"""Corrected ends by text, dialect and machine: many relations have one side in common."""
+
+
+def known_ends(text: str, dialect: str, machine: Machine) -> NDArray[np.float64]:
+    """`ends` of a corrected program, worked out once."""
+    key = text, dialect, machine.hash
+    if key not in _known:
+        _known[key] = ends(corrected(text, dialect, machine), machine)
+    return _known[key]
+
+
 def worst(relation: Relation, dialect: str, machine: Machine, pairs: int = PAIRS) -> float:
     """The largest distance between corrected ends over generated pairs, mm or degrees."""
     rng = np.random.default_rng(20261121)
     found = 0.0
     for _ in range(pairs):
         path = route(rng, relation.rotary)
-        left, right = (
-            ends(corrected(write(path), dialect, machine), machine) for write in (relation.left, relation.right)
-        )
+        left, right = (known_ends(write(path), dialect, machine) for write in (relation.left, relation.right))
         assert left.shape == right.shape, (relation.left(path), relation.right(path))
         found = max(found, float(np.abs(left - right).max()))
     return found
