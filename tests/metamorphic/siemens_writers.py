@@ -87,6 +87,31 @@ def centres(path: Route) -> str:
     return "\n".join(lines) + "\n"
 
 
+def polar(path: Route) -> str:
+    """Angle and radius, both in every block: about a pole of its own for each arc, else about the last one."""
+    return polar_words(path, sparing=False)
+
+
+def sparing_polar(path: Route) -> str:
+    """Angle and radius, those left out that are as they were."""
+    return polar_words(path, sparing=True)
+
+
+def polar_words(path: Route, *, sparing: bool) -> str:
+    """A route by G111, AP and RP."""
+    lines, pole, last = ["G111 X1 Y2"], (1.0, 2.0), ("", "")
+    for step in path:
+        if step.code > 1 and step.centre != pole:
+            pole, last = step.centre, ("", "")
+            lines.append(f"G111 X{pole[0]:.3f} Y{pole[1]:.3f}")
+        across, up = step.x - pole[0], step.y - pole[1]
+        now = f"AP={np.degrees(np.arctan2(up, across)):.8f}", f"RP={np.hypot(across, up):.7f}"
+        written = [word for word, before in zip(now, last, strict=True) if not sparing or word != before] or now[:1]
+        lines.append(f"G{step.code} {' '.join(written)} Z{step.z:.3f} F500")
+        last = now
+    return HEAD + "\n".join(lines) + "\n" + TAIL
+
+
 def tangents(path: Route) -> str:
     """A line, and arcs that each go on where the one before ended (CT), through the points of the route."""
     points = flat(path)

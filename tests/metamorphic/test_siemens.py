@@ -29,6 +29,8 @@ RELATIONS = [
     Relation("CR and I J", write.radii, write.full, TWICE),
     Relation("I=AC and I", write.centres, write.full, TWICE),
     Relation("TRANS and none", write.shifted, write.full, ONCE),
+    Relation("polar and Cartesian", write.polar, write.full, TWICE),
+    Relation("polar words left out", write.sparing_polar, write.full, TWICE),
     Relation("CT and I J", write.tangents, write.tangents_by_centre, TWICE),
 ]
 
