@@ -61,28 +61,29 @@ tcp = 1
 """
     with pytest.raises(ConfigError) as caught:
         loads(text, "part.toml")
-    assert str(caught.value) == "\n".join(
-        [
-            "part.toml: NCF383: ncfix: schema version 2, this ncfix reads 1",
-            "part.toml: NCF382: work_ofsets: unknown key",
-            "  hint: did you mean work_offsets?",
-            "part.toml: NCF382: work_offsets.G53: no work offset",
-            "  hint: they are G54 ... G59.3, and G54.1P1 ...",
-            "part.toml: NCF383: work_offsets.G55: expected a table like { X = 0.0, Z = 300.0 }",
-            "part.toml: NCF382: tools.a: no tool number",
-            "part.toml: NCF382: tools.4.lenght: unknown key",
-            "  hint: did you mean length?",
-            "part.toml: NCF382: initial.Q: no axis letter",
-            "  hint: they are X Y Z A B C U V W",
-            "part.toml: NCF383: workpiece_offset: expected three numbers [x, y, z], mm",
-            "part.toml: NCF382: references.G29: no reference point",
-            "  hint: they are G28 and G30",
-            "part.toml: NCF383: references.G29.X: expected a number, found inf",
-            "part.toml: NCF382: variables.depth: no parameter",
-            '  hint: they are written "#100" or "#<name>"',
-            "part.toml: NCF383: tcp: expected true or false, found 1",
-        ]
-    )
+    found = [
+        (message.place.line if message.place else 0, message.code, message.text, message.hint)
+        for message in caught.value.messages
+    ]
+    assert found == [
+        (2, "NCF383", "ncfix: schema version 2, this ncfix reads 1", ""),
+        (3, "NCF382", "work_ofsets: unknown key", "did you mean work_offsets?"),
+        (4, "NCF382", "work_offsets.G53: no work offset", "they are G54 ... G59.3, and G54.1P1 ..."),
+        (5, "NCF383", "work_offsets.G55: expected a table like { X = 0.0, Z = 300.0 }", ""),
+        (6, "NCF382", "tools.a: no tool number", ""),
+        (7, "NCF382", "tools.4.lenght: unknown key", "did you mean length?"),
+        (8, "NCF382", "initial.Q: no axis letter", "they are X Y Z A B C U V W"),
+        (9, "NCF383", "workpiece_offset: expected three numbers [x, y, z], mm", ""),
+        (10, "NCF382", "references.G29: no reference point", "they are G28 and G30"),
+        (10, "NCF383", "references.G29.X: expected a number, found inf", ""),
+        (11, "NCF382", "variables.depth: no parameter", 'they are written "#100" or "#<name>"'),
+        (12, "NCF383", "tcp: expected true or false, found 1", ""),
+    ]
+    assert str(caught.value).splitlines()[:3] == [
+        "part.toml:2:1: NCF383: ncfix: schema version 2, this ncfix reads 1",
+        "    ncfix = 2",
+        "    ^",
+    ]
     assert caught.value.exit_code == ExitCode.UNREADABLE
 
 
@@ -90,12 +91,25 @@ def test_a_text_that_is_no_toml() -> None:
     with pytest.raises(ConfigError) as caught:
         loads("work_offsets = [")
     assert caught.value.code == "NCF381"
+    with pytest.raises(ConfigError, match=r"^s.toml:2:7: NCF381: not TOML: Invalid value\n    tcp = \n"):
+        loads("# one\ntcp = \n", "s.toml")
+
+
+def test_names_with_dots_are_found() -> None:
+    with pytest.raises(ConfigError) as caught:
+        loads('[work_offsets]\n"G59.1" = 3\n[tools]\n"DRILL 8.5" = { lenght = 3 }\n')
+    assert [message.place.line for message in caught.value.messages if message.place] == [2, 4]
 
 
 def test_files(tmp_path: Path) -> None:
     path = tmp_path / "setup.toml"
     path.write_text(FULL, encoding="utf-8")
     assert load(str(path)) == loads(FULL)
+    path.write_text(FULL, encoding="utf-8-sig")
+    assert load(str(path)) == loads(FULL)
+    path.write_bytes(FULL.encode("utf-16"))
+    with pytest.raises(ConfigError, match="not a text in UTF-8"):
+        load(str(path))
     with pytest.raises(SourceError):
         load(str(tmp_path / "none.toml"))
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, TypeGuard
 
-from ncfix.diagnostics import Message, Place
-from ncfix.machine.toml_lines import Path, line_of
+from ncfix.diagnostics import Message
+from ncfix.toml_text import Path, line_of, place_of
 
 LARGEST = 1e12
 """No quantity of a machine has a larger number, in whatever unit; beyond it arithmetic goes wrong."""
@@ -34,11 +34,7 @@ class Report:
 
     def note(self, code: str, where: Path, text: str, hint: str = "") -> None:
         """Note a fault of the value at `where`."""
-        line = line_of(where, self.lines)
-        rows = self.text.splitlines()
-        source = rows[line - 1] if line <= len(rows) else ""
-        column = len(source) - len(source.lstrip()) + 1 if source.strip() else 0
-        place = Place(self.path, line, column, source)
+        place = place_of(line_of(where, self.lines), self.text, self.path)
         head = f"{dotted(where)}: " if where else ""
         self.messages.append(Message(code, head + text, place, hint))
 

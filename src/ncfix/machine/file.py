@@ -6,11 +6,8 @@ docs/formats.md describes the file. Millimetres and degrees there are mm and rad
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,8 +20,8 @@ from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.library import Named, library
 from ncfix.machine.machine import DEFAULT_CORRECTION, DEFAULT_INCREMENT, Machine
 from ncfix.machine.summary import at_the_ends
-from ncfix.machine.toml_lines import key_lines
 from ncfix.machine.topology import Topology
+from ncfix.toml_text import decoded, key_lines, parsed
 
 SCHEMA = 1
 TOP = ("ncfix", "name", "topology", "control", "least_increment", "max_correction", "workpiece_offset")
@@ -49,26 +46,14 @@ def load(path: str | Path) -> Machine:
 
 def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     """The machine that a text describes. Raises `ConfigError` with every fault found; `path` is for messages."""
-    text = source if isinstance(source, str) else _decoded(source, path)
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError.of("NCF301", f"not TOML: {error}", _place(error, text, path)) from error
+    text = source if isinstance(source, str) else decoded(source, path, "NCF301")
+    values = parsed(text, path, "NCF301")
     report = Report(path, text, key_lines(text), top=set(TOP))
     machine = _machine(Section(values, (), report))
     if machine is None or report.messages:
         order = sorted(report.messages, key=lambda message: message.place.line if message.place else 0)
         raise ConfigError.collected(order)
     return machine
-
-
-def _decoded(source: bytes, path: str) -> str:
-    """The text of a file, without the mark that some editors put before it."""
-    try:
-        return source.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        text = f"not a text in UTF-8 (byte {error.start})"
-        raise ConfigError.of("NCF301", text, Place(path), "save it as UTF-8") from error
 
 
 def _machine(root: Section) -> Machine | None:
@@ -256,12 +241,3 @@ def _pair(root: Section, key: str, default: tuple[float, float]) -> tuple[float,
     linear, rotary = _positive(section, "linear"), _positive(section, "rotary")
     section.close()
     return default[0] if linear is None else linear, default[1] if rotary is None else rotary * DEGREE
-
-
-def _place(error: Exception, text: str, path: str) -> Place:
-    found = re.search(r"line (\d+), column (\d+)", str(error))
-    if not found:
-        return Place(path, text.count("\n") + 1)
-    line, column = int(found[1]), int(found[2])
-    rows: list[Any] = text.splitlines() or [""]
-    return Place(path, line, column, rows[min(line, len(rows)) - 1])

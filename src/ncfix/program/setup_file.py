@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from ncfix.diagnostics import ConfigError, Message, Place
+from ncfix.diagnostics import ConfigError, Message
 from ncfix.files import read_bytes
 from ncfix.program.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.program.tool_table import load_tool_table
+from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
 
 __all__ = ["load", "load_tool_table", "loads"]
 
@@ -37,18 +37,13 @@ TOOL = re.compile(r"\d+|(?!T\d+$).{2,}")
 
 def load(path: str) -> Setup:
     """The setup in a file. Raises SourceError NCF002, ConfigError NCF38x with all that is wrong in it."""
-    return loads(read_bytes(path).decode("utf-8", "replace"), path)
+    return loads(decoded(read_bytes(path), path, NOT_TOML), path)
 
 
 def loads(text: str, path: str = "<setup>") -> Setup:
     """The setup in a text; raises ConfigError NCF38x with all that is wrong in it."""
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError.of(
-            NOT_TOML, f"not TOML: {error}", Place(path), "docs/formats.md shows a setup file"
-        ) from None
-    reading = Reading(path)
+    content = parsed(text, path, NOT_TOML, "docs/formats.md shows a setup file")
+    reading = Reading(path, text, key_lines(text))
     values = {key: reading.entry(key, value) for key, value in content.items()}
     if reading.faults:
         raise ConfigError.collected(reading.faults)
@@ -64,11 +59,19 @@ class Reading:
     """A setup file while it is read; faults are collected."""
 
     path: str
+    source: str
+    lines: Mapping[Path, int]
     faults: list[Message] = field(default_factory=list)
 
     def fault(self, code: str, key: str, text: str, hint: str = "") -> None:
         """Note what is wrong with a key."""
-        self.faults.append(Message(code, f"{key}: {text}", Place(self.path), hint))
+        place = place_of(self._line(key), self.source, self.path)
+        self.faults.append(Message(code, f"{key}: {text}", place, hint))
+
+    def _line(self, key: str) -> int:
+        """The line of a key, or of the nearest one around it; names of tools and offsets may have dots themselves."""
+        around = {".".join(map(str, path)): line for path, line in self.lines.items() if path}
+        return around[max((name for name in around if f"{key}.".startswith(f"{name}.")), key=len)]
 
     def entry(self, key: str, value: Any) -> Any:
         """The value of a top-level key as `Setup` wants it."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import operator
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.symbolic.chain import Chain
 from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation, Vector
 from ncfix.machine.symbolic.variables import Size, Variable
-from ncfix.machine.toml_lines import key_lines
+from ncfix.toml_text import decoded, key_lines, parsed
 
 SCHEMA = 1
 OPERATORS: Mapping[type, Callable[..., Expr]] = {
@@ -41,20 +40,16 @@ UNIT_TO = 1e-9
 def load_chain(path: str | Path) -> Chain:
     """The chain that a file describes; raises `ConfigError` with every fault found (NCF302 ... NCF305, NCF391)."""
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        with open(path, "rb") as handle:
+            source = handle.read()
     except OSError as error:
         raise ConfigError.of("NCF300", f"cannot read the chain file: {error.strerror}", Place(str(path))) from error
-    except UnicodeDecodeError as error:
-        raise ConfigError.of("NCF301", f"not a text in UTF-8 (byte {error.start})", Place(str(path))) from error
-    return loads_chain(text, str(path))
+    return loads_chain(decoded(source, str(path), "NCF301"), str(path))
 
 
 def loads_chain(text: str, path: str = "<chain>") -> Chain:
     """The chain that a text describes; raises as `load_chain`."""
-    try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError.of("NCF301", f"not TOML: {error}", Place(path)) from error
+    values = parsed(text, path, "NCF301")
     report = Report(path, text, key_lines(text))
     chain = _chain(Section(values, (), report))
     if report.messages:

@@ -1,4 +1,4 @@
-"""On which line of a TOML text a key stands: the standard reader does not say, messages should.
+"""TOML files as people write them: decoded, parsed, and where in the text a key stands, which the parser does not say.
 
 Paths are tuples of keys and indices, `("effect", 2, "degree")`. Only keys that stand at the start of a line are
 found; for others the line of the table that holds them is good enough.
@@ -7,7 +7,11 @@ found; for others the line of the table that holds them is good enough.
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping
+from typing import Any
+
+from ncfix.diagnostics import ConfigError, Place
 
 Path = tuple[str | int, ...]
 BARE = r"[A-Za-z0-9_-]+"
@@ -18,13 +22,48 @@ ASSIGNMENT = re.compile(rf"\s*({DOTTED})\s*=")
 QUOTES = re.compile(r'"""|\'\'\'')
 
 
+def decoded(source: bytes, path: str, code: str) -> str:
+    """The text of a file, without the mark that some editors put before it; raises `ConfigError` with this code."""
+    try:
+        return source.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError.of(
+            code, f"not a text in UTF-8 (byte {error.start})", Place(path), "save it as UTF-8"
+        ) from error
+
+
+def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
+    """What a text says; raises `ConfigError` with this code and the place if it is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"line (\d+), column (\d+)", str(error))
+        line, column = (int(found[1]), int(found[2])) if found else (text.count("\n") + 1, 0)
+        what = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
+        place = Place(path, line, column, _row(text, line))
+        raise ConfigError.of(code, f"not TOML: {what}", place, hint) from error
+    except RecursionError as error:
+        raise ConfigError.of(code, "not TOML that can be read: nested too deeply", Place(path), hint) from error
+
+
+def place_of(line: int, text: str, path: str) -> Place:
+    """A line, and in it the first character that is not a blank."""
+    row = _row(text, line)
+    return Place(path, line, len(row) - len(row.lstrip()) + 1 if row.strip() else 0, row)
+
+
+def _row(text: str, line: int) -> str:
+    rows = text.split("\n")
+    return rows[line - 1].rstrip("\r") if line <= len(rows) else ""
+
+
 def key_lines(text: str) -> Mapping[Path, int]:
     """Path -> line, from 1, of every table header and every key that stands at the start of a line."""
     lines: dict[Path, int] = {(): 1}
     counts: dict[Path, int] = {}
     table: Path = ()
     quote = ""
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.split("\n"), start=1):
         if quote:
             quote = "" if line.count(quote) % 2 else quote
             continue

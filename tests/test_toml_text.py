@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.machine.toml_lines import key_lines, line_of
+from ncfix.toml_text import key_lines, line_of
 
 TEXT = '''\
 name = "a"
