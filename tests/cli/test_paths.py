@@ -97,7 +97,9 @@ def test_verify_sees_that_the_fixed_program_is_right(shop: Any, ncfix: Any) -> N
 def test_verify_sees_that_the_original_is_wrong(shop: Any, ncfix: Any) -> None:
     result = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero")
     assert result.code == ExitCode.FINDINGS
-    assert "NOT within 1 um" in result.out.decode()
+    before, after, *_, verdict = result.out.decode().splitlines()
+    assert before.removeprefix("tip error before: ") == after.removeprefix("tip error after:  ")
+    assert verdict.startswith("NOT within 1 um: lines ")
     loose = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero", "--tolerance-um", "22")
     assert loose.code == ExitCode.DONE
 
@@ -152,7 +154,26 @@ def test_arcs_are_compared_as_arcs(shop: Any, ncfix: Any) -> None:
 def test_verify_on_the_shipped_example_against_itself(examples: Path, ncfix: Any) -> None:
     program, setup = examples / "programs/blade.nc", examples / "programs/blade.setup.toml"
     said = ncfix("verify", program, program, "--setup", setup, "-m", examples / "machines/dmu50.toml", "--json").json()
-    assert said["error_after_um"]["max"] == pytest.approx(said["error_before_um"]["max"], rel=0.2)
+    assert said["error_after_um"] == said["error_before_um"]
+    assert said["lines_not_looked_at"] == []
+
+
+def test_verify_reads_a_program_in_the_dialect_of_the_first(ncfix: Any, examples: Path, tmp_path: Path) -> None:
+    """Nothing in a program that is written out flat need show its family; here a word has `=`, as others have not."""
+    first, second = tmp_path / "a.mpf", tmp_path / "flat.txt"
+    first.write_bytes(b"R1=10\nG90 G94 F500\nG0 X0 Y0 Z20\nG1 X=R1 Y5\nX20\nM30\n")
+    second.write_bytes(b"G90 G94 F500\nG0 X0 Y0 Z20\nG1 X10 Y5\nX=20\nM30\n")
+    call = ["verify", first, second, "-m", examples / "machines/three_axis.toml", "--assume-zero"]
+    assert ncfix(*call, "--tolerance-um", "100").code == ExitCode.DONE
+
+
+def test_verify_names_what_it_could_not_look_at(ncfix: Any, examples: Path, tmp_path: Path) -> None:
+    program = tmp_path / "a.h"
+    program.write_bytes(b"BEGIN PGM A MM\nL X+0 Y+0 Z+5 FMAX\nL X+10 F100\nL X+Q7\nL X+30 Y+5 F100\nEND PGM A MM\n")
+    call = ["verify", program, program, "-m", examples / "machines/three_axis.toml", "--assume-zero"]
+    result = ncfix(*call, "--tolerance-um", "100")
+    assert "not looked at: lines 4 5 of the original" in result.out.decode()
+    assert ncfix(*call, "--json").json()["lines_not_looked_at"] == [4, 5]
 
 
 def test_verify_passes_what_fix_wrote_on_a_machine_with_play(examples: Path, ncfix: Any, tmp_path: Path) -> None:
@@ -173,5 +194,5 @@ def test_two_ways_to_look_at_a_corrected_program_agree(examples: Path, ncfix: An
     (entry,) = ncfix("fix", program, "-o", tmp_path, "--allow-refused", *common).json()["files"]
     said = ncfix("verify", program, tmp_path / "blade.nc", *common).json()
     assert 0 < said["error_after_um"]["max"] <= 1.05 * entry["error_after_um"]["max"]
-    assert said["error_before_um"]["max"] == pytest.approx(entry["error_before_um"]["max"], rel=0.01)
+    assert 0.9 < said["error_before_um"]["max"] / entry["error_before_um"]["max"] <= 1.01
     assert said["within"] is True

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from ncfix.cli.options import load_machine, read_program, subprograms
 from ncfix.cli.setup_options import SetupOptions
+from ncfix.cli.targets import STREAM
+from ncfix.diagnostics import SourceError
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
@@ -19,6 +21,28 @@ if TYPE_CHECKING:
 LINEAR = ("X", "Y", "Z")
 ROTARY = ("A", "B", "C")
 PARALLEL = ("U", "V", "W")
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
+
+    beyond       lines of the other with errors larger than the tolerance
+    not_reached  lines of the original from which the other is farther away
+    unseen       lines of the original that cut, nobody knows where
+    """
+
+    before: dict[str, Any]
+    after: dict[str, Any]
+    left_out: dict[str, Any]
+    beyond: list[int]
+    not_reached: list[int]
+    unseen: list[int]
+
+    @property
+    def within(self) -> bool:
+        """Nothing is farther from the intended path than the tolerance."""
+        return not self.beyond and not self.not_reached
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,24 +97,51 @@ class Following:
         program, machine, moves = self._on_machine(path)
         return program, moves, tip_error(machine, moves)
 
-    def compared(self, original: str, fixed: str) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Figures: of the original on this machine, of the other along its path, and along the original's path."""
+    def compared(self, original: str, fixed: str, tolerance_um: float) -> Compared:
+        """What this machine does with two programs, measured against what the first one means."""
         from ncfix.compensate.comparison import compare
-        from ncfix.compensate.simulation import tip_error
+        from ncfix.compensate.simulation import unseen
 
         program, machine, meant = self._on_machine(original)
-        other, _, done = self._on_machine(fixed)
+        other, _, done = self._on_machine(fixed, like=program)
         there, back = compare(machine, meant, done)
+        before, _ = compare(machine, meant, meant)
         lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
-        return figures(tip_error(machine, meant), lines), figures(there, other_lines), figures(back, lines)
+        limit = tolerance_um / 1e3
+        return Compared(
+            before=figures(before, lines),
+            after=figures(there, other_lines),
+            left_out=figures(back, lines),
+            beyond=_lines_at(there.rows_beyond(limit), other_lines),
+            not_reached=_lines_at(back.rows_beyond(limit), lines),
+            unseen=_lines_at(unseen(meant), lines),
+        )
 
-    def _on_machine(self, path: str) -> tuple[Program, Machine, Moves]:
+    def _read_like(self, path: str, other: Program) -> Program:
+        """A program in the dialect of another one, unless one is given, or its text shows that it is of another family.
+
+        What was written out flat may have lost all that shows a dialect.
+        """
+        if self.dialect is not None or path == STREAM:
+            return self.read(path)
+        try:
+            return read_program(path, other.dialect.name, self.machine)
+        except SourceError:
+            return self.read(path)
+
+    def _on_machine(self, path: str, like: Program | None = None) -> tuple[Program, Machine, Moves]:
+        """A program as this machine follows it; `like`: one in whose dialect it is, if its text does not forbid it."""
         from ncfix.compensate.following import follow
 
         assert self.machine is not None
-        program = self.read(path)
+        program = self.read(path) if like is None else self._read_like(path, like)
         found = follow(program, self.machine, self.setup, subprograms(path))
         return program, found.machine, found.trace.moves
+
+
+def _lines_at(rows: Any, lines: list[int]) -> list[int]:
+    """The lines of motions, each once, in order."""
+    return sorted({lines[row] for row in rows.tolist()})
 
 
 def named_axes(program: Program) -> tuple[str, ...]:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import click
 
 from ncfix.cli import console
-from ncfix.cli.following import Following
+from ncfix.cli.following import Compared, Following
 from ncfix.cli.options import dialect_option, json_option, machine_option, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import ExitCode
+
+FEW = 5
+"""Lines that are named by their numbers."""
 
 
 @click.command()
@@ -35,21 +40,41 @@ def verify(
     """
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
-        before, after, back = following.compared(original, fixed)
-    within = max(after["max"], back["max"]) <= tolerance_um
+        found = following.compared(original, fixed, tolerance_um)
     if as_json:
         console.put_json(
             original=shown(original),
             fixed=shown(fixed),
-            error_before_um=before,
-            error_after_um=after,
-            left_out_um=back,
-            within=within,
+            error_before_um=found.before,
+            error_after_um=found.after,
+            left_out_um=found.left_out,
+            within=found.within,
+            lines_beyond=found.beyond,
+            lines_not_reached=found.not_reached,
+            lines_not_looked_at=found.unseen,
         )
     else:
-        console.put(f"tip error before: {console.error_figures(before)}\n")
-        console.put(f"tip error after:  {console.error_figures(after)}\n")
-        if back["max"] > max(tolerance_um, after["max"]):
-            console.put(f"intended path not reached: {console.error_figures(back)} of the original\n")
-        console.put(f"{'within' if within else 'NOT within'} {tolerance_um:g} um\n")
-    return ExitCode.DONE if within else ExitCode.FINDINGS
+        console.put("".join(f"{line}\n" for line in said(found, tolerance_um)))
+    return ExitCode.DONE if found.within else ExitCode.FINDINGS
+
+
+def said(found: Compared, tolerance_um: float) -> Iterator[str]:
+    """What was found, for people."""
+    yield f"tip error before: {console.error_figures(found.before)}"
+    yield f"tip error after:  {console.error_figures(found.after)}"
+    if found.left_out["max"] > max(tolerance_um, found.after["max"]):
+        yield f"intended path not reached: {console.error_figures(found.left_out)} of the original"
+    if found.unseen:
+        yield f"not looked at: {lines_said(found.unseen)} of the original; where they cut is not known"
+    if found.within:
+        yield f"within {tolerance_um:g} um"
+        return
+    of = "" if found.beyond else " of the original"
+    yield f"NOT within {tolerance_um:g} um: {lines_said(found.beyond or found.not_reached)}{of}"
+
+
+def lines_said(lines: Sequence[int]) -> str:
+    """Lines, the first few by number: `lines 4 5 6 and 12 more`."""
+    few = " ".join(map(str, lines[:FEW]))
+    more = f" and {len(lines) - FEW} more" if len(lines) > FEW else ""
+    return f"line{'s' if len(lines) > 1 else ''} {few}{more}"

@@ -66,6 +66,11 @@ class TipError:
         weight = self.weight
         return float(np.sqrt(np.average(self.size**2, weights=weight if weight.sum() > 0 else None)))
 
+    def rows_beyond(self, limit_mm: float) -> Index:
+        """The motions with errors larger than a limit."""
+        found: Index = np.unique(self.rows[self.size > limit_mm])
+        return found
+
     @property
     def worst_row(self) -> int | None:
         """The motion with the largest error; None without any."""
@@ -97,6 +102,14 @@ def samples(intent: Intent) -> tuple[Index, Array]:
     rows = np.concatenate([along[owners(counts)], at_end])
     order = np.argsort(rows, kind="stable")
     return rows[order], np.concatenate([fraction, np.ones(len(at_end))])[order]
+
+
+def unseen(moves: Moves) -> Index:
+    """The motions that cut and cannot be looked at, since where they begin or end is not known."""
+    ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
+    drawn = (moves.kind == Kind.FEED) | (moves.kind == Kind.ARC)
+    lost = np.where(drawn, ~(ends & starts), ~ends)
+    return np.flatnonzero((drawn | (moves.kind == Kind.CYCLE)) & (moves.rule != Rule.PASS) & lost)
 
 
 def batches(n: int) -> list[slice]:
