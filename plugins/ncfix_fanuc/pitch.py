@@ -14,6 +14,7 @@ import numpy as np
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
+from ncfix.tables.least import of_own_axis
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.settings import choice
@@ -109,7 +110,8 @@ class FanucPitch(Control):
         files[SETTINGS] = (" ".join(words) + "\n").encode()
         notes.append("The way back needs a table of its own (3605#0); what is written is the mean of both ways.")
         notes.append(f"{SETTINGS} is for ncfix emulate only; the control does not read it.")
-        return Written(files, tuple(notes))
+        least = of_own_axis(request.machine, request.space, request.tool_length)
+        return Written(files, tuple(notes), least)
 
     def read(self, files: Files) -> Compensation:
         """As the control sums them up. Raises `ConfigError` NCF491."""

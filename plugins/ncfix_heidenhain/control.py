@@ -15,6 +15,7 @@ from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.additive import Line, additive
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
+from ncfix.tables.least import of_sums
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix_heidenhain.cma import CONFIG, LETTERS, cma_text, read_cma
@@ -122,7 +123,8 @@ class Heidenhain(Control):
             files[tables[line.input]] = text(tables[line.input], com, 4)
         files[CONFIG] = cma_text(axes, tables)
         files[SIGN] = f"{settings['sign']}\n".encode()
-        return Written(files, _notes(lines, most, both))
+        least = of_sums(machine, request.space, request.tool_length)
+        return Written(files, _notes(lines, most, both), least)
 
     def read(self, files: Files) -> Compensation:
         """As the control would take them. Raises `ConfigError` NCF491."""

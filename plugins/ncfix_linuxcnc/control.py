@@ -14,6 +14,7 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.positioning import positioning
 from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, read_joints
@@ -80,7 +81,8 @@ class LinuxCnc(Control):
         tables = positioning(request.machine, request.space, request.tool_length, most, request.target)
         joints = _joints(tables, letters)
         files = {joint.file: comp_text(joint, int(kind)) for joint in joints}
-        return Written({**files, "comp.ini": ini_text(joints, letters, int(kind))}, _notes(request))
+        files["comp.ini"] = ini_text(joints, letters, int(kind))
+        return Written(files, _notes(request), of_own_axis(request.machine, request.space, request.tool_length))
 
     def read(self, files: Files) -> Compensation:
         """As LinuxCNC loads them. Raises `ConfigError` NCF491."""

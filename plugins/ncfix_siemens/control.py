@@ -15,7 +15,7 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import State
-from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
+from ncfix.tables.control import Assumption, Control, Files, Least, Option, Properties, Request, Written
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.poses import random_poses
@@ -69,7 +69,7 @@ class Siemens(Control):
         files = {f"{table.output}_EEC.INI": eec_text(table, _heads(settings)) for table in eec}
         if cec or not eec:
             files[CEC] = cec_text(cec, _heads(settings), _titles(cec, settings), settings.style)
-        return Written(files, tuple(_notes(request, settings, scheme, cec)))
+        return Written(files, tuple(_notes(request, settings, scheme, cec)), _least(request, scheme))
 
     def probe(self, request: Request) -> Written:
         """Two small files that settle `value_sign` and `product_terms`, and what to do with them."""
@@ -165,9 +165,6 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
     yield f"Scheme {settings.scheme}: {len(cec)} tables of {settings.limits.tables}, {products} of them multiplied."
     if scheme.rest > request.target / 10:
         yield f"{1e3 * scheme.rest:.2f} um rms of the correction take three axes at once and are left."
-    if scheme.bound > request.target / 10:
-        at_that = ", with the rotary axes corrected as here" if _turns(request, scheme) else ""
-        yield f"No sums and products of pairs leave less than {1e3 * scheme.bound:.2f} um at the worst{at_that}."
     if scheme.dropped > request.target / 10:
         yield f"{1e3 * scheme.dropped:.2f} um rms were left out: the tables for them are not there, or not worth it."
     yield from _turned(request, scheme)
@@ -178,6 +175,12 @@ def _notes(request: Request, settings: Settings, scheme: Scheme, cec: Sequence[T
         yield "Tables for one way hold the play of the axes: MD32450 $MA_BACKLASH must be what it was when measured."
     if products:
         yield "Products hold in millimetres only: do not switch the control to inches with these tables on."
+
+
+def _least(request: Request, scheme: Scheme) -> Least:
+    at_that = ", with the rotary axes corrected as here" if _turns(request, scheme) else ""
+    why = "a weighting of the correction that no function of two axes sees has so much of it"
+    return Least(scheme.bound, f"{why}{at_that}")
 
 
 def _turns(request: Request, scheme: Scheme) -> bool:

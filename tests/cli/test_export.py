@@ -173,6 +173,27 @@ def test_tables_on_top_of_a_corrected_program_are_refused(shop: Any, ncfix: Any,
     assert "corrected twice" in result.err
 
 
+SCALED = '[[effect]]\nname = "EXX"\nbasis = "polynomial"\ndegree = [1, 2]\nscale = 400\ncoefficients = [0.03, 0.02]\n'
+
+
+def test_so_are_those_that_lost_their_stamp(shop: Any, ncfix: Any) -> None:
+    """Round numbers that were corrected are crooked, and the errors of the machine make them round again."""
+    shop.machine.write_text(shop.perfect.read_text() + SCALED)
+    tables, fixed = shop.folder / "tables", shop.folder / "fixed.nc"
+    assert ncfix("export", "linuxcnc", "-m", shop.machine, "-o", tables).code == ExitCode.DONE
+    lines = "\n".join(f"X{4 * n + n % 7} Y{n % 11}" for n in range(100))
+    shop.program.write_text(f"G21 G90\nG1 F500 X0 Y0 Z0\n{lines}\nM2\n")
+    assert ncfix("fix", shop.program, "-m", shop.machine, "-o", fixed, "--assume-zero").code == ExitCode.DONE
+    unstamped = "".join(line for line in fixed.read_text().splitlines(keepends=True) if "ncfix" not in line)
+    fixed.write_text(unstamped)
+    arguments = ("emulate", "linuxcnc", tables, "-m", shop.machine, "--assume-zero", "--program")
+    result = ncfix(*arguments, fixed)
+    assert result.code == ExitCode.REFUSED
+    assert "NCF438" in result.err
+    assert "run this one without tables" in result.err
+    assert ncfix(*arguments, shop.program).code == ExitCode.DONE
+
+
 def test_a_machine_without_errors_leaves_programs_as_they_are(shop: Any, ncfix: Any) -> None:
     arguments = ("-m", shop.perfect, "-o", shop.folder / "g", "--program", shop.program)
     found = ncfix("export", "gcode", *arguments, "--json").json()["program"]

@@ -32,30 +32,36 @@ SETTINGS = {
     "heidenhain-kinematics": {"sign": "error", "angle_unit": "deg"},
     "siemens": {"value_sign": "error", "product_terms": "only"},
 }
-HEAD = ("machine", "control", "class", "tables", "points", "before max / rms", "after max / rms", "most is left at")
+MORE = {"fanuc": ({"rotary": "middle"},)}
+"""Further rows, for machines with rotary axes."""
+HEAD = (
+    "machine",
+    "control",
+    "class",
+    "tables",
+    "points",
+    "before max / rms",
+    "after max / rms",
+    "at least",
+    "most is left at",
+)
 
 
-def row(name: str, machine: Machine, control: str) -> tuple[str, ...]:
+def row(name: str, machine: Machine, control: str, more: dict[str, str]) -> tuple[str, ...]:
     """One control on one machine; what is refused is said in words."""
     chosen = controls()[control]
-    options = chosen.settings(SETTINGS.get(control, {}))
+    options = chosen.settings({**SETTINGS.get(control, {}), **more})
+    title = " ".join([control, *(f"{key}={value}" for key, value in more.items())])
     try:
         made = export(chosen, Request(machine, ranges_of(machine), LENGTH, TARGET, options), POSES)
     except NcfixError as error:
-        return (
-            name,
-            control,
-            chosen.reaches,
-            "-",
-            "-",
-            "-",
-            f"{error.messages[0].code}: {error.messages[0].text}",
-            "-",
-        )
+        said = f"{error.messages[0].code}: {error.messages[0].text}"
+        return (name, title, chosen.reaches, "-", "-", "-", said, "-", "-")
     figures, limits = made.left.figures(), made.limits()
     sizes = [f"{figures[when]['max']:.2f} / {figures[when]['rms']:.2f}" for when in ("before", "after")]
     at = " ".join(f"{axis}{value:g}" for axis, value in figures["after"]["at"].items())
-    return (name, control, chosen.reaches, str(limits["tables"]), str(limits["points"]), *sizes, at)
+    least = f"{1e3 * made.least.value:.2f}" if made.least else ""
+    return (name, title, chosen.reaches, str(limits["tables"]), str(limits["points"]), *sizes, least, at)
 
 
 def rows() -> Iterator[tuple[str, ...]]:
@@ -63,10 +69,11 @@ def rows() -> Iterator[tuple[str, ...]]:
     for name in MACHINES:
         machine = load(ROOT / "examples" / "machines" / f"{name}.toml")
         for control in sorted(controls()):
-            start = time.monotonic()
-            found = row(name, machine, control)
-            print(json.dumps(found), f"{time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
-            yield found
+            for more in ({}, *(MORE.get(control, ()) if machine.rotary.any() else ())):
+                start = time.monotonic()
+                found = row(name, machine, control, more)
+                print(json.dumps(found), f"{time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+                yield found
 
 
 def table() -> str:

@@ -163,7 +163,6 @@ SETTINGS = ({}, {"positioning": "eec"}, {"model": "828D"}, {"model": "828D", "po
 
 
 HEAD = "| machine | settings | tables | points | before, max / rms | after, max / rms | least, max | most is left at |"
-LEAST = re.compile(r"leave less than ([\d.]+) um")
 
 
 def shipped_row(name: str, more: dict[str, str]) -> str:
@@ -176,8 +175,8 @@ def shipped_row(name: str, more: dict[str, str]) -> str:
     before, after = ("{max:.1f} / {rms:.1f}".format(**sizes[when]) for when in ("before", "after"))
     at = " ".join(f"{axis}{value:.0f}" for axis, value in sizes["after"]["at"].items())
     limits, said = made.limits(), " ".join(f"{key}={value}" for key, value in more.items()) or "840D"
-    found = [match.group(1) for note in made.notes if (match := LEAST.search(note))]
-    least = f"{float(found[0]):.1f}" if found else "0"
+    assert made.least is not None
+    least = f"{1e3 * made.least.value:.1f}"
     return f"| {name} | {said} | {limits['tables']} | {limits['points']} | {before} | {after} | {least} | {at} |"
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SAME = 0.5
 """mm: tools whose lengths differ by less are the same to tables."""
+INSTEAD = "give the original program, or run this one without tables"
 MANY = 4
 """Lengths that are listed."""
 
@@ -42,10 +43,11 @@ def along(
     Both are looked at where the tool cuts; rewritten programs have the figures of `fix` after, which looks at the ends
     of rapids too. It is remarked on if the program's tools are not of the length that the tables hold for, mm.
 
-    Raises `RefusedError` NCF493 for a program that carries a stamp of ncfix: it would be corrected twice.
+    Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
+    its numbers show it.
     """
     from ncfix.compensate.simulation import tip_error
-    from ncfix.compensate.tabled import tip_error_with
+    from ncfix.compensate.tabled import seems_corrected, tip_error_with
 
     program, followed = _followed(following, path)
     names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
@@ -54,6 +56,9 @@ def along(
     if control.rewrites:
         after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
     else:
+        if seems_corrected(machine, moves):
+            text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+            raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
         error = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
         after = figures(error, lines)
     fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
@@ -98,5 +103,5 @@ def _followed(following: Following, path: str) -> tuple[Program, Followed]:
     if block is not None:
         text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
         place = program.place(block)
-        raise RefusedError.of("NCF493", text, place, "give the original program, or run this one without tables")
+        raise RefusedError.of("NCF493", text, place, INSTEAD)
     return program, follow(program, following.machine, following.setup, subprograms(path))

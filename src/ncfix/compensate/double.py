@@ -12,12 +12,13 @@ numbers with all digits used as many become round as cease to be, by chance; not
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
-from ncfix.compensate.settle import Settled
 from ncfix.diagnostics import Message, Place, RefusedError
+from ncfix.program.moves import Moves
 
 COARSE = 10
 """Steps of the grid of round numbers, in steps of the control's digits."""
@@ -31,7 +32,7 @@ MOVED = 0.75
 """Steps by which a number has to be corrected to say anything."""
 
 
-def suspected(settled: Settled, step: float, path: str, force: bool) -> tuple[Message, ...]:
+def suspected(settled: Changed, step: float, path: str, force: bool) -> tuple[Message, ...]:
     """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
     if not looks_corrected(settled, step):
         return ()
@@ -42,7 +43,23 @@ def suspected(settled: Settled, step: float, path: str, force: bool) -> tuple[Me
     return (message,)
 
 
-def looks_corrected(settled: Settled, step: float) -> bool:
+class Changed(Protocol):
+    """Motions (n), which of them are left as they are, and how the commands at their ends change, (n, n_axes)."""
+
+    @property
+    def moves(self) -> Moves:
+        """As programmed."""
+
+    @property
+    def kept(self) -> Mask:
+        """Those that are left, (n,)."""
+
+    @property
+    def shift(self) -> Array:
+        """What is added, (n, n_axes) mm and rad."""
+
+
+def looks_corrected(settled: Changed, step: float) -> bool:
     """Whether the program seems to have been corrected before, for this machine.
 
     step  of the control's digits, mm
@@ -55,7 +72,7 @@ def looks_corrected(settled: Settled, step: float) -> bool:
     return gained >= ENOUGH and gained - lost > SURE * math.sqrt(gained + lost)
 
 
-def _numbers(settled: Settled, step: float) -> list[tuple[Array, Array]]:
+def _numbers(settled: Changed, step: float) -> list[tuple[Array, Array]]:
     """For each linear axis the different commands that change it, and their corrections, mm."""
     moves, change = settled.moves, settled.shift
     new = np.abs(moves.end - moves.start) > step / 2

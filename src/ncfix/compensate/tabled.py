@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.findings import Array
+from ncfix.compensate.double import looks_corrected
+from ncfix.compensate.findings import Array, Mask
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.kinematics import commands_from_joints
+from ncfix.compensate.options import FixOptions
 from ncfix.compensate.simulation import TipError, batches, samples
+from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Moves, Rule
 
 Correct = Callable[[Array, Array, float], Array]
 """Positions of all axes (k, n_axes) [mm, rad], ways (k, n_axes), tool length [mm] -> what the control adds to them."""
@@ -33,3 +38,29 @@ def tip_error_with(machine: Machine, moves: Moves, correct: Correct, state: Stat
         intended[part] = intent.tip(rows[part], fraction[part])
         actual[part] = machine.actual_tip(corrected, states)
     return TipError(rows, fraction, intended, actual)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ends:
+    """What a correction would change at the ends of motions."""
+
+    moves: Moves
+    kept: Mask
+    shift: Array
+
+
+def seems_corrected(machine: Machine, moves: Moves) -> bool:
+    """Whether the numbers of a program look as if it had been corrected for this machine already (`double`)."""
+    kept: Mask = (moves.rule != Rule.CORRECT) | ~np.isfinite(moves.end).all(axis=1)
+    shift = np.zeros_like(moves.end)
+    intent = Intent(machine, moves, State())
+    rows = np.flatnonzero(~kept)
+    for part in batches(len(rows)):
+        some = rows[part]
+        ends = np.ones(len(some))
+        corrected = get_strategy(FixOptions().strategy).correct(
+            machine, intent.joints_at(some, ends), intent.states(some, ends)
+        )
+        commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.tool_length[some])
+        shift[some] = commands - moves.end[some]
+    return looks_corrected(_Ends(moves, kept, shift), machine.least_increment[0])

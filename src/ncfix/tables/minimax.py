@@ -90,9 +90,9 @@ def least_worst(
         found = Remainder(nodes, turns, left, bound)
         if number == 0 or found.largest * found.rms < best.largest * best.rms:
             best = found
-        if best.largest <= max(NEAR * bound, enough):
-            break
         grown = weights * np.linalg.norm(left, axis=-1)
+        if best.largest <= max(NEAR * bound, enough) or not grown.any():
+            break
         weights = (1 - BASE) * grown / grown.sum() + BASE * even
     return replace(best, bound=bound)
 
