@@ -13,11 +13,12 @@ from ncfix.program.writer import apply
 
 AXES = ("X", "Y", "Z")
 STEP = np.full(3, 0.001)
+GIVEN = Setup(work_offsets={"G54": {}}, initial=dict.fromkeys(AXES, 0.0))
 
 
 def traced(text: str) -> tuple:
     program = read(text.encode("latin-1"), "test.ngc", "linuxcnc")
-    return program, trace(program, Setup(assume_zero=True), AXES, frozenset()).moves
+    return program, trace(program, GIVEN, AXES, frozenset()).moves
 
 
 def whole(moves: Moves, shift=(0.0, 0.0, 0.0), kept: np.ndarray | None = None) -> Pieces:

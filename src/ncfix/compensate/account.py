@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.compensate.left import Left
 from ncfix.diagnostics import Message, Place
 from ncfix.program.moves import Kind, Moves, Rule
 
@@ -77,6 +78,7 @@ class FixReport:
     """What was done to one program, as figures.
 
     error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
+    left    axes that had to stay where they stand, since the program has not said where that is
     """
 
     path: str
@@ -93,6 +95,7 @@ class FixReport:
     warnings: tuple[Message, ...] = ()
     strategy: str = ""
     leaves: str = ""
+    left: tuple[Left, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """The per-file object of `fix --json`."""
@@ -110,6 +113,7 @@ class FixReport:
             "error_after_um": dict(self.error_after_um),
             "strategy": self.strategy,
             "leaves": self.leaves,
+            "left_where_it_stands": [left.as_dict() for left in self.left],
             "refused": [refusal.as_dict() for refusal in self.refused],
             "warnings": [warning.as_dict() for warning in self.warnings],
         }

@@ -145,12 +145,13 @@ CODES = {
         "Fix the original program. `--force` corrects this one all the same.",
     ),
     "NCF439": Code(
-        "a word for an axis that the program has not named",
-        "The correction needs an axis that no block has named so far, so its word says where it already stands, but "
-        "for some um. Where that is was assumed (`--assume-zero`). If the axis stands elsewhere on the machine, the "
-        "word makes it go there.",
-        "Let the program name X, Y and Z in one of its first blocks, or say where the axes stand: `--initial`, "
-        "`--offset`, `--tool`.",
+        "an axis is left where it stands",
+        "The correction needs an axis that the block does not name, and the program has not said where that axis is: "
+        "at the start, after machine coordinates and reference points, a change of tool, of its length offset, of the "
+        "work offset. A word for it would lead it to where the setup says that it is, and if that is wrong, into the "
+        "part. So it gets none, and this part of the correction is made when the program names it.",
+        "Let the program name X, Y and Z in the first blocks, and again after such a change. At the start `--initial` "
+        "with `--offset` and `--tool`, without `--assume-zero`, says it as well.",
     ),
     "NCF445": Code(
         "program written out flat",

@@ -36,6 +36,7 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces) -> Pieces:
     )
     end = pieces.end.copy()
     solved = commands_from_joints(machine, q, moves.tcp[move], moves.tool_length[move])
+    solved = np.where(moves.wordless[move], end[rows], solved)
     end[rows[arrived]] = solved[arrived]
     return replace(pieces, end=end)
 

@@ -17,11 +17,11 @@ from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_l
 from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
+from ncfix.compensate.left import left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
-from ncfix.compensate.settle import Settled, settle
+from ncfix.compensate.settle import Settled, increments, settle
 from ncfix.compensate.strategies import get_strategy
-from ncfix.compensate.unnamed import words_on_trust
 from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
@@ -63,7 +63,6 @@ def fix_program(
     stamp, NCF438 for one that seems to have been corrected without one. Motions that had to be left uncorrected are in
     `report.refused`; whether that is acceptable is for the caller to decide.
     """
-    strategy = get_strategy(options.strategy)
     refuse_stamped(program, options)
     if machine.is_perfect:
         return _untouched(program)
@@ -84,9 +83,8 @@ def fix_program(
     errors = _errors(on_machine, proof.settled) if options.verify else None
     if errors is not None:
         _check_sane(program, proof.settled, errors)
-    report = _report(program, followed, proof.settled, errors, strategy.leaves, options)
-    trusted = words_on_trust(program, proof.settled, followed.assumed)
-    report = replace(report, warnings=(*suspicion, *trusted, *report.warnings))
+    report = _report(program, machine, followed, proof.settled, errors, options)
+    report = replace(report, warnings=(*suspicion, *report.warnings))
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
 
@@ -150,9 +148,15 @@ def _untouched(program: Program) -> Fixed:
 
 
 def _report(
-    program: Program, followed: Trace, settled: Settled, errors: PathError | None, leaves: str, options: FixOptions
+    program: Program,
+    machine: Machine,
+    followed: Trace,
+    settled: Settled,
+    errors: PathError | None,
+    options: FixOptions,
 ) -> FixReport:
     moves = followed.moves
+    left = tuple(left_where_they_stand(program, settled, increments(machine)).values())
     account = Account.of(moves, settled.kept, settled.reasons)
     refused = refusals(program, account)
     findings = [
@@ -172,9 +176,10 @@ def _report(
         error_before_um=_figures(errors.before) if errors else {},
         error_after_um=_figures(errors.after) | {"where": _line_of(program, moves, errors.after)} if errors else {},
         refused=tuple(refused),
-        warnings=(*followed.messages, *findings),
+        warnings=(*followed.messages, *(each.message(program.path) for each in left), *findings),
         strategy=options.strategy,
-        leaves=leaves,
+        leaves=get_strategy(options.strategy).leaves,
+        left=left,
     )
     return with_what_is_left(report, options.tolerance_um)
 

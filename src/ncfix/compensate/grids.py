@@ -148,6 +148,8 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     result = with_rotary_held(intent, strategy, move, fraction, q, found)
     command = as_commands(intent, move, programmed, q, result.q)
     command[first], command[last] = real.start[rows], real.end[rows]
+    if intent.wordless is not None:
+        command = np.where(intent.wordless[move], real.at(move, fraction), command)
     use = result.converged | bounds
     counts = sums(use.astype(np.intp), counts).astype(np.intp)
     return Grid(counts, fraction[use], command[use], _follow(intent, move[use], command[use], strategy))

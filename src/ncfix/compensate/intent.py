@@ -79,6 +79,18 @@ class Intent:
         return np.asarray(way | (self.moves.kind == Kind.ARC), dtype=bool)
 
     @cached_property
+    def wordless(self) -> Mask | None:
+        """(n, n_axes) axes that must get no word in a motion, see `Moves.wordless`; None if there are none."""
+        wordless = None if self.moves.placed is None else self.moves.wordless
+        return wordless if wordless is not None and wordless.any() else None
+
+    @cached_property
+    def mute(self) -> Mask | None:
+        """(n, 3) which of X, Y and Z they are; None if none anywhere."""
+        mute = None if self.wordless is None else self.wordless[:, self.columns]
+        return mute if mute is not None and mute.any() else None
+
+    @cached_property
     def kinks(self) -> list[tuple[int, Array]]:
         """The axes (columns) with kinks or jumps of the error model, and where these are, ascending, mm and rad."""
         return list(self.machine.kinks)

@@ -12,6 +12,7 @@ from ncfix.compensate.ragged import largest, owners, slices
 from ncfix.compensate.rows import every, lengths, some
 from ncfix.compensate.sampling import interior, merged, passed
 from ncfix.compensate.segments import Segments
+from ncfix.compensate.wordless import correctable, lacking
 from ncfix.machine.aim import CLOSE
 
 SURE = 0.5
@@ -54,6 +55,7 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
     bow = intent.machine.bow
     most = np.full(len(rows), np.inf)
     plain = ~(intent.curved[rows] | uneasy[rows] | _passes_kink(intent, real, rows))
+    plain[lacking(intent, rows)] = False
     if bow is None or intent.state.inputs or not plain.any():
         return most
     chosen = slice(None) if plain.all() else plain
@@ -91,8 +93,9 @@ def _look(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: f
 
 
 def distance(intent: Intent, real: Segments, rows: Index, fraction: Array) -> Array:
-    """How far the tip is from where it should be at fractions of motions done as `real` has them, (k,) mm."""
-    gap = intent.gap(rows, fraction, real.at(rows, fraction))
+    """How far the tip is from where it could be at fractions of motions done as `real` has them, (k,) mm."""
+    commands = real.at(rows, fraction)
+    gap = correctable(intent, rows, commands, intent.gap(rows, fraction, commands))
     size: Array = np.sqrt(np.einsum("ij,ij->i", gap, gap))
     return size
 

@@ -114,7 +114,10 @@ def too_large(written: Written) -> Finding:
 def too_fast(written: Written) -> Finding:
     """NCF407: corrections of the linear axes that change by more than the way in between accounts for."""
     machine, pieces = written.intent.machine, written.pieces
-    change = lengths(np.diff(written.correction[:, ~machine.rotary], axis=0))
+    change = np.diff(written.correction[:, ~machine.rotary], axis=0)
+    if written.intent.wordless is not None:
+        change[written.intent.wordless[pieces.move[:-1]][:, ~machine.rotary]] = 0.0
+    change = lengths(change)
     over = np.flatnonzero((change > JUMP) & ~pieces.kept[1:] & ~pieces.kept[:-1])
     way = np.abs(written.programmed[over + 1] - written.programmed[over])
     allowed = JUMP + RATE * way[:, ~machine.rotary].sum(axis=1) + RATE_TURNING * way[:, machine.rotary].sum(axis=1)

@@ -29,6 +29,7 @@ from ncfix.compensate.rows import finite
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
 from ncfix.compensate.strategies import Strategy
+from ncfix.compensate.wordless import crooked
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves, Rule
 
@@ -90,7 +91,7 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     kept = kept | ends.failed
     approaches = corrected_approaches(intent, ends.wanted, kept) if strategy.follows_path else None
     real, broken = _real(intent, ends.wanted, kept, demands, approaches)
-    bound = intent.moves.compensated if strategy.follows_path else np.ones(len(kept), dtype=bool)
+    bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(kept), dtype=bool)
     if (broken & bound).any():
         again = _plan(intent, strategy, demands, kept | (broken & bound))
         return replace(again, findings=(*ends.findings, _stuck(np.flatnonzero(broken & bound)), *again.findings))
@@ -193,7 +194,7 @@ def _remarks(
     """What is not as it was asked for, though nothing is kept for it."""
     remarks = []
     budget = demands.budget
-    over = np.flatnonzero((deviation > budget.path) & intent.moves.compensated)
+    over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
     if over.size:
         text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
         remarks.append(Finding("NCF413", over, deviation[over] * 1e3, text))

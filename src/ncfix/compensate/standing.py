@@ -13,6 +13,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
 from ncfix.compensate.kinematics import commands_from_joints, reached_joints
+from ncfix.compensate.wordless import stays
 from ncfix.machine import Machine
 from ncfix.program.moves import Kind, Moves
 
@@ -35,14 +36,17 @@ def standing(
 ) -> Standing:
     """Where each motion starts and ends if motions that are not `kept` (n,) end at `wanted` (n, n_axes).
 
+    Axes that must get no word stay where they stand.
+
     before      (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
     approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
     """
     shift = np.where(kept[:, None], 0.0, _known(wanted - moves.end))
-    if not kept.any() and _goes_on(moves):
+    staying = stays(moves, kept, shift, before)
+    if not kept.any() and not staying.any() and _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
         return Standing(moves.start + np.concatenate([first, shift[:-1]]), moves.end + shift)
-    decides = ~kept[:, None] | (moves.moved & ~moves.incremental[:, None])
+    decides = ~staying & (~kept[:, None] | (moves.moved & ~moves.incremental[:, None]))
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
     jumps, risen = _risen(moves, approaches)

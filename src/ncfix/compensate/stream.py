@@ -27,10 +27,9 @@ from ncfix.compensate.following import Resolve, kinematics_of, placed, rotary_na
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, differences
-from ncfix.compensate.settle import Agreed, Before, Settled, settle
+from ncfix.compensate.settle import Agreed, Before, Settled, increments, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
-from ncfix.compensate.unnamed import words_on_trust
 from ncfix.compensate.verify import PathError
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State
@@ -262,7 +261,7 @@ class Stream:
         if unit.before is not None:
             assert self.before is not None
             own[0] = False
-            agreed = None if self.before.kept else agreed
+            agreed = None if self.before.kept or _still_off(moves, self.before) else agreed
             self.before = replace(self.before, direction=unit.before.direction)
         first = agreed() if agreed is not None else None
         settled = settle(program, moves, machine, self.options, before=self.before, first=first)
@@ -270,11 +269,9 @@ class Stream:
             raise NotInPartsError("a refusal reaches back into an earlier part")
         if self.before is None:
             self.suspicion = suspected(settled, machine.least_increment[0], self.path, self.options.force)
-            assumed = (*follower.assumed, *self.tools)
-            self.suspicion += words_on_trust(program, settled, assumed)
         text = self._text(program, settled, follower)
         self._prove(text, settled, own, unit.last, *proof)
-        self.tally.add(program, settled, own)
+        self.tally.add(program, settled, own, increments(machine))
         if self.options.verify:
             self._look(program, settled, own, workers)
         if self.options.allow_refused or not self.tally.refused:
@@ -343,6 +340,11 @@ class Stream:
         while len(self.looks) > most:
             found, lines = self.looks.popleft()
             self.tally.figures(found(), lines)
+
+
+def _still_off(moves: Moves, before: Before) -> bool:
+    """Whether an axis goes on standing off its place where a part begins, which its plan did not know."""
+    return bool((moves.wordless[0] & (before.shift != 0)).any())
 
 
 def _ends_clean(program: Program, moves: Moves) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.findings import MOST, Finding, Mask
 from ncfix.compensate.fix import largest_correction, refusals
+from ncfix.compensate.left import Left, joined, left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.settle import Settled
 from ncfix.compensate.verify import Figures, PathError
@@ -69,10 +70,16 @@ class Tally:
     refused: list[Refusal] = field(default_factory=list)
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     found: dict[tuple[str, str, str], Found] = field(default_factory=dict)
+    left: dict[str, Left] = field(default_factory=dict)
 
-    def add(self, program: Program, settled: Settled, own: Mask) -> None:
-        """Take in a part; `own` (n,) motions that were not the last of the part before."""
+    def add(self, program: Program, settled: Settled, own: Mask, steps: NDArray[np.float64]) -> None:
+        """Take in a part.
+
+        own    (n,) motions that were not the last of the part before
+        steps  (n_axes,) what the control resolves, mm and rad
+        """
         moves = settled.moves
+        self.left = joined(self.left, left_where_they_stand(program, settled, steps, own))
         account = Account.of(moves, settled.kept, settled.reasons)
         theirs = set(moves.block[~own].tolist())
         self.moves += int(own.sum())
@@ -103,6 +110,9 @@ class Tally:
             note.shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
         note.count += int(own[finding.moves].sum())
 
+    def _left(self, path: str) -> list[Message]:
+        return [left.message(path) for left in self.left.values()]
+
     def warnings(self) -> list[Message]:
         """What the plans found, in the order of one plan."""
         messages = []
@@ -130,8 +140,9 @@ class Tally:
             error_before_um=self.before.as_dict(self.way) if figures else {},
             error_after_um=after if figures else {},
             refused=tuple(self.refused),
-            warnings=(*messages, *self.notes.values(), *self.warnings()),
+            warnings=(*messages, *self.notes.values(), *self._left(path), *self.warnings()),
             strategy=options.strategy,
             leaves=leaves,
+            left=tuple(self.left.values()),
         )
         return with_what_is_left(report, options.tolerance_um)

@@ -21,6 +21,7 @@ from ncfix.compensate.ragged import batches, owners
 from ncfix.compensate.rows import finite, lengths
 from ncfix.compensate.sampling import MOST, bends, even, merged, passed
 from ncfix.compensate.steer import rows_of
+from ncfix.compensate.wordless import correctable, lacking
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
@@ -129,6 +130,7 @@ def samples(
     uneasy = uneasy_starts(written.intent, _kept_motions(written))
     if known is not None and not tilts:
         here, before, after = known.at(written, which)
+        here[lacking(written.intent, written.pieces.move[which])] = False
         here &= (counts == 0) & ~(_begins_uneasily(written, which, uneasy) & along) & ~_kinked(written, which, along)
         on = which[here]
         move, ones = written.pieces.move[on], np.ones(len(on))
@@ -194,10 +196,13 @@ def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> 
     intent = written.intent
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
     lengths, states = intent.lengths(move), intent.states(move, at)
-    intended, done = intent.joints_at(move, at), written.joints(piece, fraction)
+    commands = written.segments.at(piece, fraction)
+    intended, done = intent.joints_at(move, at), intent.joints(move, commands)
     tip = intent.machine.tip(intended, lengths)
-    before = np.linalg.norm(intent.machine.actual_tip(intended, states) - tip, axis=1)
-    after = np.linalg.norm(intent.machine.actual_tip(done, states) - tip, axis=1)
+    before, after = (
+        np.linalg.norm(correctable(intent, move, commands, intent.machine.actual_tip(q, states) - tip), axis=1)
+        for q in (intended, done)
+    )
     if not tilts:
         return Samples(move, at, before, after, _way(written, piece), 0.0, 0.0)
     ends = np.flatnonzero(fraction == 1.0)

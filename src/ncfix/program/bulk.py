@@ -154,13 +154,22 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
     fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
     fit &= ~pieces.kept[first] & _writable_pieces(program, moves, pieces, first_piece, layouts)
-    fit &= np.isfinite(pieces.end[first]).all(axis=1)
+    fit &= np.isfinite(pieces.end[first]).all(axis=1) & _undisplaced(moves, pieces, first_piece)
     fit &= layouts.known[program.template[moves.block]]
     rising = moves.block[1:] > moves.block[:-1]
     if not rising.all():
         fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
         fit[1:] &= rising
     return fit
+
+
+def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
+    """(n,) motions in which axes that must get no word stand where the program believes them to be."""
+    if moves.placed is None or moves.placed.all():
+        return np.ones(len(moves), dtype=np.bool_)
+    last = first_piece[1:] - 1
+    fine: Mask = ~(moves.wordless & (pieces.end[last] != moves.end)).any(axis=1)
+    return fine
 
 
 def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:

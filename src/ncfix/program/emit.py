@@ -114,6 +114,7 @@ class _Emitter:
         self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
+        self.wordless = moves.wordless
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
@@ -280,7 +281,8 @@ class _Emitter:
         arc = bool(pieces.arc[rows.start])
         modal = int(moves.modal[row])
         straight = modal if modal in (0, 10) or moves.kind[row] == Kind.CYCLE else 10
-        fractions = pieces.fraction[rows]
+        fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
+        ends[:, wordless] = start[wordless]
         arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
             letters=moves.axes,
@@ -288,7 +290,7 @@ class _Emitter:
             start=start,
             nominal=nominal,
             original=nominal - nominal_start if moves.incremental[row] else nominal,
-            ends=frame.program(pieces.end[rows].copy()),
+            ends=ends,
             arc=arc,
             centre=frame.program_point(pieces.centre[rows.start], moves.axes),
             original_centre=as_programmed.program_point(moves.centre[row], moves.axes),
@@ -313,6 +315,7 @@ class _Emitter:
             pointing=moves.pointing,
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
+            wordless=tuple(wordless.tolist()),
             **self.levels.wanted(row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position),
         )
 

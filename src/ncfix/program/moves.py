@@ -120,6 +120,8 @@ class Moves:
     pointing     how rotary axes point the tool, where programs give its direction as a vector
     approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
                  which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
+    placed       (n, n_axes) the program itself has brought the axis to where it stands, in the coordinates in force:
+                 only then may it get a word that its block lacks (see `rs274.places`). None: all are
     """
 
     axes: tuple[str, ...]
@@ -149,9 +151,18 @@ class Moves:
     held: NDArray[np.bool_] | None = None
     pointing: Pointing | None = None
     approach: NDArray[np.float64] | None = None
+    placed: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
+
+    @property
+    def wordless(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand."""
+        if self.placed is None:
+            return np.zeros(self.end.shape, dtype=bool)
+        wordless: NDArray[np.bool_] = ~(self.placed | self.programmed)
+        return wordless
 
     @property
     def moved(self) -> NDArray[np.bool_]:

@@ -99,7 +99,8 @@ class BlockRenderer:
         position[column] = base + original
 
     def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
-        if not np.isfinite(end) or abs(end - position[column]) < self.half[column]:
+        still = not np.isfinite(end) or abs(end - position[column]) < self.half[column]
+        if still or not self._has_words(column):
             return
         if self.layout.allowed is not None and self.target.letters[column] not in self.layout.allowed:
             return
@@ -268,7 +269,7 @@ class BlockRenderer:
 
     def _named(self, position: FloatArray) -> list[str]:
         """A word for where an axis stands: the first line of what was an arc is a motion, even if it goes nowhere."""
-        named = [(column, letter) for column, letter in self.columns if np.isfinite(position[column])]
+        named = [each for each in self.columns if self._has_words(each[0]) and np.isfinite(position[each[0]])]
         return [
             self._cased(letter)
             + f"{0.0 if self.target.incremental else position[column]:.{self.target.decimals[column]}f}"
@@ -277,7 +278,7 @@ class BlockRenderer:
 
     def _has_words(self, column: int) -> bool:
         """Whether an axis is told where to go by a word of its own."""
-        return True
+        return self.target.may_name(column)
 
     def _further_words(self, position: FloatArray, end: FloatArray) -> list[str]:
         """Words of a further piece besides those of axes; what they move is put into `position`."""

@@ -55,6 +55,7 @@ class Target:
     level        what R shall be, NaN where it is not to be written
     nominal_level, level_before  what it was as programmed, and what is in force before the block (NaN: not known)
     least_level  R must not be lower; NaN: it may
+    wordless     (n_axes,) axes that have no word and must get none; empty: no axis
     """
 
     letters: tuple[str, ...]
@@ -92,6 +93,11 @@ class Target:
     nominal_level: float = float("nan")
     level_before: float = float("nan")
     least_level: float = float("nan")
+    wordless: tuple[bool, ...] = ()
+
+    def may_name(self, column: int) -> bool:
+        """Whether an axis has a word, or may get one."""
+        return not self.wordless or not self.wordless[column]
 
     @property
     def last_code(self) -> int:

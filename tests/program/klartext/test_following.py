@@ -56,7 +56,7 @@ def test_presets() -> None:
 
 def test_machine_coordinates_pass() -> None:
     moves = follow("CYCL DEF 7.0 SHIFT\nCYCL DEF 7.1 X+50\nL X+1 Z+2 FMAX M91\nL Y+1").moves
-    assert moves.rule.tolist() == [Rule.PASS, Rule.PASS]
+    assert moves.rule.tolist() == [Rule.PASS, Rule.CORRECT]
     assert moves.end.tolist() == [[1, 0, 2], [1, 1, 2]]
 
 

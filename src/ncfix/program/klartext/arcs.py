@@ -15,6 +15,7 @@ from ncfix.program.klartext.targets import (
     Where,
     Words,
     command_of,
+    derived,
     here,
     led,
     polar,
@@ -148,7 +149,8 @@ def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
     relative = step.name in ("ct", "ctp", "cp") or step.words.incremental
     with_increments(control, relative)
     arc = Arc(centre, normal, sweep)  # type: ignore[arg-type]
-    control.move(Kind.ARC, axes, target, unknown, CLOCKWISE if circle.sweep < 0 else COUNTER, arc=arc)
+    code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
+    control.move(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc)
     with_increments(control, False)
     control.path.tangent = direction_at_end(control.position, arc)
 

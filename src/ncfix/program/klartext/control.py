@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
@@ -15,7 +15,7 @@ from ncfix.program.pointing import Pointing
 from ncfix.program.rs274 import control as base
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.control import AT_START, Unknown
+from ncfix.program.rs274.control import AT_START, Unknown, first_reason
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.program.rs274.knowledge import WORK_OFFSET
 from ncfix.program.setup import Setup, Tool
@@ -29,10 +29,6 @@ BY_DEPTH, FROM_START = 2000, 1000
 TILTED, DOUBTFUL, TOOL, PRESET = "tilt", "doubt", "tool", "preset"
 """The keys under which motions are suspended."""
 
-
-ADRIFT = "the axis {} has not been named since M91, the start, a change of tool, preset, plane or M128: {}"
-APART = "its numbers in the workpiece would rest on the offsets alone"
-NOT_NAMED = "NCF274"
 
 RETRACTED = "where the axis {} stands after M140 is not followed"
 MOVED_ALONG = "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed"
@@ -110,7 +106,6 @@ class Control(base.Control):
         self.preset_checked = False
         self.tool_called = False
         self.defined_tools: dict[int, Tool] = {}
-        self.adrift = {i for i in (X, Y, Z) if i in self.machine and LETTERS[i] not in setup.initial}
         self.load_preset(START if START in setup.work_offsets else "G54")
 
     # -- coordinates --------------------------------------------------------------------------------------------------
@@ -146,22 +141,17 @@ class Control(base.Control):
             why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else tcp.TURNED
             tcp.switch(self, self.offsets.tool, on)
             self.unknown = {i: why if reason is tcp.TURNED else reason for i, reason in self.unknown.items()}
-            self.set_adrift((X, Y, Z))
         self.refresh()
 
-    def set_adrift(self, indices: Iterable[int]) -> None:
-        """Where these axes stand in the workpiece follows from offsets now, not from a word of the program."""
-        everywhere = self.is_rotated or self.tcp
-        self.adrift |= {i for i in ((X, Y, Z) if everywhere else indices) if i in (X, Y, Z) and i in self.machine}
-
-    def not_said(self, axes: int) -> str:
-        """Why a motion must not get words for axes that it does not name; empty if it may.
-
-        An added word would lead such an axis to where the setup says that it is, and if a preset or a tool length is
-        another on the machine, somewhere else.
-        """
-        letter = next((LETTERS[index] for index in sorted(self.adrift) if not axes >> index & 1), "")
-        return ADRIFT.format(letter, APART) if letter else ""
+    def anchors(self) -> list[Hashable]:
+        """As for the RS274 family, but datum shifts are stated by the program."""
+        if not hasattr(self, "preset"):
+            return [None] * len(LETTERS)
+        tool = zeros() if self.tcp else self.offsets.tool
+        return [
+            (self.preset, preset, tool[i], self.spatial_anchor(i) if i in (X, Y, Z) else None)
+            for i, preset in enumerate(self.transformations.preset)
+        ]
 
     def use(self) -> None:
         """A motion in workpiece coordinates: preset and tool length matter."""
@@ -207,21 +197,16 @@ class Control(base.Control):
         What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
         (PATHCTRL VECTOR), which in pieces would be turns of axes.
         """
-        lost = any(reason is not AT_START for reason in (*unknown.values(), *self.unknown.values()))
-        judged = refusal or passing or self.refusal or self.suspended or lost
-        why = "" if judged else self.not_said(axes | (1 << Z if code == BY_DEPTH else 0))
-        if why and kind in (Kind.RAPID, Kind.FEED):
-            self.warn(NOT_NAMED, why, "let the program name X, Y and Z")
-            passing = why
-        refusal = refusal or why
-        if not self.modal.incremental and not passing.startswith("machine"):
-            self.adrift -= {index for index in (X, Y, Z) if axes >> index & 1}
+        if kind == Kind.RAPID and not refusal and AT_START in unknown.values():
+            passing = passing or first_reason(unknown)
+        own = axes | (1 << Z if code == BY_DEPTH else 0)
+        settles = 0 if self.modal.incremental or passing.startswith("machine") else own
         before = self.modal.compensated
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.modal.compensated = before or 41
-        super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc)
+        super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
         self.modal.compensated = before
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:

@@ -147,7 +147,6 @@ def preset(control: Control) -> None:
         control.suspended[PRESET] = NO_PRESET
         return
     control.load_preset(f"PRESET{number:g}")
-    control.set_adrift((X, Y, Z))
 
 
 # -- execution --------------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from ncfix.program.klartext.step import Step, refuse, with_increments
 from ncfix.program.klartext.targets import (
     Words,
     command_of,
+    derived,
     destination,
     in_machine,
     led,
@@ -23,6 +24,7 @@ from ncfix.program.moves import Kind
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.control import Unknown
 from ncfix.program.rs274.coordinates import Vector, dot
+from ncfix.program.rs274.places import mask_of
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
@@ -75,7 +77,7 @@ def straight_polar(control: Control, step: Step) -> None:
 def name_polar(control: Control, step: Step) -> None:
     """PR and PA say where the axes of the plane are as well as their own words."""
     if {"PR", "PA"} <= step.words.values.keys():
-        control.adrift -= {control.path.plane.first, control.path.plane.second}
+        control.places.settle(mask_of((control.path.plane.first, control.path.plane.second)))
 
 
 def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
@@ -90,7 +92,8 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     off = step.kind == Kind.RAPID and control.is_led(unknown)
     with_increments(control, follows or step.words.incremental)
     code = 0 if step.kind == Kind.RAPID else 10
-    control.move(step.kind, axes, target, unknown, code, refusal=check_normal(control), passing=OFF if off else "")
+    refusal = check_normal(control) or derived(control, step.words, axes)
+    control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else "")
     with_increments(control, False)
     keep_tangent(control, *before)
 
@@ -151,7 +154,6 @@ def at_machine(control: Control, step: Step) -> None:
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
     control.move(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code))
-    control.set_adrift([index for index in range(3) if step.words.axes >> index & 1])
     if was:
         control.switch_tip()
     control.path.tangent = None
@@ -168,7 +170,7 @@ def approach(control: Control, step: Step) -> None:
     target, unknown = command_of(control, where, axes)
     control.path.corner = True
     with_increments(control, step.words.incremental or " p" in step.name)
-    control.move(Kind.FEED, axes, target, unknown, 10)
+    control.move(Kind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes))
     with_increments(control, False)
     if " p" in step.name:
         name_polar(control, step)

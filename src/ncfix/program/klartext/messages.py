@@ -20,13 +20,6 @@ KLARTEXT_CODES: dict[str, Code] = {
         "The vectors or points of a PLANE block lie in one line, or its angles give no plane.",
         "Check its words.",
     ),
-    "NCF274": Code(
-        "An axis that nobody has named",
-        "After the start, M91, a change of tool length, preset or plane, and where M128 goes on or off, only offsets "
-        "say where an axis stands in the workpiece. A word for it would move it if they are others on the machine, so "
-        "straight motions that leave it alone are passed until the program names it.",
-        "Name X, Y and Z in the first block after such a change.",
-    ),
     "NCF275": Code(
         "No beginning",
         "A Klartext program begins with BEGIN PGM, its name, and MM or INCH.",

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ncfix.program.klartext.control import Control
-from ncfix.program.rs274.control import AT_START, Unknown
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, PLANES, Vector, X, Y, Z
+from ncfix.program.rs274.control import ADRIFT, AT_START, Unknown
+from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.program.rs274.faults import Fault
 
 BAD_POLE = "NCF271"
@@ -106,6 +106,18 @@ def led(control: Control, words: Words) -> Where:
         if address in words.runtime:
             where.unknown[index] = RUNTIME
     return where
+
+
+def derived(control: Control, words: Words, axes: int) -> str:
+    """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
+
+    Polar words, and arcs of which an end has one word, count from a place that the program may not have said.
+    """
+    own = words.axes
+    if {"PR", "PA"} <= words.values.keys():
+        own |= polar_axes(control, words)
+    index = next((i for i in control.machine if axes & ~own & control.places.adrift >> i & 1), None)
+    return "" if index is None else ADRIFT.format(LETTERS[index])
 
 
 def settle(control: Control, words: Words) -> None:

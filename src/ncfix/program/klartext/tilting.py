@@ -121,7 +121,6 @@ def tilt_to(control: Control, tilt: Rotation | None, flags: frozenset[str], refu
         control.lose(range(3), MOVED_ALONG)
     control.recompose()
     control.switch_tip()
-    control.set_adrift(range(3))
     control.path.tangent = None
 
 

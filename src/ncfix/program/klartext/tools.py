@@ -9,6 +9,7 @@ from ncfix.program.klartext.control import TOOL, Control
 from ncfix.program.klartext.targets import Words
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.coordinates import Z, zeros
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Tool
 
 BY_NAME = "the length of the tool {} is not given"
@@ -48,6 +49,8 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
         control.tools.spindle = NAMED
     if isinstance(tool, float):
         control.tools.spindle = control.tools.selected = int(tool)
+    if tool is not None:
+        control.places.lose(mask_of(control.machine))
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))
@@ -69,8 +72,6 @@ def set_length(control: Control, length: float) -> None:
     """The machine stands still when the length of the tool changes; the tip does not."""
     tool = zeros()
     tool[Z] = length
-    if length != control.offsets.tool[Z]:
-        control.set_adrift((Z,))
     if control.tcp:
         tcp.switch(control, tool, True)
     control.offsets.tool = tool

@@ -61,11 +61,15 @@ class WordWriter:
     def _left_alone(self, column: int) -> bool:
         """An axis that must not get a word.
 
+        One of which the program has not said where it stands.
+
         A rotary axis in a program with tilted planes: the control would not keep the tip where it is; and on paths that
         are made in a plane, or lead to or away from one. The tool axis beside a corner that the control makes, which
         lies in the working plane, and in a departure.
         """
         layout, target = self.layout, self.target
+        if not target.may_name(column):
+            return True
         if target.rotary and target.rotary[column]:
             turned = any(letter in layout.axes for letter in "ABC")
             bare = layout.corner or layout.name not in ("", "l", "ln", "lp")

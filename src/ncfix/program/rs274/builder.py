@@ -56,7 +56,7 @@ class Arc(NamedTuple):
 
 @dataclass(slots=True)
 class Stretch:
-    """Consecutive motions as columns; `programmed` is a bit mask by letter, `start` and `end` are (n, 9)."""
+    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9)."""
 
     block: IntArray
     programmed: IntArray
@@ -64,6 +64,7 @@ class Stretch:
     feed: FloatArray
     start: FloatArray
     end: FloatArray
+    adrift: IntArray
 
 
 @dataclass(slots=True)
@@ -76,6 +77,7 @@ class Buffer:
     feed: list[float] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
     end: list[float] = field(default_factory=list)
+    adrift: list[int] = field(default_factory=list)
 
     def stretch(self) -> Stretch:
         """The motions as columns."""
@@ -86,6 +88,7 @@ class Buffer:
             np.array(self.feed, dtype=np.float64),
             np.array(self.start, dtype=np.float64).reshape(-1, N_LETTERS),
             np.array(self.end, dtype=np.float64).reshape(-1, N_LETTERS),
+            np.array(self.adrift, dtype=np.int64),
         )
 
 
@@ -138,8 +141,10 @@ class Builder:
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def add(self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector) -> None:
-        """One motion."""
+    def add(
+        self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector, adrift: int
+    ) -> None:
+        """One motion; `adrift`: axes that the program has not brought to where they stand."""
         buffer = self._buffer
         buffer.block.append(block)
         buffer.programmed.append(programmed)
@@ -147,6 +152,7 @@ class Builder:
         buffer.feed.append(feed)
         buffer.start.extend(start)
         buffer.end.extend(end)
+        buffer.adrift.append(adrift)
         self.count += 1
         if len(buffer.block) >= BUFFERED:
             self._flush()
@@ -176,8 +182,9 @@ class Builder:
         """All motions so far."""
         self._flush()
         parts = self._stretches or [Buffer().stretch()]
-        block, mask, style, feed = (
-            np.concatenate([getattr(part, name) for part in parts]) for name in ("block", "programmed", "style", "feed")
+        block, mask, adrift, style, feed = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("block", "programmed", "adrift", "style", "feed")
         )
         start, end = (
             np.concatenate([getattr(part, name).take(self.columns, axis=1) for part in parts])
@@ -200,6 +207,7 @@ class Builder:
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
+            placed=(adrift[:, None] & bits) == 0,
             **self._style_columns(style),
         )
 

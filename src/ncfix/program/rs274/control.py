@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ncfix.diagnostics import Message, Place
@@ -18,6 +18,7 @@ from ncfix.program.rs274.coordinates import (
     ROTARY_LETTERS,
     Rotation,
     Vector,
+    Z,
     product,
     rotated,
     transposed,
@@ -27,12 +28,19 @@ from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
 from ncfix.program.rs274.knowledge import Knowledge
 from ncfix.program.rs274.modal import Modal, Offsets, Saved
 from ncfix.program.rs274.parameters import Parameters
+from ncfix.program.rs274.places import Places, mask_of
 from ncfix.program.setup import Setup
 
 AT_START = "where the axis {} stands when the program starts is not given"
 """Why a position is not known at first; asked of the setup when it matters."""
 
 UNKNOWN_AXIS = "NCF206"
+
+ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
+"""Why a motion is left as it is, or refused, that moves an axis without naming it."""
+
+SQUARE = 1 - 1e-12
+"""A component of a turned axis that is no less lies along the axis itself."""
 
 Unknown = dict[int, str]
 """Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
@@ -89,6 +97,7 @@ class Control:
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     whole      the motions of the block must not be split, as under cutter compensation
     saved      the modal states that M70 saved, one place for each call level
+    places     which axes the program itself has brought to where they stand
     """
 
     def __init__(
@@ -135,6 +144,7 @@ class Control:
         self.first = 0
         self.offset_checked = False
         self._frame = -1
+        self.places = Places.at_start(setup, axes, LETTERS)
         self.refresh()
         self.position = zeros()
         self.unknown: Unknown = {}
@@ -181,6 +191,23 @@ class Control:
         if self.modal.diameter:
             self.scale[0] /= 2
         self._frame = -1
+        self.places.watch(self.anchors())
+
+    def anchors(self) -> list[Hashable]:
+        """For each letter what its numbers count from, besides shifts that the program states in numbers (G52)."""
+        offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool
+        own = [a + b for a, b in zip(offsets.origin, offsets.shift, strict=True)]
+        system = self.modal.system, self.extended_name
+        return [
+            (system, own[i], tool[i], self.spatial_anchor(i) if i < len(self.rotation) else None)
+            for i in range(len(LETTERS))
+        ]
+
+    def spatial_anchor(self, index: int) -> Hashable:
+        """The same for what X, Y and Z have of their own: turns, the tip of the tool, the tool's length."""
+        centre = tuple(self.offsets.centre) if self.is_rotated else None
+        length = self.tools.offset if self.tcp or index == Z else None
+        return self.rotation[index], centre, self.offsets.feature[index], self.tcp, length
 
     @property
     def frame(self) -> int:
@@ -242,10 +269,24 @@ class Control:
         refusal: str = "",
         passing: str = "",
         arc: Arc | None = None,
+        settles: int | None = None,
     ) -> None:
-        """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed."""
+        """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed.
+
+        settles  the axes whose words say where they stand afterwards; those of absolute words if not given
+        """
         if not passing:
             self._ask_for_start(kind, unknown)
+        if settles is None:
+            settles = 0 if passing or self.modal.incremental else axes
+        adrift = self._adrift(settles)
+        if not (passing or refusal) and (why := self._dragged(axes, adrift, target)):
+            refusal, passing = ("", why) if kind in (Kind.RAPID, Kind.FEED) else (why, "")
+        elif passing and kind != Kind.DWELL:
+            self.places.lose(mask_of(i for i in self.machine if axes >> i & 1 or target[i] != self.position[i]))
+        self.places.settle(settles)
+        self.places.lose(mask_of(unknown))
+        self.places.begun = True
         rule, reason = self._verdict(kind, unknown, refusal, passing)
         style = self._style(kind, rule, reason, code)
         if arc is not None:
@@ -255,11 +296,31 @@ class Control:
             start = blanked(start, self.unknown)
         if unknown:
             end = blanked(end, unknown)
-        self.builder.add(self.row_block, axes, style, self.modal.feed, start, end)
+        self.builder.add(self.row_block, axes, style, self.modal.feed, start, end, adrift)
         if self.ends is not None:
             self.ends.append(target[:])
         self.position = target
         self.unknown = unknown
+
+    def _adrift(self, settled: int) -> int:
+        """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""
+        adrift = self.places.adrift & ~settled
+        if adrift and self.is_rotated:
+            turned = self._turned()
+            adrift |= turned if adrift & turned else 0
+        return adrift
+
+    def _turned(self) -> int:
+        """Axes that are moved by words of others, since the frame is turned."""
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
+
+    def _dragged(self, axes: int, adrift: int, target: Vector) -> str:
+        """Why the motion cannot be corrected: it moves an axis that has no word and must get none; empty if it can."""
+        moved = mask_of(i for i in self.machine if target[i] != self.position[i])
+        if self.is_rotated and axes & self._turned():
+            moved |= self._turned()
+        index = next((i for i in self.machine if adrift & moved & ~axes & self.places.adrift >> i & 1), None)
+        return "" if index is None else ADRIFT.format(LETTERS[index])
 
     def _ask_for_start(self, kind: Kind, unknown: Unknown) -> None:
         """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""

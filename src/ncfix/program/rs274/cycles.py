@@ -114,7 +114,11 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
         program[across] = r
         control.builder.approach(command(control, block, program))
     program[across] = depth
-    control.move(Kind.CYCLE, block.axes, command(control, block, program), unknown, code, refusal=refusal)
+    bottom, adrift = command(control, block, program), control.places.adrift
+    settles = 0 if control.modal.incremental else block.axes | 1 << across
+    control.move(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles)
+    if not control.modal.retract_to_r:
+        control.places.lose(adrift & 1 << across)
     program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not control.modal.retract_to_r:

@@ -172,9 +172,22 @@ def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: boo
     styles = np.where(codes == 0, style(control, Kind.RAPID), style(control, Kind.FEED))
     blocks = blocks if main else np.full(len(blocks), control.row_block)
     starts, ends = stage.path[:-1][rows], stage.path[1:][rows]
-    control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends))
+    adrift = left_adrift(control, stage.mask[rows])
+    control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends, adrift))
     control.position = ends[-1].tolist()
     modal.cycle.initial = None
+
+
+def left_adrift(control: Control, mask: IntArray) -> IntArray:
+    """(n,) axes that are adrift in motions with these axis words; the control keeps those that are at the end."""
+    places = control.places
+    places.begun = True
+    if not places.adrift or control.modal.incremental:
+        return np.full(len(mask), places.adrift)
+    named = np.bitwise_or.accumulate(mask)
+    adrift: IntArray = places.adrift & ~named
+    places.settle(int(named[-1]))
+    return adrift
 
 
 def style(control: Control, kind: Kind) -> int:

@@ -11,6 +11,7 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS, Vector, Z, zeros
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"
@@ -25,11 +26,13 @@ def select_tool(control: Control, block: Block, code: int) -> None:
 
 
 def change_tool(control: Control, block: Block, code: int) -> None:
-    """M6, and M61 Qn, which only says what is in the spindle."""
+    """M6, for which machines go where tools are changed, and M61 Qn, which only says what is in the spindle."""
     if code == 610:
         control.tools.selected = whole(block.get("Q", -1.0), "Q of M61")
         if control.tools.selected < 0:
             raise Fault(BAD_LENGTH, "M61 needs Q, the number of the tool")
+    else:
+        control.places.lose(mask_of(control.machine))
     control.tools.spindle = control.tools.selected
 
 

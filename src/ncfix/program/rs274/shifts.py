@@ -9,6 +9,7 @@ from __future__ import annotations
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.settings import ENDS, unfollowed
 from ncfix.program.rs274.systems import SHIFT, mark_shaky, store, stored, words_of
 
@@ -35,6 +36,8 @@ def shift_system(control: Control, block: Block, code: int) -> None:
     control.parameters.assign(SHIFT_ACTIVE, float(code in (520, 920, 923)))
     mark_shaky(control)
     control.refresh()
+    if code == 920:
+        control.places.settle(mask_of(words_of(block)))
 
 
 def set_local(control: Control, block: Block, *, cancelled: bool) -> None:

@@ -1,0 +1,80 @@
+"""What stays undone because an axis must get no word: counted by axis, and told in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ncfix.compensate.findings import Array, Mask
+from ncfix.diagnostics import Message, Place
+from ncfix.program.tree import Program
+
+if TYPE_CHECKING:
+    from ncfix.compensate.settle import Settled
+
+HINT = "name it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """One axis that was left where it stands.
+
+    motions      how many motions would have moved it
+    first, last  their lines
+    most         how far it is from where it should be at most, mm or rad
+    """
+
+    axis: str
+    rotary: bool
+    motions: int
+    first: int
+    last: int
+    most: float
+
+    def with_later(self, other: Left) -> Left:
+        """This and what comes later in the program."""
+        motions, most = self.motions + other.motions, max(self.most, other.most)
+        return Left(self.axis, self.rotary, motions, self.first, other.last, most)
+
+    def message(self, path: str) -> Message:
+        """In words."""
+        many = f"{self.motions} motions (lines {self.first} to {self.last})" if self.motions > 1 else "this motion"
+        far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
+        text = (
+            f"{self.axis} is left where it stands in {many}, up to {far} from where it should be: "
+            "the program has not said where it is"
+        )
+        return Message("NCF439", text, Place(path, self.first), HINT)
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data, for `--json`."""
+        most = {"max_deg": float(np.degrees(self.most))} if self.rotary else {"max_um": round(self.most * 1e3, 4)}
+        return {"axis": self.axis, "motions": self.motions, "first_line": self.first, "last_line": self.last, **most}
+
+
+def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
+    """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves."""
+    moves, known = settled.moves, settled.plan.known
+    if moves.placed is None or known is None:
+        return {}
+    off = np.abs(known.end - moves.end - settled.shift)
+    lacking = moves.wordless & (off >= steps / 2) & ~settled.kept[:, None]
+    if own is not None:
+        lacking &= own[:, None]
+    found = {}
+    for column in np.flatnonzero(lacking.any(axis=0)).tolist():
+        rows = np.flatnonzero(lacking[:, column])
+        lines = program.lines(moves.block[rows[[0, -1]]])
+        most = float(off[rows, column].max())
+        axis = moves.axes[column]
+        found[axis] = Left(axis, bool(moves.rotary[column]), len(rows), int(lines[0]), int(lines[1]), most)
+    return found
+
+
+def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, Left]:
+    """What was left in two parts of a program, one behind the other."""
+    both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
+    return {**before, **later, **both}

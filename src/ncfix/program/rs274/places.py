@@ -1,0 +1,55 @@
+"""Which axes the program itself has brought to where they stand, in the coordinates that are in force.
+
+A correction may want a word for an axis that its block does not name. Such a word says where the axis stands already,
+but for some um, and that must be the program's own knowledge: if it rests on what tables or people say of the start,
+of work offsets or of tool lengths, and they are wrong, the word makes the axis move there, perhaps into the part.
+So an axis is adrift until an absolute word of the program brings it to its place, and again after whatever takes it
+elsewhere or makes another table count: machine coordinates, reference points, probing, a change of tool, of its
+length offset, or of the work offset.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+from ncfix.program.setup import Setup
+
+
+@dataclass(slots=True)
+class Places:
+    """The book of it; axes are bits of a mask, by letter.
+
+    adrift   axes that the program has not brought to where they stand
+    anchors  for each letter what its numbers count from, besides what the program states in numbers itself
+    begun    there has been a motion
+    """
+
+    adrift: int
+    anchors: Sequence[Hashable] = field(default_factory=list)
+    begun: bool = False
+
+    @classmethod
+    def at_start(cls, setup: Setup, axes: Iterable[str], letters: str) -> Places:
+        """At the start only those axes stand somewhere known that the setup gives, if it assumes nothing."""
+        given = () if setup.assume_zero else setup.initial
+        return cls(sum(1 << letters.index(axis) for axis in axes if axis not in given))
+
+    def watch(self, anchors: Sequence[Hashable]) -> None:
+        """What numbers count from now; an axis for which that has changed since the first motion is adrift."""
+        if self.begun:
+            self.adrift |= mask_of(i for i, (a, b) in enumerate(zip(self.anchors, anchors, strict=True)) if a != b)
+        self.anchors = anchors
+
+    def lose(self, axes: int) -> None:
+        """Something else than a word of the program has moved these axes, or may have."""
+        self.adrift |= axes
+
+    def settle(self, axes: int) -> None:
+        """The program says where these axes stand."""
+        self.adrift &= ~axes
+
+
+def mask_of(indices: Iterable[int]) -> int:
+    """Letter indices as a bit mask."""
+    return sum(1 << index for index in indices)
