@@ -49,7 +49,7 @@ class Place:
     text: str = ""
 
     def __str__(self) -> str:
-        parts = [self.path]
+        parts = [self.path or "''"]
         if self.line:
             parts.append(str(self.line))
             if self.column:
@@ -75,6 +75,11 @@ class Message:
             lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
 
+    @property
+    def advice(self) -> str:
+        """The hint; of a message without one of its own, where its code is explained."""
+        return self.hint or f"ncfix explain {self.code} says more"
+
     def as_dict(self) -> dict[str, object]:
         """The message as plain data, for `--json`."""
         place = self.place
@@ -84,7 +89,7 @@ class Message:
             "path": place.path if place else None,
             "line": place.line if place else None,
             "column": place.column if place else None,
-            "hint": self.hint or None,
+            "hint": self.advice,
         }
 
 

@@ -18,7 +18,8 @@ from ncfix.diagnostics import Place, SourceError, UsageError
 def read_bytes(path: str) -> bytes:
     """The content of a file; raises `SourceError` NCF002."""
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb") as handle:
+            return handle.read()
     except OSError as error:
         raise unreadable(path, error) from error
 

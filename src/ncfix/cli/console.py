@@ -59,7 +59,7 @@ def keeping() -> Iterator[list[str]]:
 def tell(*messages: Message) -> None:
     """Coded messages, on standard error; one without a hint of its own points to the explanation of its code."""
     for plain in messages:
-        message = plain if plain.hint else replace(plain, hint=f"ncfix explain {plain.code} says more")
+        message = replace(plain, hint=plain.advice)
         say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
 
 

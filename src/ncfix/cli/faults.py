@@ -3,15 +3,37 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+from ncfix.cli import console
 from ncfix.diagnostics import FaultError
+
+DEBUG = "NCFIX_DEBUG"
+"""The environment variable that asks for tracebacks; workers inherit it."""
 
 
 def fault(error: Exception) -> FaultError:
-    """Own up to a bug."""
+    """Own up to a bug, with its traceback if that is asked for."""
     import traceback
 
+    if os.environ.get(DEBUG, "") not in ("", "0"):
+        console.say("".join(traceback.format_exception(error)))
     where = traceback.extract_tb(error.__traceback__)[-1]
     at = f"{os.path.basename(where.filename)}:{where.lineno}"
     text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"
     return FaultError.of("NCF000", text, hint="ncfix --debug shows the traceback; please report it with the input")
+
+
+@contextmanager
+def debugging(wanted: bool) -> Iterator[None]:
+    """Tracebacks are asked for, as by the environment variable."""
+    before = os.environ.get(DEBUG)
+    if wanted:
+        os.environ[DEBUG] = "1"
+    try:
+        yield
+    finally:
+        if wanted:
+            os.environ.pop(DEBUG)
+            os.environ.update({} if before is None else {DEBUG: before})

@@ -54,25 +54,22 @@ class Job:
         return text_digest(repr(options).encode())
 
     def heard(self, target: Target) -> tuple[Outcome, list[str]]:
-        """Fix one program elsewhere: what came of it, and what there is to say; a fault ends this one only."""
+        """Fix one program elsewhere: what came of it, and what there is to say."""
         with console.keeping() as said:
-            try:
-                outcome = self.outcome(target)
-            except Exception as error:
-                own = fault(error)
-                console.tell(*own.messages)
-                outcome = Outcome.failed(target, own)
-        return outcome, said
+            return self.outcome(target), said
 
     def outcome(self, target: Target, jobs: int = 1) -> Outcome:
-        """Fix one program and say what came of it; an error ends this program only."""
+        """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
         find = Noted(subprograms(target.source))
         try:
             with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
                 return replace(_written(fixed, target, self.options.allow_refused), called=find.called)
-        except NcfixError as error:
-            console.tell(*error.messages)
-            return Outcome.failed(target, error)
+        except console.ReaderGoneError:
+            raise
+        except Exception as error:
+            own = error if isinstance(error, NcfixError) else fault(error)
+            console.tell(*own.messages)
+            return Outcome.failed(target, own)
 
     @contextmanager
     def fixed(self, target: Target, find: Find, jobs: int) -> Iterator[Fixed]:

@@ -2,41 +2,41 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from difflib import get_close_matches
 from importlib import import_module
 
 import click
 
 from ncfix import __version__
 from ncfix.cli import console
-from ncfix.cli.faults import fault
-from ncfix.diagnostics import ExitCode, Message, NcfixError
+from ncfix.cli.faults import debugging, fault
+from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError
 from ncfix.plugins import PluginWarning, registry
 
-VERBS = (
-    "fix",
-    "check",
-    "trace",
-    "verify",
-    "simulate",
-    "plan",
-    "calibrate",
-    "diagnose",
-    "export",
-    "emulate",
-    "report",
-    "derive",
-    "machine",
-    "effects",
-    "dialects",
-    "plugins",
-    "explain",
-    "completion",
-)
+VERBS = {
+    "fix": "Rewrite programs so that this machine cuts what was meant.",
+    "check": "Say what is the matter with programs; write nothing.",
+    "trace": "Print the motions of a program as a table.",
+    "verify": "Check a corrected program against its original, by simulation.",
+    "simulate": "Say what this machine's errors do to a program or a measurement.",
+    "plan": "Choose the poses to be measured.",
+    "calibrate": "Estimate the errors of a machine from measurements.",
+    "diagnose": "Name the effect that the model of a machine lacks.",
+    "export": "Write compensation tables for a control.",
+    "emulate": "Say what the tables in a folder leave.",
+    "report": "Put machines and results on a page.",
+    "derive": "Derive the formulas of a machine and of its errors.",
+    "machine": "Check or show a machine file.",
+    "effects": "List the errors that a machine file may have.",
+    "dialects": "List the control languages that can be read.",
+    "plugins": "List the plugins and what each adds.",
+    "explain": "Explain a message code.",
+    "completion": "Print the completion script of a shell.",
+}
 """The built-in verbs in the order of `--help`; verb `x` is the command `x` in the module `ncfix.cli.x`."""
 
 INTERRUPTED = 130
@@ -60,6 +60,25 @@ class Verbs(click.Group):
             return command
         return registry("commands").get(cmd_name)
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The verb that the arguments begin with; of one that there is not, what may be meant is said."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            close = get_close_matches(args[0], self.list_commands(ctx), 1)
+            text = f"there is no verb {args[0]!r}" + (f"; did you mean {close[0]!r}?" if close else "")
+            raise click.UsageError(text, error.ctx) from error
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The verbs, each with a short line; built-in ones are not imported for that."""
+        others = {name: self.get_command(ctx, name) for name in self.list_commands(ctx) if name not in VERBS}
+        said = VERBS | {name: command.get_short_help_str(60) for name, command in others.items() if command}
+        with formatter.section("Commands"):
+            formatter.write_dl(list(said.items()))
+
+
 
 @click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="ncfix", message="%(prog)s %(version)s")
@@ -75,12 +94,19 @@ def main() -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line; the exit code. Nothing is raised."""
+    with debugging("--debug" in arguments):
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str]) -> int:
     as_json = "--json" in arguments
     try:
+        if any("\0" in argument for argument in arguments):
+            raise UsageError.of("NCF001", "an argument has a NUL character", hint="no name of a file has one")
         with plugin_warnings_as_messages():
             return int(cli.main(list(arguments), prog_name="ncfix", standalone_mode=False) or 0)
     except click.ClickException as error:
-        return wrong_use(error)
+        return wrong_use(error, arguments)
     except NcfixError as error:
         return failed(error, as_json)
     except click.Abort:
@@ -89,20 +115,17 @@ def run(arguments: Sequence[str]) -> int:
     except console.ReaderGoneError:
         return BROKEN_PIPE
     except Exception as error:
-        if "--debug" in arguments or os.environ.get("NCFIX_DEBUG", "") not in ("", "0"):
-            import traceback
-
-            console.say("".join(traceback.format_exception(error)))
         return failed(fault(error), as_json)
 
 
-def wrong_use(error: click.ClickException) -> int:
+def wrong_use(error: click.ClickException, arguments: Sequence[str]) -> int:
     """Say what is wrong with the command line."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         console.say(error.format_message())
     else:
         context = getattr(error, "ctx", None)
-        command = context.command_path if context else "ncfix"
+        verb = next((argument for argument in arguments if argument in VERBS), "")
+        command = context.command_path if context else f"ncfix {verb}".strip()
         console.tell(Message("NCF001", error.format_message(), hint=f"{command} --help"))
     return ExitCode.USAGE
 

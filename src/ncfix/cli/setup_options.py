@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -41,9 +42,12 @@ class Assignment(click.ParamType):  # type: ignore[type-arg]
 
 def number(text: str) -> float:
     """A finite number with a decimal point."""
-    found = float(text)
-    if found - found != 0.0:
-        raise ValueError(f"{text.strip()} is not a number")
+    try:
+        found = float(text.replace("_", "?"))
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found):
+        raise ValueError(f"{text.strip()!r} is not a number")
     return found
 
 
@@ -53,7 +57,7 @@ def offset_values(name: str, text: str) -> dict[str, float]:
     if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)|PRESET\d*", name):
         raise ValueError(f"{name} is not a work offset")
     if all(AXIS.match(part.upper()) for part in parts):
-        return {part[0].upper(): number(part[1:]) for part in parts}
+        return {part[0].upper(): number(part[1:].removeprefix("=")) for part in parts}
     if not 1 <= len(parts) <= len(OFFSET_AXES):
         raise ValueError(f"{len(parts)} numbers, at most {len(OFFSET_AXES)} axes")
     return dict(zip(OFFSET_AXES, map(number, parts), strict=False))
@@ -61,7 +65,7 @@ def offset_values(name: str, text: str) -> dict[str, float]:
 
 def tool_values(name: str, text: str) -> tuple[float, ...]:
     """The length of a tool, and its radius if it is given."""
-    if (len(name) < 2 and not name.isdecimal()) or re.fullmatch(r"T\d+", name):
+    if (len(name) < 2 and not name.isdecimal()) or re.fullmatch(r"T\d+|[-+][\d.]+", name):
         raise ValueError(f"{name!r} is not a tool number, nor a name")
     values = tuple(map(number, text.split(",")))
     if len(values) > 2:
@@ -111,11 +115,13 @@ OPTIONS = (
         "inputs",
         type=Assignment("temp_spindle=24.5", lambda key, text: number(text), upper=False),
         multiple=True,
+        metavar="temp_spindle=24.5",
         help="What the machine's errors depend on besides its axes.",
     ),
     click.option(
         "--no-point",
         type=click.Choice(("calculator", "IS-A", "IS-B", "IS-C"), case_sensitive=False),
+        metavar="[calculator|IS-A|IS-B|IS-C]",
         help="What a number without a decimal point means: units, or least increments (IS-B: X50 is 0.050 mm).",
     ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
@@ -146,9 +152,9 @@ class SetupOptions:
         from ncfix.program.setup import Setup, Tool
         from ncfix.program.tool_table import load_tool_table
 
-        setup = setup_file.load(self.setup_file) if self.setup_file else Setup()
+        setup = Setup() if self.setup_file is None else setup_file.load(self.setup_file)
         tools = dict(setup.tools)
-        if self.tool_table:
+        if self.tool_table is not None:
             tools |= load_tool_table(self.tool_table)
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}

@@ -121,6 +121,8 @@ def targets(
 
 
 def _check_choices(outputs: Outputs, folder: str | None) -> None:
+    if outputs.output == "":
+        raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")
     if outputs.in_place and outputs.output is not None:
         raise UsageError.of("NCF011", "--in-place and -o contradict each other", hint="leave one of them out")
     if outputs.resume and folder is None:
