@@ -1,35 +1,44 @@
-"""Motions whose rotary axes must stay as programmed, though the strategy would correct them.
+"""Rotary axes that must stay as programmed, though the strategy would correct them.
 
-A rotary axis that must get no word stays where it stands.
-
-And in a plane that was swivelled without tool-centre-point control the control moves linear axes as if the rotary axes
-stood still for good: turned by a correction, they would take the tip along.
+One that must get no word stays where it stands. And in a plane that was swivelled without tool-centre-point control the
+control moves linear axes as if the rotary axes stood still for good: turned by a correction, they would take the tip
+along.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.steer import Correction
-from ncfix.compensate.strategies import Position, Strategy
+from ncfix.compensate.steer import Correction, steer
+from ncfix.compensate.strategies import Strategy
 
 
 def with_rotary_held(
     intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, found: Correction
 ) -> Correction:
-    """The corrections `found` for poses q (k, n_axes) of motions `move`, of the tip only where rotary axes are held."""
+    """The corrections `found` for poses q (k, n_axes) of motions `move`, but for rotary axes that are held."""
     if not strategy.corrects_orientation:
         return found
-    held = np.zeros(len(move), dtype=bool) if intent.moves.held is None else intent.moves.held[move]
-    if intent.wordless is not None:
-        held = held | intent.wordless[move][:, intent.machine.rotary].any(axis=1)
-    if not held.any():
+    held = held_axes(intent, move)
+    rows = np.flatnonzero((held & (found.q != q)).any(axis=1))
+    if not rows.size:
         return found
-    rows = np.flatnonzero(held)
-    states = intent.states(move[rows], fraction[rows])
-    tip_only = Position().solve(intent.machine, q[rows], states)
+    target = intent.machine.tip(q[rows], intent.lengths(move[rows]))
+    there = np.where(held[rows], q[rows], found.q[rows])
     corrected, converged, oriented = found.q.copy(), found.converged.copy(), found.oriented.copy()
-    corrected[rows], converged[rows], oriented[rows] = tip_only.q, tip_only.converged, tip_only.oriented
+    corrected[rows], arrived = steer(intent.machine, there, target, intent.states(move[rows], fraction[rows]))
+    converged[rows] &= arrived
+    oriented[rows] = False
     return Correction(corrected, converged, oriented)
+
+
+def held_axes(intent: Intent, move: Index) -> Mask:
+    """(k, n_axes) rotary axes that motions must not turn but as programmed."""
+    held = np.zeros((len(move), len(intent.machine.axes)), dtype=bool)
+    if intent.moves.held is not None:
+        held |= intent.moves.held[move][:, None] & intent.machine.rotary
+    if intent.wordless is not None:
+        held |= intent.wordless[move] & intent.machine.rotary
+    return held
