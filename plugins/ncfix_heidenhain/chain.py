@@ -14,6 +14,7 @@ import numpy as np
 
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Compensation, Term
 from ncfix_heidenhain.table_text import Column, TextTable, number, read_table
 
 KEYS = ("Trans", "MachAxis", "MachBase")
@@ -45,7 +46,7 @@ class Kinematics:
     sense       1 if errors under COMPTAB say how the machine is, -1 if they say what to do about it
     angle       rad per unit of an angle under COMPTAB
     components  (axis, column) -> the values over that axis, mm or the unit of `angle`
-    own         tables of rotary axes over themselves: corrections
+    own         tables of axes over themselves: corrections
     length      of the tool, mm
     """
 
@@ -53,7 +54,7 @@ class Kinematics:
     sense: float
     angle: float
     components: Mapping[tuple[str, str], Grid]
-    own: tuple[Grid, ...]
+    own: tuple[Term, ...]
     length: float = 0.0
 
     def for_tool(self, length: float) -> Kinematics:
@@ -63,7 +64,7 @@ class Kinematics:
     @property
     def grids(self) -> tuple[Grid, ...]:
         """Every table."""
-        return (*self.components.values(), *self.own)
+        return (*self.components.values(), *Compensation(self.own).grids)
 
     @property
     def axes(self) -> frozenset[str]:
@@ -76,11 +77,8 @@ class Kinematics:
         return sum(grid.points for grid in self.grids)
 
     def at(self, names: Sequence[str], q: Array, direction: Array | None = None) -> Array:
-        """See `Tables.at`: rotary axes by their own tables, linear ones so that the tip is where it is meant."""
-        correction = np.zeros(q.shape)
-        for grid in self.own:
-            column = names.index(grid.inputs[0])
-            correction[:, column] = grid.at(q[:, [column]])[:, 0]
+        """See `Tables.at`: each axis by its own table, linear ones also so that the tip is where it is meant."""
+        correction = Compensation(self.own).at(names, q, direction)
         linear = [index for index, name in enumerate(names) if name in "XYZ" and name in self.axes]
         nominal = self.tip(names, q, False)
         jacobian = np.stack([self.tip(names, q + np.eye(q.shape[1])[i], False) - nominal for i in linear], axis=-1)
@@ -88,7 +86,7 @@ class Kinematics:
         for _ in range(2):
             gap = nominal - self.tip(names, moved, True)
             moved[:, linear] += np.linalg.solve(jacobian, gap[..., None])[..., 0]
-        correction[:, linear] = (moved - q)[:, linear]
+        correction[:, linear] += (moved - q)[:, linear]
         return correction
 
     def tip(self, names: Sequence[str], q: Array, wrong: bool) -> Array:

@@ -30,12 +30,19 @@ DEGREE = np.pi / 180
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """The errors of an axis in its own frame: nodes (n,), values (n, 6) mm and rad; a rotary axis's own angle apart."""
+    """The errors of an axis in its own frame: what stands before it in the chain, and what is looked up by itself.
+
+    nodes   (n,) mm or rad
+    values  (n, 6) mm and rad, without a rotary axis's own angle
+    own     (n,) a rotary axis's own angle; of a linear axis, what its way changes: both while it moves towards plus
+    back    (n,) the same while it moves towards minus
+    """
 
     axis: str
     nodes: Array
     values: Array
     own: Array
+    back: Array
 
     def used(self, column: int) -> bool:
         """Whether there is anything in a column."""
@@ -73,29 +80,34 @@ def angles(frame: Array) -> tuple[float, float, float]:
     return a / DEGREE, b / DEGREE, c / DEGREE
 
 
-def component(machine: Machine, space: Array, axis: int, most: int, target: float) -> tuple[Component, bool]:
-    """The errors of one axis, and whether other things than its position matter to them, which are averaged over."""
+def component(
+    machine: Machine, space: Array, axis: int, most: int, target: float, play: bool
+) -> tuple[Component, bool]:
+    """The errors of one axis, and whether other axes matter to them, over which is averaged; `play`: ways apart."""
     described = machine.axes[axis]
     low, high = space[axis].tolist()
     fine = np.linspace(low, high, FINE)
     q = np.repeat(even_poses(space, OTHERS)[None], FINE, axis=0)
     q[:, :, axis] = fine[:, None]
     flat = q.reshape(-1, len(space))
-    both = np.stack([machine.joint_errors(flat, State(direction=way))[..., axis, :] for way in (1.0, -1.0)])
-    twist = both.mean(axis=0).reshape(FINE, OTHERS, 6)
-    depends = bool(max(np.ptp(twist, axis=1).max(), np.ptp(both, axis=0).max()) > NOTHING)
-    curve = _in_frame(described, fine, twist.mean(axis=1))
-    own = np.zeros(FINE)
+    ways = [np.eye(len(space))[axis] * way for way in (1.0, -1.0)]
+    both = [machine.joint_errors(flat, State(direction=way))[..., axis, :].reshape(FINE, OTHERS, 6) for way in ways]
+    depends = bool(max(np.ptp(twist, axis=1).max() for twist in both) > NOTHING)
+    ahead, back = (_in_frame(described, fine, twist.mean(axis=1)) for twist in both)
+    curve = (ahead + back) / 2
+    index = LETTERS.index(described.name)
+    sense = -1.0 if described.workpiece_side else 1.0
+    own = sense * (ahead - back)[:, index] / 2 if play else np.zeros(FINE)
+    turned = np.zeros(FINE)
     if described.rotary:
-        index = LETTERS.index(described.name)
-        own, curve[:, index] = curve[:, index] * (-1.0 if described.workpiece_side else 1.0), 0.0
+        turned, curve[:, index] = sense * curve[:, index], 0.0
     lever = np.array([1.0] * 3 + [REACH] * 3) * 8
-    parts = np.concatenate([curve * lever, own[:, None] * lever[3]], axis=1)
+    parts = np.concatenate([curve * lever, np.stack([turned + own, turned - own], axis=1) * lever[index]], axis=1)
     count = max(nodes_needed(fine, part, most, target) for part in parts.T)
     step = round((high - low) / described.unit / (count - 1), 4)
     nodes = (round(low / described.unit, 4) + step * np.arange(count)) * described.unit
     fit = projector(fine, nodes)
-    return Component(described.name, nodes, fit @ curve, fit @ own), depends
+    return Component(described.name, nodes, fit @ curve, fit @ (turned + own), fit @ (turned - own)), depends
 
 
 def _in_frame(axis: Axis, positions: Array, twist: Array) -> Array:

@@ -9,8 +9,10 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.grid import Grid
+from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.reversal import reversal_note
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import LARGE, Com, old_text, read_com
@@ -36,7 +38,7 @@ class KinematicsComp(Control):
         unit="mm, degree; angles under C4 to C6 and COMPTAB as --set angle_unit says",
         quantum=(1e-7, 1e-7),
         extrapolation="taken as held at the first and last row",
-        bidirectional=False,
+        bidirectional=True,
         max_points=MOST,
         max_tables=18,
         combine="a kinematic chain with the errors of all axes",
@@ -72,10 +74,20 @@ class KinematicsComp(Control):
             "so",
             "Open the files in the table editor of the control.",
         ),
+        Assumption(
+            "KINE-5",
+            "BACKLASH is what counts for the axis itself instead of its own column while it travels towards minus.",
+            "MANUALplus 620 technical manual: values measured in negative travel (see HEID-3)",
+            "it repeats the own column; --set backlash=on writes what play changes",
+            "Load 0.000 in the axis column and 0.010 in BACKLASH, and read a dial gauge from both sides.",
+        ),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": Option(None, "error: entries say how the machine is wrong; correction: the opposite"),
         "angle_unit": Option(None, "deg or rad"),
+        "backlash": Option(
+            "off", "on: play of the axes, in their own columns and BACKLASH; off: the mean of both ways"
+        ),
         "points": Option(str(MOST), f"most rows of an axis table, at most {MOST}"),
     }
     steps = (
@@ -96,7 +108,8 @@ class KinematicsComp(Control):
         machine, axes = request.machine, axes_of(request)
         _check_axes(machine.axis_names)
         most = whole(settings, "points", 2, MOST)
-        found = [component(machine, request.space, i, most, request.target) for i in range(len(axes))]
+        play = choice(settings, "backlash", ("off", "on")) == "on"
+        found = [component(machine, request.space, i, most, request.target, play) for i in range(len(axes))]
         components = [each for each, _ in found]
         chain = rows(machine, components, angle, sense)
         for text in over_limits(chain):
@@ -112,7 +125,10 @@ class KinematicsComp(Control):
                 files[tables[each.axis]] = old_text(tables[each.axis], com, 7)
         files[CONFIG] = cma_text(axes, tables)
         files[UNITS] = f"{settings['sign']} {settings['angle_unit']}\n".encode()
-        return Written(files, tuple(_notes(components, [flag for _, flag in found], most)))
+        notes = _notes(components, [flag for _, flag in found], most)
+        done = Compensation(self.read(files).own)
+        left = reversal_note(machine, request.space, request.tool_length, done)
+        return Written(files, (*notes, *left))
 
     def read(self, files: Files) -> Kinematics:
         """As the control would follow the chain. Raises `ConfigError` NCF491."""
@@ -132,7 +148,7 @@ class KinematicsComp(Control):
         remarks = [config, table]
         sense, angle = _read_units(files, config)
         components: dict[tuple[str, str], Grid] = {}
-        own: list[Grid] = []
+        own: list[Term] = []
         for axis, name in tables.items():
             com, found = read_com(name, files[name])
             remarks.append(found)
@@ -150,13 +166,14 @@ def _check_axes(names: tuple[str, ...]) -> None:
 
 def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -> Com:
     """The table of an axis: C1 to C6 where there is anything in them, and the own angle of a rotary axis."""
-    columns = {}
-    if np.abs(errors.own).max() > 1e-9:
+    columns, back = {}, None
+    if max(np.abs(errors.own).max(), np.abs(errors.back).max()) > 1e-9:
         columns[str(axes.index(errors.axis) + 1)] = sense * errors.own / unit_of(errors.axis)
+        back = sense * errors.back / unit_of(errors.axis)
     for index in range(6):
         if errors.used(index):
             columns[f"C{index + 1}"] = sense * errors.values[:, index] / (angle if index >= 3 else 1.0)
-    return Com(errors.nodes / unit_of(errors.axis), columns)
+    return Com(errors.nodes / unit_of(errors.axis), columns, back)
 
 
 def _take(
@@ -165,7 +182,7 @@ def _take(
     axes: tuple[str, ...],
     sense: float,
     components: dict[tuple[str, str], Grid],
-    own: list[Grid],
+    own: list[Term],
     remarks: Remarks,
 ) -> None:
     nodes = com.nodes * unit_of(axis)
@@ -173,9 +190,18 @@ def _take(
         if name.startswith("C") and name != "C":
             components[axis, name] = Grid((axis,), (nodes,), (axis,), values[:, None])
         elif name.isdigit() and 1 <= int(name) <= len(axes) and axes[int(name) - 1] == axis:
-            own.append(Grid((axis,), (nodes,), (axis,), -sense * unit_of(axis) * values[:, None]))
+            own += _own(axis, nodes, -sense * unit_of(axis) * values, com, -sense * unit_of(axis))
         else:
             remarks.refuse(0, f"the column {name} is not that of the axis itself, nor C1 to C6")
+
+
+def _own(axis: str, nodes: Array, values: Array, com: Com, factor: float) -> tuple[Term, ...]:
+    """The table of an axis over itself: BACKLASH in its place while it travels towards minus."""
+    ahead = Grid((axis,), (nodes,), (axis,), values[:, None])
+    if com.backlash is None or np.array_equal(values, factor * com.backlash):
+        return (Term((ahead,)),)
+    back = Grid((axis,), (nodes,), (axis,), factor * com.backlash[:, None])
+    return (Term((ahead,), (axis, 1)), Term((back,), (axis, -1)))
 
 
 def _check_names(chain: tuple[Row, ...], components: Mapping[tuple[str, str], Grid], remarks: Remarks) -> None:

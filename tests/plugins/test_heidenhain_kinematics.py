@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import ConfigError, RefusedError, UsageError
-from ncfix.machine import Machine, load, loads
+from ncfix.machine import Effect, Machine, load, loads
+from ncfix.machine.smooth import Backlash
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.lines import Remarks
@@ -94,7 +95,28 @@ def test_the_mean_of_both_ways_is_said() -> None:
     )
     machine = loads(text + '[[effect]]\nname = "EYX"\nbasis = "backlash"\ncoefficients = [0.004]\n')
     written = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS))
-    assert any("Errors of X depend on more" in note for note in written.notes)
+    assert any("(play) is left: up to 2.00 um" in note for note in written.notes)
+
+
+@pytest.mark.parametrize("topology", ["w F X Y Z t", "w X F Y Z t"])
+@pytest.mark.parametrize("sign", ["error", "correction"])
+def test_play_goes_into_backlash_if_asked_for(topology: str, sign: str) -> None:
+    machine = single_error("EXX", topology=topology)
+    play = Effect("EXX", (0.004,), Backlash((0,)))
+    machine = machine.replace(effects=(*machine.effects, play))
+    off, on = (exported(machine, backlash=each, sign=sign) for each in ("off", "on"))
+    assert off.left.after.max() == pytest.approx(0.002, abs=2e-4)
+    assert on.left.after.max() < 2e-4
+    assert not on.messages
+
+
+def test_a_rotary_axis_is_turned_right_both_ways(root: Path) -> None:
+    """BACKLASH counts instead of the axis's own column towards minus: it repeats it, and is not left at zero."""
+    made = exported(load(root / "examples" / "machines" / "dmu50.toml"), 10)
+    rows = [line.split() for line in made.native["AXIS-C.COM"].decode().splitlines()[1:]]
+    own = next(index for index, name in enumerate(rows[0]) if name.endswith("=F()"))
+    assert any(float(row[own]) for row in rows[1:])
+    assert all(row[1] == row[own] for row in rows[1:])
 
 
 def test_the_sample_is_read_and_written_again_identically(shared: Callable[[str], Path]) -> None:
