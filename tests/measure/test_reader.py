@@ -85,7 +85,10 @@ BAD = {
     "foreign direction": (GOOD.replace("dir_X", "dir_C"), ("NCF610", 4, 11)),
     "half a direction": (GOOD.replace("-20.0,1,", "-20.0,0.5,"), ("NCF612", 5, 0)),
     "time backwards": (GOOD + "1,101.0,50.0,-20.0,1,-3.0,160.0,0.0,0.0,0.0\n", ("NCF611", 6, 0)),
-    "semicolons": (HEAD + "X;Y;dx\n1,5;2;0,001\n", ("NCF605", 4, 0)),
+    "semicolons": (HEAD + "X;Y;dx\n1,5;2;0,001\n", ("NCF604", 4, 0)),
+    "a comma too many": (HEAD + "X,Y,dx,\n1,2,0.001,\n", ("NCF604", 4, 8)),
+    "two kinds": (GOOD.replace("# noise_um: 1.5", "# kind: tcp6"), ("NCF602", 3, 3)),
+    "no such number": (GOOD.replace("100.0", "1e200"), ("NCF608", 5, 3)),
     "empty file": ("", ("NCF600", 0, 0)),
 }
 
@@ -94,6 +97,24 @@ BAD = {
 def test_a_fault_is_named_with_its_place(name):
     text, expected = BAD[name]
     assert expected in faults(text)
+
+
+def test_a_file_with_semicolons_has_one_fault():
+    rows = "".join(f"{k},5;2;0,001\n" for k in range(30))
+    assert faults(HEAD + "X;Y;dx\n" + rows) == [("NCF604", 4, 0)]
+
+
+def test_a_spreadsheet_s_quotes_and_mark_mean_nothing():
+    quoted = "".join(
+        line if line.startswith("#") else ",".join(f'"{cell}"' for cell in line.strip().split(",")) + "\r\n"
+        for line in GOOD.splitlines(keepends=True)
+    )
+    plain, other = reads(GOOD.encode(), THREE), reads(quoted.encode("utf-8-sig"), THREE)
+    assert {key: list(column) for key, column in plain.columns.items()} == {
+        key: list(column) for key, column in other.columns.items()
+    }
+    with pytest.raises(ConfigError, match="UTF-16"):
+        reads(GOOD.encode("utf-16"), THREE)
 
 
 def test_all_faults_are_named_at_once():

@@ -11,6 +11,8 @@ from ncfix.measure.lines import Cell, Text
 VERSION = 1
 NUMBERS = {"noise_um": 1, "noise_urad": 1, "point": 3}
 """Header lines that are so many numbers."""
+ONCE = ("ncfix-measurement", "kind", "noise_um", "noise_urad", "point", "frame", "setup", "carried_by")
+"""Header lines of which there can only be one."""
 NAMED = {"distance": (2, 2), "target": (1, 3)}
 """Header lines that are names and then numbers: `distance: 1 2 304.6686 0.0012`."""
 
@@ -49,7 +51,11 @@ def kind_of(text: Text, pairs: list[tuple[Cell, Cell]]) -> str:
 def check(text: Text, pairs: list[tuple[Cell, Cell]], kind: str) -> None:
     """Note unknown keys and values that cannot be."""
     known = (*COMMON, *KINDS[kind].headers)
+    said: set[str] = set()
     for key, value in pairs:
+        if key.text in said and key.text in ONCE:
+            text.note("NCF602", f"header line {key.text!r} is there twice", key.line, key.column)
+        said.add(key.text)
         if key.text not in known:
             hint = did_you_mean(key.text, known) or f"notes go under {', '.join(COMMON[4:])}"
             text.note("NCF602", f"unknown header line {key.text!r}", key.line, key.column, hint)

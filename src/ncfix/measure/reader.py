@@ -6,6 +6,7 @@ faults noted. What is well formed but odd is looked at afterwards, in `ncfix.mea
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 from collections.abc import Iterable
@@ -15,13 +16,14 @@ import numpy as np
 from ncfix import files
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.machine import Machine
-from ncfix.machine.fields import did_you_mean
+from ncfix.machine.fields import LARGEST, did_you_mean
 from ncfix.measure import checks, headers
 from ncfix.measure.kinds import KINDS, STATES, Kind
 from ncfix.measure.lines import Cell, Text
 from ncfix.measure.measurement import Array, Measurement
 
 SCHEMA = "ncfix-measurement"
+SEPARATED = "cells are separated by commas, numbers have a decimal point"
 COMMA = re.compile(r"[-+]?\d+,\d+")
 LABELS = ("set", "repeat")
 """Columns of labels that any kind may have."""
@@ -54,6 +56,8 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
 
 
 def _decoded(source: bytes, path: str) -> str:
+    if source.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise ConfigError.of("NCF600", "the text is in UTF-16", Place(path), "save it as UTF-8")
     if b"\0" in source:
         raise ConfigError.of("NCF600", "not a text file", Place(path), "a measurement file is comma-separated text")
     try:
@@ -74,6 +78,9 @@ def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
         text.stop()
     assert start is not None
     names = _cells(text.lines[start], start + 1)
+    if _separated_otherwise(names):
+        text.note("NCF604", "the columns are not separated by commas", start + 1, 0, SEPARATED)
+        text.stop()
     _check_names(text, names, form, machine, plan)
     rows = _rows(text, names, start)
     text.stop()
@@ -85,10 +92,12 @@ def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
 
 
 def _cells(line: str, number: int) -> list[Cell]:
-    """The cells of a line with their columns."""
+    """The cells of a line with their columns; a spreadsheet's quotes round a cell are taken off."""
     cells, column = [], 1
     for part in line.split(","):
-        cells.append(Cell(part.strip(), number, column + len(part) - len(part.lstrip())))
+        text, at = part.strip(), column + len(part) - len(part.lstrip())
+        quoted = len(text) > 1 and text[0] == text[-1] == '"'
+        cells.append(Cell(text[1:-1].strip(), number, at + 1) if quoted else Cell(text, number, at))
         column += len(part) + 1
     return cells
 
@@ -107,10 +116,10 @@ def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, pl
         _check_length_form(text, seen, names[0].line)
     wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
     for missing in [each for each in wanted if each not in seen]:
-        text.note("NCF605", f"kind {form.name} has a column {missing!r}", names[0].line, 0, _semicolons(names))
+        text.note("NCF605", f"kind {form.name} has a column {missing!r}", names[0].line)
     if form.any_of and not plan and not seen & set(form.measured):
         one = ", ".join(form.measured)
-        text.note("NCF605", f"kind {form.name} has at least one of {one}", names[0].line, 0, _semicolons(names))
+        text.note("NCF605", f"kind {form.name} has at least one of {one}", names[0].line)
 
 
 def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: Machine) -> None:
@@ -119,13 +128,16 @@ def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: 
         has = " ".join(machine.axis_names)
         text.note("NCF610", f"the machine has no axis {axis}, only {has}", name.line, name.column)
         return
+    if not name.text:
+        text.note("NCF604", "a column without a name", name.line, name.column, "is there a comma too many?")
+        return
     hint = did_you_mean(name.text, known) or f"kind {form.name} has {', '.join(form.columns)}"
     text.note("NCF604", f"unknown column {name.text!r}", name.line, name.column, hint)
 
 
-def _semicolons(names: list[Cell]) -> str:
-    several = len(names) == 1 and any(mark in names[0].text for mark in ";\t")
-    return "cells are separated by commas, numbers have a decimal point" if several else ""
+def _separated_otherwise(names: list[Cell]) -> bool:
+    """Whether columns are separated by something else than commas."""
+    return len(names) == 1 and any(mark in names[0].text for mark in ";\t")
 
 
 def _check_length_form(text: Text, seen: set[str], line: int) -> None:
@@ -191,4 +203,8 @@ def _number(text: Text, cell: Cell, name: str) -> float:
         return math.nan
     if not math.isfinite(value):
         text.note("NCF608", f"column {name!r}: {cell.text} is not a finite number", cell.line, cell.column)
+    elif abs(value) > LARGEST:
+        text.note(
+            "NCF608", f"column {name!r}: {cell.text} is more than anything that is measured", cell.line, cell.column
+        )
     return value
