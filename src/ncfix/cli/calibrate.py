@@ -144,10 +144,7 @@ def _print(found: Calibration, over: Prediction) -> None:
     for row in _positioning(found):
         _say_positioning(row)
     console.say(f"sigma of the tip error over the travels: {over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms")
-    console.say(
-        f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; reduced chi-square "
-        f"{found.chi_square:.3f} with {found.freedom} degrees of freedom"
-    )
+    console.say(f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; {_noise(found)}")
 
 
 def _rows(found: Calibration) -> Iterator[tuple[str, str, str, str]]:
@@ -158,7 +155,16 @@ def _rows(found: Calibration) -> Iterator[tuple[str, str, str, str]]:
     values, sigma = found.estimate.coefficients.tolist(), found.sigma.tolist()
     for label, value, deviation, (factor, unit) in zip(found.labels, values, sigma, said, strict=True):
         known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
-        yield label, f"{factor * value:.4g}", known, unit
+        if value or known != "held":
+            yield label, f"{factor * value:.4g}", known, unit
+
+
+def _noise(found: Calibration) -> str:
+    """How the residuals go with the noise; where nobody knows it, they are all that says how large it is."""
+    freedom = f"{found.freedom} degrees of freedom"
+    if found.problem.noise_known:
+        return f"reduced chi-square {found.chi_square:.3f} with {freedom}"
+    return f"noise neither given nor to be told from repeats: sigmas are those of the residuals ({freedom})"
 
 
 def _say_bar(bar: dict[str, Any]) -> None:

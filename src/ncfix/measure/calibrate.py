@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
@@ -255,5 +255,5 @@ def noise_scale(problem: Problem, chi_square: float, freedom: int) -> float:
     """The factor on the standard deviations: estimated if the noise is not known, never below one if it is."""
     if not problem.noise_known:
         return float(np.sqrt(chi_square))
-    improbable = stats.chi2.sf(chi_square * freedom, freedom) < UNLIKELY
+    improbable = chdtrc(freedom, chi_square * freedom) < UNLIKELY
     return float(np.sqrt(chi_square)) if improbable else 1.0

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtr
 
 from ncfix.machine import Effect
 from ncfix.machine.smooth import Polynomial
@@ -65,7 +65,7 @@ def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:
     left = target - design @ value
     freedom = max(start - design.shape[1], 1)
     deviation = np.sqrt((inverse**2).sum(1) * float(left @ left) / freedom)
-    chances: Array = 2 * stats.t.sf(np.abs(value) / np.maximum(deviation, 1e-300), freedom)
+    chances: Array = 2 * stdtr(freedom, -np.abs(value) / np.maximum(deviation, 1e-300))
     return chances, left
 
 
@@ -83,7 +83,7 @@ def _best_outside(
         explained = float(column @ left / size)
         freedom = max(start - int(inside.sum()) - 1, 1)
         rest = max(float(left @ left) - explained**2, 1e-300)
-        chance = float(2 * stats.t.sf(abs(explained) / np.sqrt(rest / freedom), freedom))
+        chance = float(2 * stdtr(freedom, -abs(explained) / np.sqrt(rest / freedom)))
         if best is None or chance < best[1]:
             best = int(k), chance
     return best

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtr
 
 from ncfix.diagnostics import Place
 from ncfix.measure.measurement import Array, Index
@@ -67,7 +67,7 @@ def runs_test(values: Array) -> float:
     runs = 1 + int((np.diff(signs) != 0).sum())
     mean = 1 + 2 * up * down / n
     variance = (mean - 1) * (mean - 2) / (n - 1)
-    return float(stats.norm.cdf((runs - mean) / np.sqrt(variance)))
+    return float(ndtr((runs - mean) / np.sqrt(variance)))
 
 
 def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:

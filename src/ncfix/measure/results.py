@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc
 
 from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine
@@ -84,7 +84,7 @@ def _size(found: Residuals, index: int) -> str:
 
 
 def _noise(problem: Problem, chi_square: float, freedom: int) -> Iterator[Message]:
-    if problem.noise_known and stats.chi2.sf(chi_square * freedom, freedom) < UNLIKELY:
+    if problem.noise_known and chdtrc(freedom, chi_square * freedom) < UNLIKELY:
         factor = np.sqrt(chi_square)
         text = f"the residuals are {factor:.2f} times the noise: an effect is missing, or the noise is larger"
         yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")

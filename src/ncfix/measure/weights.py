@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtri
 
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import Solution
@@ -52,6 +52,6 @@ def outliers(solution: Solution) -> NDArray[np.bool_]:
     left = residual - columns @ shift
     m, free = len(residual), max(len(residual) - columns.shape[1], 1)
     deviation = spread(left) * np.sqrt(m / free)
-    limit = HEAVY * stats.norm.isf(FALSE_ALARM / (2 * m))
+    limit = -HEAVY * ndtri(FALSE_ALARM / (2 * m))
     gross: NDArray[np.bool_] = np.abs(left) > limit * deviation
     return gross

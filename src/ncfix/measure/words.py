@@ -13,8 +13,8 @@ ALIKE = 0.02
 
 def remarks(solution: Solution, labels: Sequence[str]) -> list[Message]:
     """What could not be told, and what was found instead."""
-    found = [_unseen(labels[k], "nothing that was measured depends on it") for k in solution.unseen]
-    found += [_unseen(labels[k], "the unknown set-up does the same") for k in solution.set_up]
+    found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
+    found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
     found += [_combined(combination, labels) for combination in solution.combinations]
     if solution.condition > 1e4:
         text = f"the estimates depend strongly on one another: condition {solution.condition:.0f}"
@@ -22,8 +22,18 @@ def remarks(solution: Solution, labels: Sequence[str]) -> list[Message]:
     return found
 
 
-def _unseen(label: str, why: str) -> Message:
-    return Message("NCF632", f"{label} is held as it is: {why}")
+def _unseen(names: Sequence[str], why: str) -> list[Message]:
+    if not names:
+        return []
+    are, them = ("is held as it is", "it") if len(names) == 1 else ("are held as they are", "them")
+    return [Message("NCF632", f"{', '.join(names)} {are}: {why} {them}")]
+
+
+def _listed(held: Sequence[int], labels: Sequence[str]) -> list[str]:
+    """The coefficients by their names; where all of an effect's are held, the effect by its own."""
+    free = {name.split()[0] for k, name in enumerate(labels) if k not in set(held)}
+    names = [labels[k] for k in held]
+    return list(dict.fromkeys(name if name.split()[0] in free else name.split()[0] for name in names))
 
 
 def _combined(combination: Combination, labels: Sequence[str]) -> Message:
