@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.diagnose.catalogue import Candidate
+from ncfix.diagnose.catalogue.candidate import stacked
 from ncfix.diagnose.view import HARDLY, View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
@@ -55,10 +56,10 @@ def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
     every = view.design([effect for candidate in candidates for effect in candidate.effects])
     ends = np.cumsum([0, *(sum(effect.basis.size for effect in each.effects) for each in candidates)])
     for candidate, start, stop in zip(candidates, ends[:-1], ends[1:], strict=True):
-        design = every[:, start:stop]
-        forms = [
-            form for loading in candidate.loadings if (form := _form(view, candidate, loading, design)) is not None
-        ]
+        design, loadings = every[:, start:stop], candidate.loadings
+        if candidate.grows:
+            design, loadings = view.expansion(candidate.effects), tuple(stacked(*[each] * 4) for each in loadings)
+        forms = [form for loading in loadings if (form := _form(view, candidate, loading, design)) is not None]
         shares = [_left(basis, form.columns / view.relative[:, None]) for form in forms]
         seen = [form for form, share in zip(forms, shares, strict=True) if share >= VISIBLE]
         groups += seen

@@ -21,6 +21,7 @@ WIDE_UM = 1e5
 TRIM = 0.97
 """Share of the values that count: the rest may be outliers."""
 STEPS = 4
+SETTLED_UM = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,11 @@ class Misfit:
     def left(self, prior_um: float = TIGHT_UM) -> float:
         """Root mean square of residual values, um, without the largest; what constants moved is counted as misfit."""
         return _fitted(self.problem, self.relative, self.noise, prior_um, self.loose)[0]
+
+    @property
+    def count(self) -> int:
+        """How many values count."""
+        return int(TRIM * len(self.relative))
 
     @property
     def free(self) -> float:
@@ -79,6 +85,8 @@ def _fitted(problem: Problem, relative: Array, sigma: float, prior_um: float, fr
         stacked = np.concatenate([columns / size, np.diag(pull)])
         change = np.linalg.lstsq(stacked, np.concatenate([y, back]), rcond=1e-9)[0] / size
         unknowns, coefficients = unknowns + change[:k], coefficients + change[k:]
+        if np.abs(columns @ change).max(initial=0.0) < SETTLED_UM:
+            break
     y = np.abs(UM * problem.residual(coefficients, unknowns) / relative)
     y = np.sort(np.where(np.isfinite(y), y, 1e12))[: int(TRIM * len(y))]
     moved = (pull * size * np.concatenate([np.zeros(k), coefficients - start]))[k:]

@@ -32,8 +32,10 @@ AS_GOOD = 1.5
 """And no more than this times what is left with all constants free."""
 AS_SIMPLE = 1.03
 """Of mistakes that leave no more than this times the least, the simplest is taken."""
-LARGE_RAD = 6e-4
+LARGE_RAD = 2e-4
 """An angle above this may have been typed in degrees."""
+LIKELIER = 10.0
+"""Log odds by which the data must prefer the angle in radians."""
 TURN_RAD = 6.6
 OFF_MM = 0.3
 """An axis point that is off by more was measured to the wrong face."""
@@ -73,7 +75,7 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     least = min((each.after_um for each in tried), default=np.inf)
     alike = [each for each in tried if each.after_um <= AS_SIMPLE * least]
     typed = [each for each in alike if each.likely]
-    if typed and least <= left:
+    if typed and now.count * np.log(left / typed[0].after_um) > LIKELIER:
         return typed[0]
     if not alike or not _explains(least, left, now):
         return None

@@ -9,7 +9,7 @@ effect is not in the catalogue.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -25,6 +25,7 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.effect import SPINDLE
 from ncfix.machine.smooth import Backlash, Fourier, Polynomial
 from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
 
 UNNAMED = "unnamed"
 """Family of the rivals."""
@@ -50,6 +51,8 @@ BEND = 0.4
 SLOW = 0.3
 WAVES = (1.0, 0.7, 0.5, 0.3, 0.2, 0.2)
 """Variances of the waves a turn."""
+HELD = 0.8
+"""Share of an error's squares, beside what is free, that makes it the same as a name."""
 PLAY = (1.0, 1.0, 0.5, 0.3)
 Part = tuple[str, dict[str, Any], Array]
 """Component, options of the effect, and the loading of its coefficients."""
@@ -70,12 +73,30 @@ def rivals(view: View, named: Sequence[Group]) -> tuple[Group, ...]:
         return ()
     found = [_at_tip(view, owner, way, kernel) for way in _frames(view, tip) for owner, kernel in _kernels(view)]
     found += _of_joints(view)
-    seen = [group for group in found if group is not None]
+    seen = _not_in_catalogue(view, [group for group in found if group is not None], named)
     if not any(group.owner.constant for group in named):
         return tuple(seen)
     columns = apart(view, np.concatenate([group.columns for group in seen], axis=1), named)
     ends = np.cumsum([group.columns.shape[1] for group in seen])[:-1]
     return tuple(replace(group, columns=own) for group, own in zip(seen, np.split(columns, ends, axis=1), strict=True))
+
+
+def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]) -> list[Group]:
+    """Without the single errors that a name holds already: those are that name with another shape."""
+    basis = orthonormal(view.base / view.relative[:, None])
+    own: dict[str, list[Array]] = {}
+    for group in named:
+        left = without(basis, group.columns / view.relative[:, None])
+        span = orthonormal(left)
+        for name in {effect.name for effect in group.owner.effects}:
+            own.setdefault(name, []).append(span)
+    return [group for group in found if not _held(without(basis, group.columns / view.relative[:, None]), group, own)]
+
+
+def _held(left: Array, group: Group, spans: Mapping[str, Sequence[Array]]) -> bool:
+    names = [effect.name for effect in group.owner.effects]
+    held = [((span.T @ left) ** 2).sum() for name in names for span in spans.get(name, ())]
+    return bool(max(held, default=0.0) > HELD * (left**2).sum())
 
 
 def _frames(view: View, tip: Array) -> tuple[Array, ...]:
@@ -201,7 +222,8 @@ def _of_joints(view: View) -> Iterator[Group | None]:
         own = [np.concatenate([next(shown) for _ in component], axis=1) for component in components]
         yield _group(view, _something(axis, f"something of {axis.name}", what), own)
         for component, part in zip(components, own, strict=True):
-            yield _group(view, _something(axis, component[0][0], what), [part])
+            name = component[0][0]
+            yield _group(view, replace(_something(axis, name, what), effects=(Effect(name, (0.0,)),)), [part])
 
 
 def _designs(view: View, effects: Sequence[Effect]) -> list[Array]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.diagnose.view import view
+from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.solve import orthonormal, without
@@ -29,12 +29,7 @@ def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Mach
     if not curves:
         return
     ways = {name: _ways(seen.reach.spans[name]) for name in curves}
-    shown = {
-        name: np.stack(
-            [_left(basis, seen.design(each) @ _values(each) / seen.relative) for each in _at(curves[name], ways[name])]
-        )
-        for name in curves
-    }
+    shown = {name: _shown(seen, basis, curves[name], ways[name]) for name in curves}
     own = {name: rows[len(rows) // 2] for name, rows in shown.items()}
     y = _left(basis, seen.y / seen.relative) + sum(own.values(), np.zeros(len(seen.y)))
     beside = _found(y, shown)
@@ -48,20 +43,22 @@ def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Mach
         yield _machine(machine, curves, ways, beside, True), title + _said(ways, beside)
 
 
+def _shown(seen: View, basis: Array, curves: Sequence[Effect], ways: Array) -> Array:
+    """What curves of one axis show at every other place, beside what is free, (places, m)."""
+    moved = [replace(e, center=e.center - float(way)) for way in ways for e in curves]
+    values = np.concatenate([np.asarray(e.coefficients) for e in curves])
+    designs = np.split(seen.design(moved), len(ways), axis=1)
+    columns = np.stack([design @ values for design in designs], axis=1)
+    left: Array = without(basis, columns / seen.relative[:, None]).T
+    return left
+
+
 def _bent(effect: Effect) -> bool:
     return effect.active and effect.basis.needs_signal and not effect.location
 
 
 def _ways(span: tuple[float, float]) -> Array:
     return np.linspace(-REACH, REACH, PLACES) * (span[1] - span[0])
-
-
-def _at(effects: Sequence[Effect], ways: Array) -> list[list[Effect]]:
-    return [[replace(e, center=e.center - float(way)) for e in effects] for way in ways]
-
-
-def _values(effects: Sequence[Effect]) -> Array:
-    return np.concatenate([np.asarray(e.coefficients) for e in effects])
 
 
 def _left(basis: Array, values: Array) -> Array:

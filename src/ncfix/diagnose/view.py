@@ -25,6 +25,8 @@ from ncfix.measure.selection import Selection
 UM = 1e3
 STEPS = 6
 SETTLED_UM = 1e-3
+FAR = 1.0
+"""How far from the middle of what was measured a workpiece is held, in times its size."""
 HARDLY = 1e-5
 """Singular values below this, of the largest, are taken for what cannot be told."""
 
@@ -75,21 +77,25 @@ class View:
         return UM * np.concatenate([each.design(effects) for each in self.problem.observations])
 
     def expansion(self, drive: Sequence[Effect]) -> Array:
-        """What is seen when things on the table move away from the middle of what was measured, um, (m, k).
+        """What is seen when things on the table expand, um, (m, 4 k): the effects say with what, k coefficients.
 
-        The effects say with what they expand, one column per coefficient, for an expansion by the tip's distance.
+        In turn by the tip's distance from the middle of what was measured, and by the x, y and z of the point at which
+        they are held, which nobody knows.
         """
         parts = []
         for each in self.problem.observations:
             nominal = each.machine.nominal(each.q, each.state.tool_length)
             arm = nominal[:, :3, 3] - nominal[:, :3, 3].mean(axis=0)
-            turned = np.einsum("nji,nj->ni", nominal[:, :3, :3], arm)[np.maximum(each.rows, 0)]
+            far = float(np.sqrt((arm**2).sum(axis=1).mean()))
+            ways = np.stack([arm, *(np.broadcast_to(FAR * far * way, arm.shape) for way in np.eye(3))], axis=-1)
+            turned = np.einsum("nji,njw->niw", nominal[:, :3, :3], ways)[np.maximum(each.rows, 0)]
             tip = each.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"])
-            seen = np.einsum("mk,mk->m", tip, turned) * (each.rows >= 0)
+            seen = np.einsum("mk,mkw->mw", tip, turned) * (each.rows >= 0)[:, None]
             driven = each.machine.design(each.q, each.state, drive)[:, :3]
             along = each.machine.design(each.q, each.state, [Effect(drive[0].name, (0.0,))])[:, :3]
             course = np.einsum("nik,ni->nk", driven, along[:, :, 0]) / (along[:, :, 0] ** 2).sum(axis=1)[:, None]
-            parts.append(-seen[:, None] * course[np.maximum(each.rows, 0)])
+            shown = seen[:, :, None] * course[np.maximum(each.rows, 0)][:, None]
+            parts.append(-shown.reshape(len(shown), -1))
         return UM * np.concatenate(parts)
 
     @cached_property

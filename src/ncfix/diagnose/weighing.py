@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import SIZES, Court, Heard, Member
 from ncfix.diagnose.rivals import functions, scaled
 from ncfix.measure.measurement import Array
@@ -40,8 +41,10 @@ MISSHAPEN = 0.2
 """How much the shape of an effect may differ from that of the catalogue, as a share of what it shows."""
 SLOWLY = 1.0
 """Over which length of the axes, of half their travel."""
-SMOOTHEST = 20
+SMOOTHEST = 16
 """Functions of them that are kept."""
+USUAL = SHARES[2]
+"""The share of the background at which it is asked what the members show."""
 
 
 def margin(count: int) -> float:
@@ -99,7 +102,7 @@ class Scale:
         if not named:
             return None
         every = self.all(members)
-        shown = court.shown(every, court.share(every))
+        shown = court.shown(every, USUAL)
         whole = np.sum([each for member, each in zip(every, shown, strict=True) if member in named], axis=0)
         return court.background.seen(MISSHAPEN * whole[:, None] * self._slow)
 
