@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -24,6 +25,9 @@ DOCUMENTS = (
     "docs/conventions.md",
     "docs/derive.md",
 )
+
+COLUMN = 72
+"""Where README.md says at the latest what a command does."""
 
 LINK = re.compile(r"\[[^]]*\]\(([^)#\s]+)(#[^)\s]*)?\)")
 
@@ -66,6 +70,24 @@ def test_every_verb_and_option_has_help(verb: str) -> None:
     for parameter in command.params:
         if isinstance(parameter, click.Option):
             assert parameter.help, parameter.opts
+
+
+def shown_commands(root: Path) -> Iterator[list[str]]:
+    """The command lines of README.md, as arguments; what they do stands behind them in a column of its own."""
+    lines = [line for line in (root / "README.md").read_text().splitlines() if line.startswith("    ncfix ")]
+    for line in lines:
+        command, *said = re.split(r"\s{2,}", line.strip())
+        yield shlex.split(command if said else line[:COLUMN])[1:]
+
+
+def test_the_commands_of_the_readme_are_understood(root: Path) -> None:
+    found = list(shown_commands(root))
+    assert len(found) >= 10
+    context = click.Context(cli, info_name="ncfix")
+    for verb, *arguments in found:
+        command = cli.get_command(context, verb)
+        assert command is not None, verb
+        command.make_context(verb, arguments, parent=context)
 
 
 def test_every_hook_is_documented_and_none_that_is_not(root: Path) -> None:

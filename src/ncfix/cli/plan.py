@@ -19,7 +19,7 @@ KINDS = ("tcp", "tcp6", "probe", "length")
 @click.command()
 @machine_option
 @click.option("--kind", type=click.Choice(KINDS), default="tcp", show_default=True, help="What will be measured.")
-@click.option("--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
+@click.option("-n", "--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
 @click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
 @click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
 @click.option("--existing", metavar="FILE", help="A measurement that the new poses complete.")
