@@ -13,7 +13,7 @@ from time import process_time
 from typing import Any
 
 from ncfix import fast
-from ncfix.compensate import crew, path, settle, stream
+from ncfix.compensate import path, settle, stream
 from ncfix.compensate.options import FixOptions
 from ncfix.machine import load
 from ncfix.program import dialects, parts
@@ -36,7 +36,7 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
     ("check limits", settle, "findings"),
     ("write: which words change, digits", settle, "emit"),
     ("write: put the text together", stream, "spliced"),
-    ("figures: tip errors before and after", crew, "path_error"),
+    ("figures: tip errors before and after", stream, "path_error"),
 )
 
 
@@ -55,8 +55,8 @@ def main() -> None:
 
 def corrected(source: bytes) -> None:
     """Correct a program, part by part."""
-    given = (load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
-    stream.Stream(*given, io.BytesIO(source).read, lambda data: None).run()
+    task = stream.Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
+    stream.Stream(task, io.BytesIO(source).read, lambda data: None).run()
 
 
 def timed(source: bytes) -> dict[str, float]:

@@ -14,7 +14,7 @@ import pytest
 from ncfix import fast
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.stream import Stream
+from ncfix.compensate.stream import Stream, Task
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.program import dialects
@@ -33,7 +33,8 @@ def streamed(
     out: list[bytes] = []
     dialect = dialects.get("linuxcnc")
     given = io.BytesIO(source)
-    done = Stream(machine, SETUP, options, None, "p.ngc", dialect, given.read, out.append, size, jobs).run()
+    task = Task(machine, SETUP, options, None, "p.ngc", dialect, size)
+    done = Stream(task, given.read, out.append, jobs).run()
     text, stamp = b"".join(out), done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
     return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()

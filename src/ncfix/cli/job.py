@@ -98,24 +98,14 @@ class Job:
     def _outlet(
         self, source: Source, target: Target, dialect: Dialect, find: Find, jobs: int
     ) -> Iterator[tuple[Stream, Outlet]]:
-        from ncfix.compensate.stream import Stream
+        from ncfix.compensate.stream import Stream, Task
 
         if source.size is None or source.size >= compiled_from():
             fast.engage()
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
-            stream = Stream(
-                self.machine,
-                self.setup,
-                self.options,
-                find,
-                path,
-                dialect,
-                source.read,
-                outlet.put,
-                part_bytes(),
-                jobs,
-            )
+            task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes())
+            stream = Stream(task, source.read, outlet.put, jobs)
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:

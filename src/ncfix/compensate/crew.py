@@ -1,125 +1,198 @@
-"""Who works on the parts of a program: this process, or several others beside it. The results are the same."""
+"""Several processes that correct one program: each reads and follows all of it, and corrects parts of its own.
+
+Parts are taken in turn. What a part has to know of the one before (`Before`) is handed on as soon as that is written,
+so that the next one can be written, too, while it is still being proved. The text comes to the others from the first
+process, and what they have done goes back to it.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
+import pickle
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
-from multiprocessing.context import BaseContext
-from typing import TypeVar
-
-import numpy as np
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait
+from queue import Empty
+from typing import Any, Generic, Protocol, TypeVar
 
 from ncfix import fast
-from ncfix.compensate.findings import Array, Mask
-from ncfix.compensate.known import Known
-from ncfix.compensate.options import FixOptions
-from ncfix.compensate.settle import Agreed, Before, agree
-from ncfix.compensate.verify import PathError, path_error
-from ncfix.machine import Machine, State
-from ncfix.program.dialect import Dialect
-from ncfix.program.moves import Moves
-from ncfix.program.pieces import Pieces
+from ncfix.compensate.settle import Before
 
-Value = TypeVar("Value")
-Later = Callable[[], Value]
-"""Gives a result that is being worked on, waiting for it if need be."""
+Result = TypeVar("Result")
+Done = TypeVar("Done", covariant=True)
+Read = Callable[[int], bytes]
+"""Gives the next so many bytes of a text; none at its end."""
+PATIENCE = 1.0
+"""Seconds after which it is looked whether those who are waited for are still there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
-    """What all parts of a program have in common."""
-
-    machine: Machine
-    dialect: Dialect
-    options: FixOptions
-
-    def agree(self, moves: Moves, before: Before | None) -> Agreed:
-        """The plan of a part."""
-        return agree(moves, self.machine, self.dialect, self.options, before)
-
-    def errors(
-        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
-    ) -> PathError:
-        """The tip errors of motions `rows` (n,) before and after; without those of each motion."""
-        found = path_error(self.machine, moves, pieces, start, state=state, rows=rows, tilts=False, known=known)
-        nothing = np.empty(0)
-        return PathError(found.before, found.after, nothing, nothing, found.samples, found.way)
+class GoneError(Exception):
+    """A process that worked on the program has ended before its time."""
 
 
 @dataclass(slots=True)
-class Crew:
-    """This process alone: everything is done when its result is asked for.
+class Share:
+    """What of a program a process does: of every `jobs` parts the one with the number `mine`.
 
-    ahead  how many parts are begun before the first has to be done
+    inbox    what the part before has left, if another process has corrected it
+    outbox   where the process hears of it that has the next part
+    others   whether the others are still there
     """
 
-    task: Task
-    ahead: int = 0
+    jobs: int = 1
+    mine: int = 0
+    inbox: Any = None
+    outbox: Any = None
+    others: Callable[[], bool] = field(default=lambda: True)
+    last: Before | None = None
 
-    def agree(self, moves: Moves, before: Before | None) -> Later[Agreed]:
-        """Begin the plan of a part."""
-        return lambda: self.task.agree(moves, before)
+    def has(self, number: int) -> bool:
+        """Whether a part is its own."""
+        return number % self.jobs == self.mine
 
-    def errors(
-        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
-    ) -> Later[PathError]:
-        """Begin to find out tip errors."""
-        return lambda: self.task.errors(moves, pieces, start, state, rows, known)
+    def before(self, number: int) -> Before | None:
+        """What the part before that one has left, as soon as it is known; None for the first part."""
+        if number == 0 or self.jobs == 1:
+            return self.last
+        found: Before = waited_for(self.inbox, self.others)
+        return found
+
+    def leave(self, before: Before) -> None:
+        """Hand on what an own part leaves."""
+        self.last = before
+        if self.jobs > 1:
+            self.outbox.put(before)
+
+
+class Worker(Protocol[Done]):
+    """Corrects the parts of a share."""
+
+    def work(self, share: Share) -> Iterator[tuple[int, Done]]:
+        """The number of each own part, and what has been done to it."""
 
 
 @dataclass(slots=True)
-class Workers(Crew):
-    """Other processes."""
+class Crew(Generic[Result]):
+    """The processes beside this one, and what they have done."""
 
-    pool: ProcessPoolExecutor | None = None
+    share: Share
+    texts: list[Any] = field(default_factory=list)
+    results: Any = None
+    there: Callable[[], bool] = field(default=lambda: True)
+    done: dict[int, Result | Exception] = field(default_factory=dict)
+    given: int = 0
 
-    def agree(self, moves: Moves, before: Before | None) -> Later[Agreed]:
-        """Begin the plan of a part."""
-        assert self.pool is not None
-        return self.pool.submit(_agree, moves, before).result
+    def spread(self, read: Read) -> Read:
+        """A way to read that lets the others read the same."""
 
-    def errors(
-        self, moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None
-    ) -> Later[PathError]:
-        """Begin to find out tip errors."""
-        assert self.pool is not None
-        return self.pool.submit(_errors, moves, pieces, start, state, rows, known).result
+        def spreading(size: int) -> bytes:
+            text = read(size)
+            for each in self.texts:
+                each.put(text)
+            return text
+
+        return spreading if self.texts else read
+
+    def put(self, number: int, result: Result) -> None:
+        """Note what this process has done."""
+        self.done[number] = result
+
+    def ready(self) -> Iterator[Result]:
+        """What has been done, in order, as far as it is there."""
+        if self.results is not None:
+            while True:
+                try:
+                    number, result = self.results.get_nowait()
+                except Empty:
+                    break
+                self.done[number] = result
+        while self.given in self.done:
+            yield self._next()
+
+    def rest(self, count: int) -> Iterator[Result]:
+        """What is left of so many parts, in order; waits for it."""
+        while self.given < count:
+            while self.given not in self.done:
+                number, result = waited_for(self.results, self.there)
+                self.done[number] = result
+            yield self._next()
+
+    def _next(self) -> Result:
+        result = self.done.pop(self.given)
+        if isinstance(result, Exception):
+            raise result
+        self.given += 1
+        return result
+
+
+def waited_for(queue: Any, there: Callable[[], bool]) -> Any:
+    """What comes out of a queue; raises `GoneError` if those who might put something in are gone."""
+    while True:
+        try:
+            return queue.get(timeout=PATIENCE)
+        except Empty:
+            if not there():
+                raise GoneError("a process that worked on the program has ended") from None
 
 
 @contextmanager
-def crew(jobs: int, machine: Machine, dialect: Dialect, options: FixOptions) -> Iterator[Crew]:
-    """Those who work on a program: `jobs` processes beside this one, if that is more than one."""
-    task = Task(machine, dialect, options)
+def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[Result]]:
+    """Those who work on a program: `jobs` processes, of which this is one.
+
+    worker  makes what corrects a text in another process
+    """
     if jobs <= 1:
-        yield Crew(task)
+        yield Crew(Share())
         return
     forks = "fork" in multiprocessing.get_all_start_methods()
-    context: BaseContext = multiprocessing.get_context("fork" if forks else None)
-    with ProcessPoolExecutor(jobs, context, initializer=_begin, initargs=(task, fast.engaged())) as pool:
-        try:
-            yield Workers(task, jobs + 1, pool)
-        finally:
-            pool.shutdown(cancel_futures=True)
+    context: Any = multiprocessing.get_context("fork" if forks else None)
+    boxes, texts = [context.Queue() for _ in range(jobs)], [context.Queue() for _ in range(jobs - 1)]
+    results = context.Queue()
+    shares = [Share(jobs, mine, boxes[mine], boxes[(mine + 1) % jobs]) for mine in range(jobs)]
+    processes = [
+        context.Process(target=_work, args=(worker, share, text, results, fast.engaged()), daemon=True)
+        for share, text in zip(shares[1:], texts, strict=True)
+    ]
+
+    def there() -> bool:
+        return all(process.is_alive() for process in processes)
+
+    for process in processes:
+        process.start()
+    shares[0].others = there
+    try:
+        yield Crew(shares[0], texts, results, there)
+    finally:
+        for queue in (*boxes, *texts):
+            queue.cancel_join_thread()
+        for process in processes:
+            process.terminate()
+            process.join()
 
 
-_task: Task | None = None
-
-
-def _begin(task: Task, compiled: bool) -> None:
-    global _task
-    _task = task
+def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, results: Any, compiled: bool) -> None:
+    """What another process does; it ends when the first one has all it needs, or is gone."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
     if compiled:
         fast.engage()
+    share.others, number = parent.is_alive, share.mine
+    try:
+        for number, result in worker(lambda size: waited_for(texts, parent.is_alive)).work(share):
+            results.put((number, result))
+            number += share.jobs
+    except (KeyboardInterrupt, GoneError):
+        return
+    except Exception as error:
+        results.put((number, _portable(error)))
+    wait([parent.sentinel])
 
 
-def _agree(moves: Moves, before: Before | None) -> Agreed:
-    assert _task is not None
-    return _task.agree(moves, before)
-
-
-def _errors(moves: Moves, pieces: Pieces, start: Array, state: State, rows: Mask, known: Known | None) -> PathError:
-    assert _task is not None
-    return _task.errors(moves, pieces, start, state, rows, known)
+def _portable(error: Exception) -> Exception:
+    """The error, or its text where it cannot go from one process to another."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

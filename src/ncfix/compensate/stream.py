@@ -6,46 +6,44 @@ Every part goes through the same plan, emitter, checks and proof as a whole prog
 is the same, byte for byte. A part begins with the last motion of the one before it, which is written already: all that
 one part has to know of the earlier ones is what that motion left (`Before`). What cannot be done that way raises
 `NotInPartsError`, and the caller takes the program as a whole.
+
+Several processes can work on a program (see `crew`): each reads and follows all of it, and corrects parts in turn.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.compensate.account import FixReport
-from ncfix.compensate.crew import Crew, Later, crew
-from ncfix.compensate.direction import Signs, matters
+from ncfix.compensate.crew import Read, Share, crew
 from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
-from ncfix.compensate.fix import refuse_stamped, stamp_of
-from ncfix.compensate.following import Resolve, kinematics_of, placed, rotary_names, with_tool_lengths
-from ncfix.compensate.intent import Intent
+from ncfix.compensate.fix import stamp_of
+from ncfix.compensate.following import Resolve, kinematics_of, placed, rotary_names
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, differences
-from ncfix.compensate.settle import Agreed, Before, Settled, increments, settle
+from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
-from ncfix.compensate.verify import PathError
-from ncfix.diagnostics import Message, NcfixError, UsageError
+from ncfix.compensate.units import Part, Unit, Units
+from ncfix.compensate.verify import path_error
+from ncfix.diagnostics import Message, NcfixError
 from ncfix.machine import Machine, State
 from ncfix.program import stamp
 from ncfix.program.dialect import Dialect
 from ncfix.program.language import Run, language_of
-from ncfix.program.moves import Kind, Moves, Rule, Trace
-from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, rows_of, stretch
+from ncfix.program.moves import Moves
+from ncfix.program.parts import Follower, NotInPartsError, PartReader
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
 
 PART_BYTES = 3 << 18
 """How much text is a part: the columns of a part take about thirty times as much memory."""
-MOST_PENDING = 64
-"""Parts that may be put together before one of them ends where it may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,33 +64,24 @@ class Streamed:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last."""
+class Done:
+    """A part that has been corrected and proved; of the first one, what makes one think that it was corrected before.
 
-    program: Program
-    moves: Moves
-    last: bool
+    text   what it is now
+    tally  what there is to report of it
+    """
+
+    text: bytes
+    tally: Tally
+    suspicion: tuple[Message, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
-    """A part behind the last motion of the one before: `before` as far as it is known yet; `agreed` gives its plan."""
+class Task:
+    """What all parts of a program have in common.
 
-    program: Program
-    moves: Moves
-    last: bool
-    before: Before | None
-    agreed: Later[Agreed]
-
-
-@dataclass(slots=True)
-class Stream:
-    """One program on its way. `run` is called once.
-
-    read   gives the next so many bytes of the text; none at its end
-    write  takes the corrected text, part by part
-    size   bytes of a part
-    jobs   processes that work on parts
+    resolve  gives the text of a subprogram file by its name
+    size     bytes of a part
     """
 
     machine: Machine
@@ -101,245 +90,136 @@ class Stream:
     resolve: Resolve | None
     path: str
     dialect: Dialect
-    read: Callable[[int], bytes]
-    write: Callable[[bytes], None]
     size: int = PART_BYTES
-    jobs: int = 1
-    tally: Tally = field(default_factory=Tally)
-    rest: bytes = b""
-    context: tuple[Part, Signs] | None = None
-    direction: Signs = field(init=False)
-    before: Before | None = None
-    looks: deque[tuple[Later[PathError], NDArray[np.int64]]] = field(default_factory=deque)
-    at: int = 0
-    stamped: bytes = b""
-    head: Program | None = None
-    units: set[float] = field(default_factory=set)
-    tools: dict[str, str] = field(default_factory=dict)
-    lacking: dict[str, Message] = field(default_factory=dict)
-    suspicion: tuple[Message, ...] = ()
 
-    def __post_init__(self) -> None:
-        self.direction = np.zeros(len(self.machine.axes), dtype=np.int8)
-
-    def run(self) -> Streamed:
-        """Correct the program; raises what `fix_program` raises, and `NotInPartsError`."""
-        strategy = get_strategy(self.options.strategy)
-        language = language_of(self.dialect)
-        if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
-            raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
-        if language.follower is None:
-            raise NotInPartsError(f"{self.dialect.title} is followed as a whole")
-        on_machine = placed(self.machine, self.setup)
-        follower, proof = self._follower(), self._follower()
-        again = PartReader(self.path, self.dialect)
-        with crew(self.jobs, on_machine, self.dialect, self.options) as workers:
-            waiting: deque[Unit] = deque()
-            for part in self._parts(follower):
-                moves = self._known(part)
-                if follower.lacking or self.lacking:
-                    continue
-                waiting.append(self._unit(part, moves, on_machine, workers))
-                while len(waiting) > workers.ahead:
-                    self._correct(waiting.popleft(), on_machine, follower, (again, proof), workers)
-            while waiting and not (follower.lacking or self.lacking):
-                self._correct(waiting.popleft(), on_machine, follower, (again, proof), workers)
-            self._gather(workers, 0)
-        if follower.lacking:
-            raise UsageError.collected(follower.lacking)
-        if self.lacking:
-            raise UsageError.collected(self.lacking.values())
-        self._pass_on()
-        report = self.tally.report(self.path, (*self.suspicion, *follower.messages), strategy.leaves, self.options)
-        assumed = (*follower.assumed, *self.tools)
-        return Streamed(report, Stamp(self.at, self.stamped, self._stamp(assumed) if self.tally.changed else b""))
-
-    # -- parts --------------------------------------------------------------------------------------------------------
-
-    def _follower(self) -> Follower:
+    def follower(self) -> Follower:
+        """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
         make = language_of(self.dialect).follower
-        assert make is not None
+        if make is None:
+            raise NotInPartsError(f"{self.dialect.title} is followed as a whole")
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)
         kinematics = kinematics_of(self.machine)
         found: Follower = make(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
         return found
 
-    def _parts(self, follower: Follower) -> Iterator[Part]:
-        """The text in parts that end where they may."""
-        reader = PartReader(self.path, self.dialect)
-        pending: list[tuple[Program, Moves]] = []
-        for program, last in self._texts(reader):
-            refuse_stamped(program, self.options)
-            reader.first_line += len(program)
-            self.tally.blocks += len(program)
-            pending.append((program, follower.follow(program, last)))
-            last |= follower.ended
-            if not last and not _ends_clean(*pending[-1]):
-                if len(pending) > MOST_PENDING:
-                    raise NotInPartsError("there is no place at which the program could be parted")
+    def check(self) -> None:
+        """Raise `NotInPartsError` for what has to be looked at as a whole."""
+        strategy = get_strategy(self.options.strategy)
+        if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
+            raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
+
+
+class Corrector:
+    """Goes through a program and corrects its parts, or some of them. `work` is called once.
+
+    head     the first part
+    at       where the stamp stands in what is written
+    stamped  the stamp, as far as it was known then; empty if there is none
+    """
+
+    def __init__(self, task: Task, read: Read) -> None:
+        self.task = task
+        self.machine = placed(task.machine, task.setup)
+        reader = PartReader(task.path, task.dialect)
+        self.units = Units(
+            task.machine, self.machine, task.setup, task.options, reader, task.follower(), read, task.size
+        )
+        self.again, self.proof = PartReader(task.path, task.dialect), task.follower()
+        self.again.templates, self.again.index = reader.templates, reader.index
+        self.head: Program | None = None
+        self.at = 0
+        self.stamped = b""
+
+    def work(self, share: Share) -> Iterator[tuple[int, Done]]:
+        """The number of each part of the share, and what it has become; the others are only followed."""
+        foreign = False
+        for number, unit in enumerate(self.units):
+            if not share.has(number):
+                foreign = True
+                self.again.first_line += len(unit.part.program)
+                self.proof.follow(unit.part.program, unit.part.last)
                 continue
-            programs = [each for each, _ in pending]
-            moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
-            yield Part(joined(programs), moves, last)
-            pending = []
-            if last:
-                return
+            yield number, self._corrected(unit, number, share, foreign)
+            foreign = False
 
-    def _texts(self, reader: PartReader) -> Iterator[tuple[Program, bool]]:
-        """The text in parts that end between two blocks of plain words; True with the last one."""
-        wanted = self.size
-        while True:
-            new = self.read(max(wanted - len(self.rest), self.size // 4))
-            text = self.rest + new
-            if not new:
-                self.rest = b""
-                if text:
-                    yield reader.read(text), True
-                return
-            if not text.strip():
-                self.rest = text
-                continue
-            stop = text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1
-            program = reader.read(text[:stop]) if stop else None
-            cut = reader.last_cut(program) if program is not None else 0
-            if program is None or not cut:
-                self.rest, wanted = text, 2 * max(wanted, len(text))
-                continue
-            wanted = self.size
-            self.rest = text[int(program.blocks[cut, 0]) :]
-            yield stretch(program, 0, cut), False
+    def stamp(self) -> bytes:
+        """The stamp as it has to be by what is known now."""
+        assert self.head is not None
+        text = stamp_of(self.head, self.task.machine, self.task.options, self.units.assumed)
+        return stamp.insertion(self.head, text).text
 
-    def _pass_on(self) -> None:
-        """What comes after the end of the program goes out as it came in."""
-        text = self.rest
-        while text:
-            if stamp.SIGN.search(text.decode("latin-1")) and not self.options.force:
-                raise NotInPartsError("there is a stamp after the end of the program")
-            ended = text.endswith(b"\n")
-            self.tally.blocks += text.count(b"\n")
-            self.write(text)
-            text = self.read(self.size)
-            self.tally.blocks += not text and not ended
-
-    # -- one part -----------------------------------------------------------------------------------------------------
-
-    def _unit(self, part: Part, moves: Moves, machine: Machine, workers: Crew) -> Unit:
-        """A part behind the last motion of the one before, and its plan, which somebody begins to make."""
-        program, before = part.program, None
-        if self.context is not None:
-            head, self.direction = self.context
-            program = joined([head.program, program])
-            moves = joined_moves([head.moves, moves], [1, len(part.program)])
-            nowhere = np.zeros(len(moves.axes))
-            before = Before(False, nowhere, self.direction, nowhere)
-        units = {frame.unit for frame in moves.frames}
-        if not units <= self.units and self.context is not None:
-            raise NotInPartsError("the program changes between inch and mm")
-        self.units |= units
-        if not part.last:
-            self.context = self._context(program, moves, machine)
-        return Unit(program, moves, part.last, before, workers.agree(moves, before))
-
-    def _context(self, program: Program, moves: Moves, machine: Machine) -> tuple[Part, Signs]:
-        """The last motion with its block, and the way in which the axes came there."""
-        row = len(moves) - 1
-        block = int(moves.block[row])
-        head = Part(stretch(program, block, block + 1), rows_of(moves, row, row + 1, block), False)
-        if not matters(machine):
-            return head, self.direction
-        arrival = Intent(machine, moves, State(direction=self.direction)).arrival
-        assert arrival is not None
-        return head, arrival[row - 1] if row else self.direction
-
-    def _correct(
-        self, unit: Unit, machine: Machine, follower: Follower, proof: tuple[PartReader, Follower], workers: Crew
-    ) -> None:
-        """Correct a part, prove it, write it, and keep what the next one has to know."""
-        program, moves = unit.program, unit.moves
-        agreed: Later[Agreed] | None = unit.agreed
-        own = np.ones(len(moves), dtype=bool)
-        if unit.before is not None:
-            assert self.before is not None
-            own[0] = False
-            agreed = None if self.before.kept or _still_off(moves, self.before) else agreed
-            self.before = replace(self.before, direction=unit.before.direction)
-        first = agreed() if agreed is not None else None
-        settled = settle(program, moves, machine, self.options, before=self.before, first=first)
-        if self.before is not None and settled.kept[0] != self.before.kept:
+    def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
+        """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
+        task, part = self.task, unit.together()
+        moves = part.moves
+        nowhere = np.zeros(len(moves.axes))
+        guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
+        first: Agreed | None = agree(moves, self.machine, task.dialect, task.options, guess)
+        before = share.before(number)
+        if before is not None:
+            before = replace(before, direction=unit.direction)
+            first = None if before.kept or _still_off(moves, before) else first
+        settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
+        if before is not None and settled.kept[0] != before.kept:
             raise NotInPartsError("a refusal reaches back into an earlier part")
-        if self.before is None:
-            self.suspicion = suspected(settled, machine.least_increment[0], self.path, self.options.force)
-        text = self._text(program, settled, follower)
-        self._prove(text, settled, own, unit.last, *proof)
-        self.tally.add(program, settled, own, increments(machine))
-        if self.options.verify:
-            self._look(program, settled, own, workers)
-        if self.options.allow_refused or not self.tally.refused:
-            self.write(text)
-        shift = settled.plan.start[-1] - moves.start[-1]
-        shift = np.where(np.isfinite(shift), shift, 0.0)
-        self.before = Before(bool(settled.kept[-1]), shift, self.direction, settled.emission.end[-1].copy())
+        share.leave(_left(settled))
+        text = self._text(part.program, settled, before is None)
+        if before is not None and foreign:
+            self.proof.stand(before.position)
+        own = np.ones(len(moves), dtype=bool)
+        own[0] &= unit.head is None
+        self._prove(text, settled, own, part.last)
+        tally = Tally()
+        tally.add(part.program, settled, own, increments(self.machine))
+        if task.options.verify:
+            self._look(part, settled, own, unit, tally)
+        return Done(text, tally, self._suspicion(settled) if before is None else ())
 
-    def _known(self, part: Part) -> Moves:
-        """The motions of a part with every tool length known; notes what is lacking."""
-        try:
-            found = with_tool_lengths(part.program, Trace(part.moves), self.machine, self.setup)
-        except UsageError as error:
-            self.lacking |= {message.text: message for message in error.messages if message.text not in self.lacking}
-            return part.moves
-        for name, message in zip(found.assumed, found.messages, strict=True):
-            self.tools.setdefault(name, name)
-            self.tally.notes.setdefault((message.code, message.text), message)
-        return found.moves
+    def _suspicion(self, settled: Settled) -> tuple[Message, ...]:
+        return suspected(settled, self.machine.least_increment[0], self.task.path, self.task.options.force)
 
-    def _text(self, program: Program, settled: Settled, follower: Follower) -> bytes:
+    def _text(self, program: Program, settled: Settled, first: bool) -> bytes:
         """The corrected text of a part."""
         splices = settled.emission.splices
-        if self.before is not None:
+        if not first:
             stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
             return spliced(program.source, splices)[stop:]
-        edit = stamp.insertion(program, stamp_of(program, self.machine, self.options, ()))
+        edit = stamp.insertion(program, stamp_of(program, self.task.machine, self.task.options, ()))
         self.at = edit.start
         self.head = program
         if len(splices):
-            self.stamped = self._stamp((*follower.assumed, *self.tools))
+            self.stamped = self.stamp()
             edit = replace(edit, text=self.stamped)
             splices = Splices.joined([splices, Splices.of([edit])])
         return spliced(program.source, splices)
 
-    def _stamp(self, assumed: tuple[str, ...]) -> bytes:
-        assert self.head is not None
-        return stamp.insertion(self.head, stamp_of(self.head, self.machine, self.options, assumed)).text
-
-    def _prove(
-        self, text: bytes, settled: Settled, own: Mask, last: bool, reader: PartReader, follower: Follower
-    ) -> None:
+    def _prove(self, text: bytes, settled: Settled, own: Mask, last: bool) -> None:
         """The text is read and followed again: the control must understand what the plan meant."""
         try:
-            program = reader.read(text)
-            again = follower.follow(program, last)
+            program = self.again.read(text)
+            again = self.proof.follow(program, last)
         except NcfixError as error:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
-        reader.first_line += len(program)
+        self.again.first_line += len(program)
         wrong = differences(settled, again, own[settled.plan.pieces.move])
         if wrong is None or wrong.any():
             raise NotInPartsError("the program takes frames or values from where the machine stands")
 
-    def _look(self, program: Program, settled: Settled, own: Mask, workers: Crew) -> None:
-        """Begin to find out the tip errors before and after, with the numbers as the control will understand them."""
+    def _look(self, part: Part, settled: Settled, own: Mask, unit: Unit, tally: Tally) -> None:
+        """Find out the tip errors before and after, with the numbers as the control will understand them."""
         emission, moves = settled.emission, settled.moves
         pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
-        state = State() if self.before is None else State(direction=self.before.direction)
-        known = settled.plan.known
-        found = workers.errors(moves, pieces, emission.start, state, own & ~settled.kept, known)
-        self.looks.append((found, program.lines(moves.block)))
-        self._gather(workers, workers.ahead)
-
-    def _gather(self, workers: Crew, most: int) -> None:
-        """Take in what was found out, but for that of the last `most` parts."""
-        while len(self.looks) > most:
-            found, lines = self.looks.popleft()
-            self.tally.figures(found(), lines)
+        errors = path_error(
+            self.machine,
+            moves,
+            pieces,
+            emission.start,
+            state=State() if unit.head is None else State(direction=unit.direction),
+            rows=own & ~settled.kept,
+            tilts=False,
+            known=settled.plan.known,
+        )
+        tally.figures(errors, part.program.lines(moves.block))
 
 
 def _still_off(moves: Moves, before: Before) -> bool:
@@ -347,10 +227,72 @@ def _still_off(moves: Moves, before: Before) -> bool:
     return bool((moves.wordless[0] & (before.shift != 0)).any())
 
 
-def _ends_clean(program: Program, moves: Moves) -> bool:
-    """Whether another part may follow: the last block is a straight motion that may be corrected, and nothing else."""
-    if len(moves) < 2 or moves.block[-1] != len(program) - 1 or moves.block[-2] == moves.block[-1]:
-        return False
-    straight = moves.kind[-1] in (Kind.RAPID, Kind.FEED) and moves.modal[-1] in (0, 10)
-    known = np.isfinite(moves.start[-1]).all() and np.isfinite(moves.end[-1]).all()
-    return bool(straight and known and moves.rule[-1] == Rule.CORRECT)
+def _left(settled: Settled) -> Before:
+    """What a part leaves to the next one, but for the way in which the axes came there."""
+    plan, moves = settled.plan, settled.moves
+    shift = plan.start[-1] - moves.start[-1]
+    shift = np.where(np.isfinite(shift), shift, 0.0)
+    nowhere = np.zeros(len(shift), dtype=np.int8)
+    return Before(bool(settled.kept[-1]), shift, nowhere, settled.emission.end[-1].copy())
+
+
+@dataclass(slots=True)
+class Stream:
+    """One program on its way. `run` is called once.
+
+    read   gives the next so many bytes of the text; none at its end
+    write  takes the corrected text, part by part
+    jobs   processes that work on it
+    """
+
+    task: Task
+    read: Read
+    write: Callable[[bytes], None]
+    jobs: int = 1
+    tally: Tally = field(default_factory=Tally)
+    suspicion: tuple[Message, ...] = ()
+    corrector: Corrector | None = None
+
+    @property
+    def stamped(self) -> bytes:
+        """The stamp as it was written; empty as long as there is none."""
+        return b"" if self.corrector is None else self.corrector.stamped
+
+    def run(self) -> Streamed:
+        """Correct the program; raises what `fix_program` raises, and `NotInPartsError`."""
+        task = self.task
+        task.check()
+        task.follower()
+        with crew(self.jobs, partial(Corrector, replace(task, resolve=None))) as others:
+            own = self.corrector = Corrector(task, others.spread(self.read))
+            for number, done in own.work(others.share):
+                others.put(number, done)
+                self._take(others.ready())
+            if error := own.units.missing():
+                raise error
+            self._take(others.rest(own.units.count))
+        self._pass_on(own.units.rest)
+        self.tally.blocks += own.units.blocks
+        self.tally.notes = own.units.notes
+        messages = (*self.suspicion, *own.units.follower.messages)
+        report = self.tally.report(task.path, messages, get_strategy(task.options.strategy).leaves, task.options)
+        return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
+
+    def _take(self, parts: Iterator[Done]) -> None:
+        """Write parts, and report them."""
+        for done in parts:
+            self.suspicion += done.suspicion
+            self.tally.take(done.tally)
+            if self.task.options.allow_refused or not self.tally.refused:
+                self.write(done.text)
+
+    def _pass_on(self, text: bytes) -> None:
+        """What comes after the end of the program goes out as it came in."""
+        while text:
+            if stamp.SIGN.search(text.decode("latin-1")) and not self.task.options.force:
+                raise NotInPartsError("there is a stamp after the end of the program")
+            ended = text.endswith(b"\n")
+            self.tally.blocks += text.count(b"\n")
+            self.write(text)
+            text = self.read(self.task.size)
+            self.tally.blocks += not text and not ended

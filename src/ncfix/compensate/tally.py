@@ -47,6 +47,12 @@ class Side:
         if figures.max > self.max:
             self.max, self.line = figures.max, line
 
+    def take(self, other: Side) -> None:
+        """Take in what comes behind."""
+        self.squares += other.squares
+        if other.max > self.max:
+            self.max, self.line = other.max, other.line
+
     def as_dict(self, way: float) -> dict[str, float | int | None]:
         """The figures, um."""
         rms = math.sqrt(self.squares / way) if way else 0.0
@@ -93,6 +99,24 @@ class Tally:
         for finding in settled.plan.findings:
             self._note(finding, program, moves, own)
 
+    def take(self, other: Tally) -> None:
+        """Take in what has been done to the part that comes next."""
+        self.blocks += other.blocks
+        self.moves += other.moves
+        self.compensated += other.compensated
+        self.passed += other.passed
+        self.inserted += other.inserted
+        self.changed |= other.changed
+        self.largest = max(self.largest, other.largest)
+        self.way += other.way
+        self.before.take(other.before)
+        self.after.take(other.after)
+        self.refused += other.refused
+        self.notes = other.notes | self.notes
+        self.left = joined(self.left, other.left)
+        for key, found in other.found.items():
+            self._take_found(key, found)
+
     def figures(self, errors: PathError, lines: NDArray[np.int64]) -> None:
         """Take in the tip errors of a part; `lines` (n,) of its motions."""
         self.way += errors.way
@@ -101,14 +125,18 @@ class Tally:
             side.add(figures, errors.way, line)
 
     def _note(self, finding: Finding, program: Program, moves: Moves, own: Mask) -> None:
-        key = (finding.code, finding.text, finding.hint)
-        if finding.code in ONCE and key in self.found:
+        shown = []
+        for k in np.flatnonzero(own[finding.moves])[:MOST].tolist():
+            place = program.place(int(moves.block[finding.moves[k]]))
+            shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
+        self._take_found((finding.code, finding.text, finding.hint), Found(shown, int(own[finding.moves].sum())))
+
+    def _take_found(self, key: tuple[str, str, str], found: Found) -> None:
+        if key[0] in ONCE and key in self.found:
             return
         note = self.found.setdefault(key, Found())
-        for k in np.flatnonzero(own[finding.moves])[: max(MOST - note.count, 0)].tolist():
-            place = program.place(int(moves.block[finding.moves[k]]))
-            note.shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
-        note.count += int(own[finding.moves].sum())
+        note.shown += found.shown[: max(MOST - note.count, 0)]
+        note.count += found.count
 
     def _left(self, path: str) -> list[Message]:
         return [left.message(path) for left in self.left.values()]

@@ -41,6 +41,9 @@ class Follower(Protocol):
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part; `last`: nothing comes after it."""
 
+    def stand(self, position: NDArray[np.float64]) -> None:
+        """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""
+
     @property
     def lacking(self) -> tuple[Message, ...]:
         """What the program used so far and the setup does not give, and axes that the machine lacks."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.language import Run
@@ -75,6 +78,12 @@ class RS274Follower:
         self.control.builder.clear()
         self.interpreter.run_part(last, self.max_blocks)
         return self.control.builder.moves()
+
+    def stand(self, position: NDArray[np.float64]) -> None:
+        """Take the axes to a command (n_axes,), mm and rad."""
+        self.control.position = list(self.control.position)
+        for column, value in zip(self.control.builder.columns, position.tolist(), strict=True):
+            self.control.position[column] = value
 
     @property
     def lacking(self) -> tuple[Message, ...]:

@@ -1,0 +1,192 @@
+"""The parts of a program, read and followed one after the other, each behind the last motion of the one before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ncfix.compensate.direction import Signs, matters
+from ncfix.compensate.fix import refuse_stamped
+from ncfix.compensate.following import with_tool_lengths
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.options import FixOptions
+from ncfix.diagnostics import Message, UsageError
+from ncfix.machine import Machine, State
+from ncfix.program.moves import Kind, Moves, Rule, Trace
+from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, rows_of, stretch
+from ncfix.program.setup import Setup
+from ncfix.program.tree import Program
+
+MOST_PENDING = 64
+"""Parts that may be put together before one of them ends where it may."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last."""
+
+    program: Program
+    moves: Moves
+    last: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A part, and the last motion of the one before, which is written already.
+
+    head       that motion and its block; None for the first part
+    direction  (n_axes,) the way in which the axes came to where that motion begins
+    """
+
+    part: Part
+    head: Part | None
+    direction: Signs
+
+    def together(self) -> Part:
+        """The part behind that motion."""
+        if self.head is None:
+            return self.part
+        program = joined([self.head.program, self.part.program])
+        moves = joined_moves([self.head.moves, self.part.moves], [1, len(self.part.program)])
+        return Part(program, moves, self.part.last)
+
+
+@dataclass(slots=True)
+class Units:
+    """Reads and follows a program. Gone through once.
+
+    machine   as it is; `placed` with the workpiece where the setup has it
+    read      gives the next so many bytes of the text; none at its end
+    size      bytes of a part
+    rest      what of the text comes after the end of the program
+    blocks    lines so far
+    count     parts so far
+    tools     what was taken as zero of tool lengths, in words
+    notes     what there is to say about them
+    lacking   what of them is not known
+    """
+
+    machine: Machine
+    placed: Machine
+    setup: Setup
+    options: FixOptions
+    reader: PartReader
+    follower: Follower
+    read: Callable[[int], bytes]
+    size: int
+    rest: bytes = b""
+    blocks: int = 0
+    count: int = 0
+    tools: dict[str, str] = field(default_factory=dict)
+    notes: dict[tuple[str, str], Message] = field(default_factory=dict)
+    lacking: dict[str, Message] = field(default_factory=dict)
+    units: set[float] = field(default_factory=set)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """What was taken as zero so far, in words."""
+        return (*self.follower.assumed, *self.tools)
+
+    def __iter__(self) -> Iterator[Unit]:
+        """The parts; none any more once something is lacking. Raises what reading and following do."""
+        head, direction = None, np.zeros(len(self.machine.axes), dtype=np.int8)
+        for found in self._parts():
+            part = Part(found.program, self._known(found), found.last)
+            if self.follower.lacking or self.lacking:
+                continue
+            unit = Unit(part, head, direction)
+            self._check_units(part.moves, head is None)
+            if not part.last:
+                head, direction = self._head(unit)
+            self.count += 1
+            yield unit
+
+    def missing(self) -> UsageError | None:
+        """What the setup does not give, as an error."""
+        found = (*self.follower.lacking,) or (*self.lacking.values(),)
+        return UsageError.collected(found) if found else None
+
+    def _parts(self) -> Iterator[Part]:
+        """The text in parts that end where they may."""
+        pending: list[tuple[Program, Moves]] = []
+        for program, last in self._texts():
+            refuse_stamped(program, self.options)
+            self.reader.first_line += len(program)
+            self.blocks += len(program)
+            pending.append((program, self.follower.follow(program, last)))
+            last |= self.follower.ended
+            if not last and not _ends_clean(*pending[-1]):
+                if len(pending) > MOST_PENDING:
+                    raise NotInPartsError("there is no place at which the program could be parted")
+                continue
+            programs = [each for each, _ in pending]
+            moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
+            yield Part(joined(programs), moves, last)
+            pending = []
+            if last:
+                return
+
+    def _texts(self) -> Iterator[tuple[Program, bool]]:
+        """The text in parts that end between two blocks of plain words; True with the last one."""
+        wanted = self.size
+        while True:
+            new = self.read(max(wanted - len(self.rest), self.size // 4))
+            text = self.rest + new
+            if not new:
+                self.rest = b""
+                if text:
+                    yield self.reader.read(text), True
+                return
+            if not text.strip():
+                self.rest = text
+                continue
+            stop = text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1
+            program = self.reader.read(text[:stop]) if stop else None
+            cut = self.reader.last_cut(program) if program is not None else 0
+            if program is None or not cut:
+                self.rest, wanted = text, 2 * max(wanted, len(text))
+                continue
+            wanted = self.size
+            self.rest = text[int(program.blocks[cut, 0]) :]
+            yield stretch(program, 0, cut), False
+
+    def _known(self, part: Part) -> Moves:
+        """The motions of a part with every tool length known; notes what is lacking."""
+        try:
+            found = with_tool_lengths(part.program, Trace(part.moves), self.machine, self.setup)
+        except UsageError as error:
+            self.lacking |= {message.text: message for message in error.messages if message.text not in self.lacking}
+            return part.moves
+        for name, message in zip(found.assumed, found.messages, strict=True):
+            self.tools.setdefault(name, name)
+            self.notes.setdefault((message.code, message.text), message)
+        return found.moves
+
+    def _check_units(self, moves: Moves, first: bool) -> None:
+        units = {frame.unit for frame in moves.frames}
+        if not units <= self.units and not first:
+            raise NotInPartsError("the program changes between inch and mm")
+        self.units |= units
+
+    def _head(self, unit: Unit) -> tuple[Part, Signs]:
+        """The last motion with its block, and the way in which the axes came there."""
+        part, direction = unit.part, unit.direction
+        row, block = len(part.moves) - 1, int(part.moves.block[-1])
+        head = Part(stretch(part.program, block, block + 1), rows_of(part.moves, row, row + 1, block), False)
+        if matters(self.machine):
+            moves = unit.together().moves
+            arrival = Intent(self.placed, moves, State(direction=direction)).arrival
+            assert arrival is not None
+            direction = arrival[-2] if len(moves) > 1 else direction
+        return head, direction
+
+
+def _ends_clean(program: Program, moves: Moves) -> bool:
+    """Whether another part may follow: the last block is a straight motion that may be corrected, and nothing else."""
+    if len(moves) < 2 or moves.block[-1] != len(program) - 1 or moves.block[-2] == moves.block[-1]:
+        return False
+    straight = moves.kind[-1] in (Kind.RAPID, Kind.FEED) and moves.modal[-1] in (0, 10)
+    known = np.isfinite(moves.start[-1]).all() and np.isfinite(moves.end[-1]).all()
+    return bool(straight and known and moves.rule[-1] == Rule.CORRECT)
