@@ -15,7 +15,7 @@ from ncfix import fast
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.stream import Stream, Task
-from ncfix.diagnostics import NcfixError
+from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Machine, load
 from ncfix.program import dialects
 from ncfix.program.parts import NotInPartsError
@@ -111,9 +111,20 @@ def test_plain_programs_are_done_in_parts(machine: Machine) -> None:
     assert all(assert_same(program(seed, 60, 0.0), machine, 300) for seed in (1, 5))
 
 
-def test_several_processes_give_the_same_bytes(machine: Machine) -> None:
-    source = program(5, 300, 0.05)
-    assert streamed(source, machine, 3000, jobs=2) == streamed(source, machine, 3000)
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_several_processes_give_the_same_bytes(jobs: int, machine: Machine) -> None:
+    for seed in (5, 7):
+        source = program(seed, 200, 0.05)
+        assert streamed(source, machine, 2000, jobs=jobs) == streamed(source, machine, 2000)
+
+
+def test_a_fault_in_a_part_of_another_process_is_told(machine: Machine) -> None:
+    source = program(5, 200, 0.0).replace(b"M30", b"G92 X1\nG1 X2 Y2 Z5 B0 C0\nX3\nX4\nM30")
+    for jobs in (1, 2, 3):
+        with pytest.raises(NotInPartsError, match="machine stands"):
+            streamed(source, machine, 900, jobs=jobs)
+        with pytest.raises(SourceError, match="NCF1"):
+            streamed(program(5, 200, 0.0).replace(b"M30", b"G1 X?\nM30"), machine, 900, jobs=jobs)
 
 
 def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,6 +147,7 @@ def test_play_remembers_the_way_across_parts(root: Path) -> None:
         for k in range(40)
     )
     assert all(assert_same(source + b"M2\n", machine, size) for size in (150, 400))
+    assert streamed(source + b"M2\n", machine, 150, jobs=2) == streamed(source + b"M2\n", machine, 150)
 
 
 def test_what_looks_at_the_whole_path_is_not_done_in_parts(machine: Machine) -> None:
