@@ -7,8 +7,10 @@
 from __future__ import annotations
 
 import csv
+import re
 import sys
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -69,11 +71,24 @@ def dialect_of(source: bytes, name: str, dialect: str) -> str:
     return found if found in RELATIVES.get(dialect, ()) else dialect
 
 
-def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False) -> Account:
-    """Correct every program of a folder and keep the books."""
+STORED = re.compile(r".*?__[0-9a-f]{6}_(?P<name>.*)", re.DOTALL)
+"""How files of the corpus are named: owner, hash, and the name that the file had."""
+
+
+def beside(folder: Path) -> Callable[[str], bytes | None]:
+    """The text of a subprogram by the name by which programs call it: a file of the folder."""
+    names = {(found["name"] if (found := STORED.fullmatch(path.name)) else path.name): path for path in folder.iterdir()}
+    return lambda name: names[name].read_bytes() if name in names else None
+
+
+def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False, only: str = "") -> Account:
+    """Correct every program of a folder, or one of them, and keep the books; subprograms are found in the folder."""
     books = Account()
     fix = fix_flat if flat else fix_program
+    resolve = beside(folder)
     for path in sorted(folder.iterdir()):
+        if only not in ("", path.name):
+            continue
         source = path.read_bytes()
         try:
             program = read(source, path.name, dialect_of(source, path.name, dialect))
@@ -81,7 +96,7 @@ def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False)
             books.files["of another family" if error.messages[0].code in FOREIGN else "unreadable"] += 1
             continue
         try:
-            report = fix(program, machine, SETUP, FixOptions(verify=False, tolerance_um=5.0)).report
+            report = fix(program, machine, SETUP, FixOptions(verify=False, tolerance_um=5.0), resolve).report
         except NcfixError as error:
             books.files["not followed"] += 1
             books.stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1

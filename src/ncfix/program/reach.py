@@ -23,8 +23,8 @@ PROGRAM_ENDS = frozenset({20, 300})
 """M2 and M30, in tenths."""
 
 
-LEADER = re.compile(rb"(?:[ \t\r\n]|\([^()\r\n]*\)|;[^\r\n]*)*+")
-"""Blank lines and comments."""
+LEADER = re.compile(rb"(?:[ \t\r\n]|\([^()\r\n]*+(?:\([^()\r\n]*+\)[^()\r\n]*+)*+\)|;[^\r\n]*)*+")
+"""Blank lines and comments, with brackets in them, too."""
 
 
 def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:

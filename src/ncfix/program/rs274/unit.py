@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ncfix.program.rs274.coordinates import N_LETTERS
 from ncfix.program.rs274.groups import Rules
 from ncfix.program.rs274.plans import Lane, Plan, plan_of
-from ncfix.program.tree import Flow, Program
+from ncfix.program.tree import Comment, Flow, Program
 
 
 def view(array: NDArray[Any]) -> Sequence[Any]:
@@ -120,9 +120,10 @@ class Unit:
         return self._lanes
 
     def begins_with_tape(self) -> bool:
-        """Whether the first block that is not blank is a `%`."""
+        """Whether the first block that is not blank is a `%`; controls but LinuxCNC pass over comments before it."""
         for block in range(len(self)):
             plan = self.plan(block)
-            if plan.tape or plan.template.items:
+            leader = not self.rules.strict and all(isinstance(item, Comment) for item in plan.template.items)
+            if plan.tape or (plan.template.items and not leader):
                 return plan.tape
         return False
