@@ -17,6 +17,9 @@ from . import candidate, score, tally  # noqa: E402
 from .families import FAMILIES, Task, tasks  # noqa: E402
 from .scenario import scenario  # noqa: E402
 
+HISTORY = Path(__file__).with_name("history.md")
+"""What an earlier final run gave, as it came."""
+
 
 def parser() -> argparse.ArgumentParser:
     """The command line."""
@@ -63,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     answer_all([] if options.known else todo, asked, options, records)
     chosen = [records[task.family, task.seed] for task in wanted if (task.family, task.seed) in records]
     run = f"{'Final' if options.final else 'Development'} seeds. {options.note}".strip()
-    section = tally.markdown(chosen, run)
+    section = tally.markdown(chosen, run, HISTORY.read_text().strip() if options.final else "")
     print(section)
     if options.table:
         old = options.table.read_text() if options.table.exists() else ""

@@ -40,7 +40,10 @@ class Wish:
 
 
 def pick(rng: Generator, spec: Family, wish: Wish, draft: Draft, tries: int) -> Entry:
-    """Half of the scenarios walk through the rows of the catalogue, the others draw from all its effects alike."""
+    """Half of the scenarios walk through the rows of the catalogue, the others draw from all its effects alike.
+
+    The walk leaps, by machine and by round, so that the first few scenarios have as many rows as there are of them.
+    """
     machine = draft.world.machine
     if spec.source == "location":
         return location.entry(machine, draft.notes["lacking"])
@@ -53,7 +56,7 @@ def pick(rng: Generator, spec: Family, wish: Wish, draft: Draft, tries: int) -> 
     if wish.index is None or wish.index % 8 < 4 or tries > ROUNDS:
         return entries[int(rng.integers(len(entries)))]
     rows = sorted({e.row for e in entries})
-    same = [e for e in entries if e.row == rows[(wish.index // 8) % len(rows)]]
+    same = [e for e in entries if e.row == rows[(7 * (wish.index // 8) + 5 * (wish.index % 4)) % len(rows)]]
     return same[int(rng.integers(len(same)))]
 
 

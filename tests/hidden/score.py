@@ -24,7 +24,7 @@ CLOSE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What came out of one scenario; None where a question does not arise."""
+    """What came out of one scenario; None where a question does not arise. `rows` were handed over."""
 
     family: str
     index: int
@@ -53,6 +53,12 @@ class Record:
     seconds: float
     cpu_seconds: float
     error: str
+    rows: int = 0
+
+    @property
+    def per_300_rows(self) -> float:
+        """Processor seconds in proportion to the rows."""
+        return 300 * self.cpu_seconds / self.rows
 
 
 def run(task: Task, candidate: Candidate, keep: Path | None = None) -> Record:
@@ -93,7 +99,7 @@ def judged(
         family_right=_family_right(scene, first) if truth.without else None,
         gap_before_um=gaps["before"], gap_after_um=after, gap_file_um=gaps["file"], floor_um=gaps["floor"],
         resolved=resolved[0], resolved_by_random=resolved[1], seconds=answer.seconds,
-        cpu_seconds=answer.cpu_seconds, error=answer.error,
+        cpu_seconds=answer.cpu_seconds, error=answer.error, rows=int(scene.given.sum()),
     )  # fmt: skip
 
 

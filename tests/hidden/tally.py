@@ -105,6 +105,7 @@ def lines(records: Sequence[Record]) -> list[Line]:
     far, near = ([r for r in deleted if (r.closest < CLOSE) == lone] for lone in (True, False))
     gone = [x for x in map(removed, single) if x is not None]
     false, besides = ([float(r.false_names) for r in rows] for rows in (single, of["two"] + of["three"]))
+    paced = [r.per_300_rows for r in records if r.rows]
     named: Judge = lambda r: bool(r.reported)  # noqa: E731
     return [
         share("one effect 5 to 20 um: first name right", single, lambda r: r.first_right, 0.97, prototype="0.98"),
@@ -135,6 +136,8 @@ def lines(records: Sequence[Record]) -> list[Line]:
         share("hidden from these poses: any other name", of["blind"], lambda r: r.false_names > 0),
         quantile("seconds of one core for one answer: median", [r.cpu_seconds for r in records], 0.5, 5.0, True),
         quantile("seconds of one core for one answer: 95 %", [r.cpu_seconds for r in records], 0.95),
+        quantile("seconds of one core for 300 rows: median", paced, 0.5, 5.0, True),
+        quantile("seconds of one core for 300 rows: 95 %", paced, 0.95),
         share("no answer (fault, time out)", records, lambda r: bool(r.error), 0.0, True),
     ]  # fmt: skip
 
@@ -164,8 +167,8 @@ anew for every seed. What is simulated and how an answer is judged is in `tests/
 hidden`. "Met" is about the value as it came; the interval says how sure it is with that many scenarios."""
 
 
-def markdown(records: Sequence[Record], run: str) -> str:
-    """The whole section: which run, the table, and the main figure by topology, kind of data and size."""
+def markdown(records: Sequence[Record], run: str, earlier: str = "") -> str:
+    """The whole section: which run, the table, the main figure by topology, kind of data and size; an earlier run."""
     head = "| what | scenarios | value | 95 % interval | wanted | met | prototype |\n|---|---|---|---|---|---|---|"
     counted = [line for line in lines(records) if line.count]
     left_out = ", ".join(name for name in FAMILIES if not any(r.family == name for r in records))
@@ -180,6 +183,7 @@ def markdown(records: Sequence[Record], run: str) -> str:
         *(line.row() for line in counted),
         "",
         *_breakdown(records),
+        *(["", earlier] if earlier else []),
     ]
     return "\n".join([*parts, END])
 
