@@ -16,7 +16,7 @@ from typing import Any
 
 import click
 
-from ncfix.diagnostics import Message
+from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.files import unwritable
 
 SCHEMA = 1
@@ -39,10 +39,11 @@ _kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
 def say(text: str) -> None:
     """A line for people, on standard error."""
     kept = _kept.get()
-    if kept is None:
-        click.echo(text, err=True, color=colour())
-    else:
+    if kept is not None:
         kept.append(text)
+        return
+    with suppress(OSError, AttributeError):  # nobody can be told that nobody can be told; exit codes still say it
+        click.echo(text, err=True, color=colour())
 
 
 @contextmanager
@@ -77,6 +78,8 @@ def tell_some(messages: Sequence[Message]) -> None:
 
 def put(data: str | bytes) -> None:
     """Data on standard output, as it is, at once."""
+    if sys.stdout is None:
+        raise UsageError.of("NCF007", "is closed", Place("<stdout>"), "-o FILE")
     try:
         click.echo(data, nl=False, color=colour())
         sys.stdout.flush()
@@ -114,7 +117,7 @@ def error_figures(error: Mapping[str, Any]) -> str:
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table on standard output: plain columns, or a drawn table on a terminal."""
-    if sys.stdout.isatty():
+    if sys.stdout is not None and sys.stdout.isatty():
         _drawn(header, rows)
         return
     widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
@@ -137,7 +140,7 @@ def _drawn(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 @contextmanager
 def busy(what: str) -> Iterator[None]:
     """Show what is going on while it lasts, on a terminal, if it lasts."""
-    if _kept.get() is not None or not sys.stderr.isatty():
+    if _kept.get() is not None or sys.stderr is None or not sys.stderr.isatty():
         yield
         return
     from rich.console import Console

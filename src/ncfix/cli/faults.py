@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ncfix.cli import console
-from ncfix.diagnostics import FaultError
+from ncfix.diagnostics import FaultError, NcfixError
+from ncfix.files import unwritable
 
 DEBUG = "NCFIX_DEBUG"
 """The environment variable that asks for tracebacks; workers inherit it."""
+
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""What the system says where there is no room: never a bug."""
+
+
+def owned(error: Exception) -> NcfixError:
+    """An exception as the error that is told: a remedy where there is one, else a fault of ncfix."""
+    if isinstance(error, NcfixError):
+        return error
+    if isinstance(error, OSError) and error.errno in FULL:
+        return unwritable(str(error.filename or "<stdout> or a temporary file"), error)
+    return fault(error)
 
 
 def fault(error: Exception) -> FaultError:

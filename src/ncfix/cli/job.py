@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ncfix import __version__, fast
 from ncfix.batch.journal import Find, Noted, digest_of, text_digest
 from ncfix.cli import console
-from ncfix.cli.faults import fault
+from ncfix.cli.faults import owned
 from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Fixed, Outlet, Source, compiled_from, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
@@ -67,7 +67,7 @@ class Job:
         except console.ReaderGoneError:
             raise
         except Exception as error:
-            own = error if isinstance(error, NcfixError) else fault(error)
+            own = owned(error)
             console.tell(*own.messages)
             return Outcome.failed(target, own)
 

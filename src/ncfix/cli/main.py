@@ -13,7 +13,7 @@ import click
 
 from ncfix import __version__
 from ncfix.cli import console
-from ncfix.cli.faults import debugging, fault
+from ncfix.cli.faults import debugging, owned
 from ncfix.diagnostics import ExitCode, Message, NcfixError, UsageError
 from ncfix.plugins import PluginWarning, registry
 
@@ -79,7 +79,6 @@ class Verbs(click.Group):
             formatter.write_dl(list(said.items()))
 
 
-
 @click.command(cls=Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="ncfix", message="%(prog)s %(version)s")
 @click.option("--debug", is_flag=True, help="Show the traceback of a fault of ncfix (also NCFIX_DEBUG=1).")
@@ -107,15 +106,13 @@ def _run(arguments: Sequence[str]) -> int:
             return int(cli.main(list(arguments), prog_name="ncfix", standalone_mode=False) or 0)
     except click.ClickException as error:
         return wrong_use(error, arguments)
-    except NcfixError as error:
-        return failed(error, as_json)
     except click.Abort:
         console.tell(Message("NCF012", "interrupted"))
         return INTERRUPTED
     except console.ReaderGoneError:
         return BROKEN_PIPE
     except Exception as error:
-        return failed(fault(error), as_json)
+        return failed(owned(error), as_json)
 
 
 def wrong_use(error: click.ClickException, arguments: Sequence[str]) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +12,7 @@ from typing import IO, TYPE_CHECKING
 
 from ncfix import files
 from ncfix.cli import console
-from ncfix.cli.targets import STREAM, Target, shown
+from ncfix.cli.targets import STREAM, Target, shown, stdin
 from ncfix.diagnostics import Place, RefusedError
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ def source_of(path: str) -> Iterator[Source]:
     """An input file, or standard input, to be read from its beginning."""
     if path == STREAM:
         with tempfile.TemporaryFile() as kept:
-            yield Source(path, sys.stdin.buffer, kept)
+            yield Source(path, stdin(), kept)
         return
     try:
         handle = open(path, "rb")  # noqa: SIM115

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from typing import IO
 
 from ncfix import files
 from ncfix.batch.gathering import Gathered, gathered
@@ -22,9 +24,16 @@ def read(path: str) -> bytes:
     if path != STREAM:
         return files.read_bytes(path)
     try:
-        return sys.stdin.buffer.read()
+        return stdin().read()
     except OSError as error:
         raise files.unreadable(shown(path), error) from error
+
+
+def stdin() -> IO[bytes]:
+    """Standard input; raises `SourceError` NCF002 if it is closed."""
+    if sys.stdin is None:
+        raise files.unreadable(shown(STREAM), OSError(errno.EBADF, "it is closed"))
+    return sys.stdin.buffer
 
 
 def shown(path: str) -> str:
