@@ -196,3 +196,19 @@ def test_two_ways_to_look_at_a_corrected_program_agree(examples: Path, ncfix: An
     assert 0 < said["error_after_um"]["max"] <= 1.05 * entry["error_after_um"]["max"]
     assert 0.9 < said["error_before_um"]["max"] / entry["error_before_um"]["max"] <= 1.01
     assert said["within"] is True
+
+
+def test_verify_says_where_nothing_could_be_corrected(ncfix: Any, examples: Path, tmp_path: Path) -> None:
+    """A cut whose Z the program has not said: Z gets no word, and the error that stays along it is explained."""
+    program, out = tmp_path / "a.ngc", tmp_path / "b.ngc"
+    program.write_text("G21 G90 G94\nG0 X50. Y100.\nG1 X150. F500\nG0 Z5.\nG1 Z-5.\nG1 X50.\nM2\n")
+    options = ["-m", examples / "machines/wCBXFZYSt.toml", "--assume-zero"]
+    fixed = ncfix("fix", program, "-o", out, *options, "--json").json()["files"][0]
+    assert [(left["axis"], left["first_line"], left["last_line"]) for left in fixed["left_where_it_stands"]] == [
+        ("Z", 2, 3)
+    ]
+    found = ncfix("verify", program, out, *options, "--json")
+    assert found.json()["left_where_it_stands"] == [{"axis": "Z", "lines": [3]}]
+    assert found.code == ExitCode.FINDINGS
+    said = ncfix("verify", program, out, *options).out.decode()
+    assert "along Z nothing can be corrected in line 3 of the original: the program has not said where Z stands" in said

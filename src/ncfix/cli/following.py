@@ -30,6 +30,8 @@ class Compared:
     beyond       lines of the other with errors larger than the tolerance
     not_reached  lines of the original from which the other is farther away
     unseen       lines of the original that cut, nobody knows where
+    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
+                 nothing can be corrected along it there
     """
 
     before: dict[str, Any]
@@ -38,6 +40,7 @@ class Compared:
     beyond: list[int]
     not_reached: list[int]
     unseen: list[int]
+    left: dict[str, list[int]]
 
     @property
     def within(self) -> bool:
@@ -101,6 +104,7 @@ class Following:
         """What this machine does with two programs, measured against what the first one means."""
         from ncfix.compensate.comparison import compare
         from ncfix.compensate.simulation import unseen
+        from ncfix.compensate.wordless import left_in_cuts
 
         program, machine, meant = self._on_machine(original)
         other, _, done = self._on_machine(fixed, like=program)
@@ -115,6 +119,7 @@ class Following:
             beyond=_lines_at(there.rows_beyond(limit), other_lines),
             not_reached=_lines_at(back.rows_beyond(limit), lines),
             unseen=_lines_at(unseen(meant), lines),
+            left={axis: _lines_at(rows, lines) for axis, rows in left_in_cuts(meant).items()},
         )
 
     def _read_like(self, path: str, other: Program) -> Program:

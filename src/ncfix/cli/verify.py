@@ -52,6 +52,7 @@ def verify(
             lines_beyond=found.beyond,
             lines_not_reached=found.not_reached,
             lines_not_looked_at=found.unseen,
+            left_where_it_stands=[{"axis": axis, "lines": lines} for axis, lines in found.left.items()],
         )
     else:
         console.put("".join(f"{line}\n" for line in said(found, tolerance_um)))
@@ -71,6 +72,9 @@ def said(found: Compared, tolerance_um: float) -> Iterator[str]:
         return
     of = "" if found.beyond else " of the original"
     yield f"NOT within {tolerance_um:g} um: {lines_said(found.beyond or found.not_reached)}{of}"
+    for axis, lines in found.left.items():
+        where = f"{lines_said(lines)} of the original"
+        yield f"along {axis} nothing can be corrected in {where}: the program has not said where {axis} stands there"
 
 
 def lines_said(lines: Sequence[int]) -> str:

@@ -191,6 +191,7 @@ class Control(base.Control):
         refusal: str = "",
         passing: str = "",
         arc: Arc | None = None,
+        settles: int | None = None,
     ) -> None:
         """As for the RS274 family.
 
@@ -200,7 +201,8 @@ class Control(base.Control):
         if kind == Kind.RAPID and not refusal and AT_START in unknown.values():
             passing = passing or first_reason(unknown)
         own = axes | (1 << Z if code == BY_DEPTH else 0)
-        settles = 0 if self.modal.incremental or passing.startswith("machine") else own
+        if settles is None:
+            settles = 0 if self.modal.incremental or passing.startswith("machine") else own
         before = self.modal.compensated
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)
