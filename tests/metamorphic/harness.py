@@ -24,6 +24,9 @@ from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
 
 PAIRS = int(os.environ.get("NCFIX_PAIRS", "3"))
+TOGETHER = 10
+"""So many routes make one program where there are more of them."""
+
 LENGTH = 80.0
 SETUP = Setup(
     work_offsets={"G54": {"X": 0.0, "Y": 0.0, "Z": 60.0, "A": 0.0, "B": 0.0, "C": 0.0}},
@@ -54,13 +57,17 @@ Write = Callable[[Route], str]
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """Two ways to write a route, and how far (mm, degrees) the corrected ends may be apart for their rounding alone."""
+    """Two ways to write a route, and how far (mm, degrees) the corrected ends may be apart for their rounding alone.
+
+    joins  routes may be written one behind the other, which many are
+    """
 
     name: str
     left: Write
     right: Write
     apart: float
     rotary: bool = False
+    joins: bool = True
 
 
 def route(rng: np.random.Generator, rotary: bool) -> Route:
@@ -121,9 +128,10 @@ def known_ends(text: str, dialect: str, machine: Machine) -> NDArray[np.float64]
 def worst(relation: Relation, dialect: str, machine: Machine, pairs: int = PAIRS) -> float:
     """The largest distance between corrected ends over generated pairs, mm or degrees."""
     rng = np.random.default_rng(20261121)
-    found = 0.0
-    for _ in range(pairs):
-        path = route(rng, relation.rotary)
+    found, together = 0.0, TOGETHER if relation.joins and pairs > TOGETHER else 1
+    for first in range(0, pairs, together):
+        count = min(together, pairs - first)
+        path = [step for _ in range(count) for step in route(rng, relation.rotary)]
         left, right = (known_ends(write(path), dialect, machine) for write in (relation.left, relation.right))
         assert left.shape == right.shape, (relation.left(path), relation.right(path))
         found = max(found, float(np.abs(left - right).max()))

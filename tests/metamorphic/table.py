@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 BEGIN, END = "<!-- metamorphic: begin -->", "<!-- metamorphic: end -->"
-HEAD = "| one path written in two ways | pairs | worst difference of corrected ends, um or 0.001 degree |\n|---|---|---|"
+HEAD = (
+    "| one path written in two ways | pairs | worst difference of corrected ends, um or 0.001 degree |\n|---|---|---|"
+)
 FIGURE = re.compile(r"metamorphic, (?P<dialect>\w+), (?P<relation>.+): (?P<pairs>\d+) pairs, worst (?P<worst>[\d.]+) ")
 ROW = re.compile(r"\| (?P<relation>[^|]+) \| (?P<pairs>\d+) \| (?P<cells>[^|]+) \|")
 

@@ -31,7 +31,7 @@ RELATIONS = [
     Relation("TRANS and none", write.shifted, write.full, ONCE),
     Relation("polar and Cartesian", write.polar, write.full, TWICE),
     Relation("polar words left out", write.sparing_polar, write.full, TWICE),
-    Relation("CT and I J", write.tangents, write.tangents_by_centre, TWICE),
+    Relation("CT and I J", write.tangents, write.tangents_by_centre, TWICE, joins=False),
 ]
 
 
