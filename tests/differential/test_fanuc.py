@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import random
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from differential import corpus, locality, product, setups
 from differential.canon import Canon
-from differential.errors import LETTERS, Machine
+from differential.errors import Machine
+from differential.generated import Study
 from differential.generator import Generator
-from differential.judge import Terms, judge
-from differential.test_generated import MACHINES, SETUP
 
 CASES = int(os.environ.get("NCFIX_GENERATED", "4"))
 
@@ -54,7 +51,7 @@ class Fanuc(Generator):
         """Holes with levels of their own, and other motions right behind them."""
         if self.incremental or self.inverse or self.plane != "G17":
             return
-        at_level = self.rng.random() < 0.5 and not self.inch  # in inches R and Z would be rounded apart
+        at_level = self.rng.random() < 0.5
         self.block("G0", {"Z": 4.0 if at_level else 30.0})
         retract = self.rng.choice(("G98", "G99"))
         kind = self.rng.choice(("G81", "G82 P1", f"G83 Q{self.number(3.0)}", "G85"))
@@ -82,37 +79,11 @@ def test_programs_made_up_at_random(
     tmp_path: Path,
     figures: Callable[[str], None],
 ) -> None:
-    found: Counter[str] = Counter()
-    wrong: list[str] = []
-    for seed in range(int(os.environ.get("NCFIX_SEED", "0")), CASES):
-        name = MACHINES[seed % len(MACHINES)]
-        model = machine(name)
-        axes = "".join(LETTERS[column] for column in (*model.linear, *model.rotary))
-        source = source_of(seed, "".join(axis for axis in axes if axis in "ABC"))
-        original = rs274(source.encode(), SETUP)
-        found["programs"] += 1
-        if not original.accepted:
-            found["not for the control"] += 1
-            continue
-        options = ("--setup", setups.write(tmp_path, SETUP, axes), "--allow-refused", "--no-point", "calculator")
-        outcome = product.fix_text(source, machine_file(name), tmp_path, "--dialect", dialect, *options)
-        if outcome.text is None:
-            wrong.append(f"seed {seed} {name}: {outcome.errors}")
-            continue
-        terms = Terms(
-            step=model.linear_step,
-            rotary_step=model.rotary_step,
-            refused=outcome.refused,
-            passed=corpus.passed_by_rule(source.encode()),
-            tool_length={number: length for number, (length, _) in SETUP.tools.items()},
-        )
-        verdict = judge(original, rs274(outcome.text, SETUP), model, terms)
-        found["motions"] += verdict.motions
-        found["refused"] += verdict.refused
-        wrong += [f"seed {seed} {name}: {verdict}"] if not verdict.right else []
-        plain = b"\n".join(line for line in outcome.text.split(b"\n") if b"NCFIX" not in line.upper())
-        wrong += [f"seed {seed} {name}: {text}" for text in locality.complaints(source.encode(), plain)[:2]]
-    figures(f"generated, {dialect}: {dict(found)}, {len(wrong)} wrong")
-    assert not wrong, "\n".join(wrong[:12])
+    options = ("--dialect", dialect, "--no-point", "calculator")
+    study = Study(rs274, machine, machine_file, tmp_path, source_of, options)
+    study.run(range(int(os.environ.get("NCFIX_SEED", "0")), CASES))
+    found = study.found
+    figures(f"generated, {dialect}: {dict(found)}, {len(study.wrong)} wrong")
+    assert not study.wrong, "\n".join(study.wrong[:12])
     assert found["not for the control"] < found["programs"] / 3
     assert found["refused"] < 0.05 * found["motions"]

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 BEGIN, END = "<!-- metamorphic: begin -->", "<!-- metamorphic: end -->"
-HEAD = (
-    "| one path written in two ways | pairs | worst difference of corrected ends, um or 0.001 degree |\n|---|---|---|"
-)
+HEAD = "| one path written in two ways | pairs | worst difference of ends, um or 0.001 degree |\n|---|---|---|"
 FIGURE = re.compile(r"metamorphic, (?P<dialect>\w+), (?P<relation>.+): (?P<pairs>\d+) pairs, worst (?P<worst>[\d.]+) ")
 ROW = re.compile(r"\| (?P<relation>[^|]+) \| (?P<pairs>\d+) \| (?P<cells>[^|]+) \|")
 
@@ -34,8 +32,8 @@ def rows_of(page: str) -> Rows:
 
 
 def merged(rows: Rows, key: tuple[str, int], dialect: str, worst: str) -> Rows:
-    """The rows with a new figure; an older one of the same dialect and relation, of another number of pairs, is gone."""
-    relation, pairs = key
+    """The rows with a new figure; an older one of the same dialect and relation is gone."""
+    relation = key[0]
     kept = {
         (name, count): {each: value for each, value in cells.items() if (name, each) != (relation, dialect)}
         for (name, count), cells in rows.items()

@@ -23,7 +23,8 @@ def test_figures_become_rows_by_relation(tmp_path: Path) -> None:
         ("G91 and G90", 500): {"fanuc": "0.100", "haas": "0.200"},
         ("X= and X", 3): {"siemens": "0.000"},
     }
-    assert page.read_text().startswith("before\n") and page.read_text().endswith("\nafter\n")
+    assert page.read_text().startswith("before\n")
+    assert page.read_text().endswith("\nafter\n")
 
 
 def test_a_new_figure_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
