@@ -124,8 +124,8 @@ def test_a_name_that_must_not_be_used_is_not_used(known: Machine) -> None:
     worn = known.replace(effects=(*known.effects, Effect("EXX", (0.016,), Backlash())))
     found = diagnose([measured(worn, 80)], known, ("backlash-x", "no such name"))
     assert all(each.candidate.name != "backlash X" for each in found.findings)
-    assert found.unheard_of == ("no such name",)
-    assert any(message.code == "NCF657" for message in remarks(found.view, found.unheard_of))
+    assert found.case.unheard_of == ("no such name",)
+    assert any(message.code == "NCF657" for message in remarks(found.view, found.case.unheard_of))
 
 
 def test_nothing_is_named_where_nothing_is(known: Machine) -> None:

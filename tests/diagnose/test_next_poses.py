@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.diagnose.next_poses import COUNT, Contest, _climbed, _exchanged
+from ncfix.diagnose.contest import COUNT, Contest, climbed, exchanged
 
 OFFERED, HEIGHT, WIDTH = 60, 3, 9
 ROUNDING = 1e-8
@@ -33,7 +33,7 @@ def test_more_poses_never_tell_less(contest: Contest) -> None:
 
 
 def test_exchanged_poses_beat_a_thousand_random_dozens(contest: Contest) -> None:
-    rows, told = _exchanged([contest], OFFERED)
+    rows, told = exchanged([contest], OFFERED)
     random = np.random.default_rng(0)
     chance = [contest.told(random.permutation(OFFERED)[:COUNT].tolist()) for _ in range(1000)]
     assert len(set(rows)) == COUNT
@@ -43,5 +43,5 @@ def test_exchanged_poses_beat_a_thousand_random_dozens(contest: Contest) -> None
 
 def test_the_worst_of_two_contests_counts(contest: Contest) -> None:
     other = Contest(contest.matrix, contest.vector, contest.square, contest.columns, contest.signal[::-1])
-    rows, told = _climbed([contest, other], list(range(COUNT)))
+    rows, told = climbed([contest, other], list(range(COUNT)))
     assert told == pytest.approx(min(contest.told(rows), other.told(rows)), rel=ROUNDING)

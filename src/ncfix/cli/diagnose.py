@@ -59,7 +59,7 @@ def diagnose(
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
         found = diagnosed(data, machine, without)
-    console.tell(*remarks(found.view, found.unheard_of))
+    console.tell(*remarks(found.view, found.case.unheard_of))
     written = None
     if machine_target is not None and found.machine is not None:
         machine_target.write(dumps(result.with_provenance(found)).encode())

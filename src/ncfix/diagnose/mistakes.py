@@ -17,12 +17,13 @@ from ncfix.diagnose import stale
 from ncfix.diagnose.catalogue import Candidate
 from ncfix.diagnose.catalogue.build import plain
 from ncfix.diagnose.misfit import Misfit, misfit
+from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axis import Axis
 from ncfix.measure.measurement import Measurement
 
 if TYPE_CHECKING:
-    from ncfix.diagnose.diagnosis import Diagnosis
+    from ncfix.diagnose.findings import Diagnosis
 
 SUSPECT, SUSPECT_UM = 1.4, 1.5
 """Times the noise, and um above it, from which on a mistake is looked for."""
@@ -182,7 +183,7 @@ def _with(machine: Machine, axis: Axis) -> Machine:
 
 def told(found: Diagnosis, wrong: Mistake) -> Diagnosis:
     """The diagnosis with the mistake as its first finding."""
-    from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Finding
+    from ncfix.diagnose.findings import Finding
 
     candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
     size = float(np.sqrt(max(wrong.before_um**2 - wrong.after_um**2, 0.0)))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix.diagnose.contest import Contest, exchanged
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
 from ncfix.diagnose.selection import ALIKE, Selected, aliases
@@ -23,12 +24,7 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 
-COUNT = 12
 OFFERED = 320
-PASSES = 4
-STARTS = 60
-CLIMBED = 3
-"""Of so many random dozens, so many are improved."""
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""
 RIVALS_MOST = 3
@@ -72,43 +68,6 @@ class Proposal:
     reason: str
     rivals: tuple[str, ...]
     beyond: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, repr=False)
-class Contest:
-    """One name against another that imitates it: information of the old rows, and the blocks of every pose on offer.
-
-    matrix, vector, square  inner products of what may be refitted, of that with the signal, of the signal
-    columns (n, r, k), signal (n, r)  of the poses on offer
-    """
-
-    matrix: Array
-    vector: Array
-    square: float
-    columns: Array
-    signal: Array
-
-    def told(self, rows: Sequence[int]) -> float:
-        """What of the signal the refitted rival cannot imitate with these poses too, squared noise units."""
-        matrix, vector, square = self.summed(rows)
-        return square - float(vector @ np.linalg.solve(matrix, vector))
-
-    def summed(self, rows: Sequence[int]) -> tuple[Array, Array, float]:
-        """Inner products of old rows and these."""
-        own = self.columns[list(rows)].reshape(-1, self.columns.shape[2])
-        seen = self.signal[list(rows)].ravel()
-        return self.matrix + own.T @ own, self.vector + own.T @ seen, self.square + float(seen @ seen)
-
-    def told_with(self, rows: Sequence[int]) -> Array:
-        """The same with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
-        matrix, vector, square = self.summed(rows)
-        count, height, width = self.columns.shape
-        solved = np.linalg.solve(matrix, np.column_stack([vector, self.columns.reshape(-1, width).T]))
-        missed = self.signal - self.columns @ solved[:, 0]
-        spread = np.eye(height) + self.columns @ solved[:, 1:].reshape(width, count, height).transpose(1, 0, 2)
-        gain = np.einsum("nr,nr->n", missed, np.linalg.solve(spread, missed[:, :, None])[:, :, 0])
-        found: Array = square - float(vector @ solved[:, 0]) + gain
-        return found
 
 
 def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
@@ -158,7 +117,7 @@ def _within(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ra
     names = tuple(dict.fromkeys(rival.group.owner.name for rival in rivals))
     every = list(range(len(offered)))
     useful = [each for each in contests if each.told(every) > TOLD]
-    index, after = _exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
+    index, after = exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
     before = min(each.told([]) for each in useful or contests)
     plan = offered.rows(index) if useful and after > BETTER * before else None
     reason = _reason(court, chosen.group, [rival.group for rival in rivals])
@@ -242,32 +201,6 @@ def _shown(new: Observation, group: Group) -> Array:
     used = group.loading.any(axis=1)
     shown: Array = 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
     return shown
-
-
-def _exchanged(contests: Sequence[Contest], count: int) -> tuple[list[int], float]:
-    """Start with many random dozens, keep the best, and exchange one pose after another as long as that helps."""
-    random = np.random.default_rng(0)
-    starts = [random.permutation(count)[:COUNT].tolist() for _ in range(STARTS)]
-    starts.sort(key=lambda rows: -min(each.told(rows) for each in contests))
-    climbed = [_climbed(contests, rows) for rows in starts[:CLIMBED]]
-    return max(climbed, key=lambda found: found[1])
-
-
-def _climbed(contests: Sequence[Contest], chosen: list[int]) -> tuple[list[int], float]:
-    """Every pose in turn replaced by the one on offer that helps most in the worst contest."""
-    value = min(each.told(chosen) for each in contests)
-    for _ in range(PASSES):
-        before = value
-        for place in range(len(chosen)):
-            rest = [*chosen[:place], *chosen[place + 1 :]]
-            told = np.min([each.told_with(rest) for each in contests], axis=0)
-            told[rest] = -np.inf
-            best = int(told.argmax())
-            if told[best] > value:
-                chosen, value = [*chosen[:place], best, *chosen[place + 1 :]], float(told[best])
-        if value < 1.02 * before:
-            break
-    return chosen, value
 
 
 def _reason(court: Court, chosen: Group, rivals: Sequence[Group]) -> str:

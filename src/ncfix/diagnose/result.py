@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ncfix.diagnose.carriers import carriers, conditions
-from ncfix.diagnose.diagnosis import Diagnosis, Finding
+from ncfix.diagnose.findings import Diagnosis, Finding
 from ncfix.diagnose.next_poses import as_objects
 from ncfix.diagnose.words import why
 from ncfix.machine import Machine
@@ -19,7 +19,7 @@ def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
     return {
         "verdict": found.verdict,
         "effects": [_effect(found, each) for each in found.findings],
-        "unknown": {"share_um": found.unknown_um, "where": found.unknown_kind},
+        "unknown": {"share_um": found.unknown_um, "where": found.rest.kind},
         "gap_um": {name: getattr(found.gap, name) for name in found.gap.__dataclass_fields__},
         "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in found.patterns],
         "next_measurements": as_objects(found.proposal.plan) if found.proposal and found.proposal.plan else [],
@@ -27,8 +27,8 @@ def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
         "machine": machine,
         "noise": {"sigma_um": found.floor.sigma_um, "source": found.floor.source, "freedom": found.floor.freedom},
         "lack_of_fit": {"before": found.p_lack, "after": found.p_left},
-        "invisible": [{"name": c.name, "visible_share": share} for c, share in found.gathered.invisible],
-        "considered": len(found.considered),
+        "invisible": [{"name": c.name, "visible_share": share} for c, share in found.case.gathered.invisible],
+        "considered": len(found.case.considered),
         "outliers": _outliers(found),
         "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in found.moved],
     }
@@ -83,7 +83,7 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
 def _outliers(found: Diagnosis) -> list[dict[str, Any]]:
     places, first = [], 0
     for each in found.view.measurements:
-        for row in np.flatnonzero(found.outlying[first : first + len(each)]):
+        for row in np.flatnonzero(found.case.outlying[first : first + len(each)]):
             place = each.place(int(row))
             places.append({"path": place.path, "line": place.line})
         first += len(each)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ncfix.diagnose.noise import Floor
 
 if TYPE_CHECKING:
-    from ncfix.diagnose.diagnosis import Finding
+    from ncfix.diagnose.findings import Finding
 
 NOTHING, FOUND, AMBIGUOUS, UNKNOWN = "nothing-missing", "found", "ambiguous", "unknown-effect"
 EXCESS_UM = 2.0

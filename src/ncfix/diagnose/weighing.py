@@ -68,9 +68,16 @@ class Scale:
         """Log likelihood of the data with these members, less their prices."""
         key = frozenset(members.values())
         if key not in self.weights:
-            likelihood = self.court.likelihood(self.all(members), self.allowance(members))
-            self.weights[key] = likelihood - sum(map(self.price, members)) - margin(len(members))
+            self.weights[key] = self._likelihood(members) - sum(map(self.price, members)) - margin(len(members))
         return self.weights[key]
+
+    def _likelihood(self, members: Members) -> float:
+        """Of effects shaped as in the catalogue, or a little otherwise: either in half of all machines."""
+        every, allowance = self.all(members), self.allowance(members)
+        plain = self.court.likelihood(every)
+        if allowance is None:
+            return plain
+        return float(np.logaddexp(plain, self.court.likelihood(every, allowance)) - np.log(2))
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from ncfix.diagnose.addition import Moved
 from ncfix.diagnose.carriers import carriers, conditions
-from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, UNKNOWN, Diagnosis, Finding
+from ncfix.diagnose.findings import Diagnosis, Finding
 from ncfix.diagnose.next_poses import Proposal
+from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
 
 SAID = {
     NOTHING: "nothing is missing that stands out of the noise",
@@ -36,8 +37,8 @@ def text(found: Diagnosis) -> str:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
         lines += [f"  {constant(each)}" for each in found.moved]
     lines += _next(found)
-    if found.outlying.any():
-        lines += ["", f"{int(found.outlying.sum())} rows put aside as outliers (--json lists them)"]
+    if found.case.outlying.any():
+        lines += ["", f"{int(found.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
 
 
@@ -80,7 +81,7 @@ def carried(found: Diagnosis, finding: Finding) -> str:
 
 def rest(found: Diagnosis) -> str:
     """What has no name; and that it decides nothing, where it does not."""
-    said = f"without a name: {found.unknown_um:.1f} um rms of {found.unknown_kind}"
+    said = f"without a name: {found.unknown_um:.1f} um rms of {found.rest.kind}"
     if found.verdict == UNKNOWN:
         return said
     why = "no more than one value's noise, and without repeats it may be the part's or the instrument's"
@@ -111,8 +112,8 @@ def why(found: Diagnosis, finding: Finding) -> str:
     """One sentence on why this name."""
     name = finding.candidate.name
     said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g})"
-    runners = found.selected.runners.get(name, {}) if found.selected else {}
+    runners = found.selected.runners.get(name, {})
     if not runners:
         return said
     best = max(runners, key=lambda each: runners[each])
-    return f"{said}; next best of {len(found.considered)}: {best}, {finding.odds - runners[best]:.0f} less"
+    return f"{said}; next best of {len(found.case.considered)}: {best}, {finding.odds - runners[best]:.0f} less"

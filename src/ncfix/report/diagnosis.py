@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ncfix.diagnose.diagnosis import Diagnosis, Finding
+from ncfix.diagnose.findings import Diagnosis, Finding
 from ncfix.diagnose.words import SAID, beyond, carried, constants, odd, rest, why
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
@@ -57,11 +57,11 @@ def _finding(found: Diagnosis, finding: Finding) -> Section:
 
 def _runners(found: Diagnosis, finding: Finding) -> Iterator[Part]:
     """The names that did not win, by their evidence."""
-    runners = found.selected.runners.get(finding.candidate.name, {}) if found.selected else {}
+    runners = found.selected.runners.get(finding.candidate.name, {})
     if runners:
         best = sorted(runners, key=lambda each: -runners[each])[:RUNNERS]
         rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners[each]:.1f}") for each in best)]
-        yield Text(f"Evidence, log odds, best of {len(found.considered)}:")
+        yield Text(f"Evidence, log odds, best of {len(found.case.considered)}:")
         yield Table(("name", "log odds"), rows)
 
 
@@ -92,7 +92,7 @@ def _residuals(found: Diagnosis) -> Section:
 def _maps(found: Diagnosis) -> Iterator[Part]:
     """Residuals of all components over each axis that moved."""
     view = found.view
-    inside = (view.row >= 0) & ~found.outlying[np.maximum(view.row, 0)]
+    inside = (view.row >= 0) & ~found.case.outlying[np.maximum(view.row, 0)]
     sides = {"before": found.before[inside], "after": found.after[inside]}
     if not inside.any():
         return
@@ -118,8 +118,8 @@ def _next(found: Diagnosis) -> Section:
 
 
 def _unseen(found: Diagnosis) -> Section:
-    names = ", ".join(candidate.name for candidate, _ in found.gathered.invisible)
-    count = int(found.outlying.sum())
+    names = ", ".join(candidate.name for candidate, _ in found.case.gathered.invisible)
+    count = int(found.case.outlying.sum())
     parts = [Text(f"Not visible with these poses: {names}.")] if names else []
     if count:
         parts.append(Text(f"{count} rows were put aside as outliers; --json lists them."))
