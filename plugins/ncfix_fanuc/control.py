@@ -15,8 +15,8 @@ from ncfix.tables.control import Assumption, Control, Files, Option, Properties,
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
-from ncfix_fanuc.filling import SIDE, TEMPLATE, GridFilling
-from ncfix_fanuc.records import NAME, TABLE, TEXT, Volc, csv_text, json_text, read_volc, template_text
+from ncfix_fanuc.filling import TEMPLATE, GridFilling
+from ncfix_fanuc.records import NAME, SIDE, TABLE, TEXT, Volc, csv_text, json_text, read_volc, template_text
 from ncfix_fanuc.units import SIGN, UNITS
 
 

@@ -17,14 +17,11 @@ from ncfix.tables.reversal import reversal_note
 from ncfix.tables.settings import choice, number, whole, wrong
 from ncfix.tables.volume import Volume
 from ncfix_fanuc.backlash import Backlash
-from ncfix_fanuc.records import TEXT, Style, Volc
+from ncfix_fanuc.records import MOST_MAGNIFICATION, MOST_NUMBER, SIDE, TEXT, Style, Volc, check_template
 from ncfix_fanuc.units import SIGNS, sense_of
 
-SIDE = 25
-MOST_MAGNIFICATION = 100
 AXES = ("X", "Y", "Z")
 TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
-MOST_NUMBER = 99_999_999
 FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
 ROTARY = ("zero", "middle")
 SAID = {
@@ -159,9 +156,8 @@ def _style(settings: Mapping[str, str]) -> Style:
     first, largest = whole(settings, "first_number", 0, MOST_NUMBER), whole(settings, "largest", 1, MOST_NUMBER)
     template = settings["template"]
     try:
-        template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)
-    except (KeyError, ValueError, IndexError) as error:
-        raise wrong(settings, "template", f"like {TEMPLATE}") from error
-    if template and not all(f"{{{name}" in template for name in ("dx", "dy", "dz")):
-        raise wrong(settings, "template", "it needs {dx}, {dy} and {dz}")
+        if template:
+            check_template(template)
+    except (ValueError, KeyError, IndexError) as error:
+        raise wrong(settings, "template", f"like {TEMPLATE}; {error}") from error
     return Style(first, settings["order"], largest, template, "".join(sorted(settings["home_minus"].upper())))

@@ -9,28 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-import numpy as np
-
 from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
-from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_own_axis
-from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.neutral import Compensation
 from ncfix.tables.settings import choice
 from ncfix_fanuc.increments import curves, pitch_of
-from ncfix_fanuc.pitch_text import (
-    MOST,
-    NUMBERS,
-    Pitch,
-    parameter_text,
-    pitch_text,
-    read_increments,
-    read_records,
-)
+from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
+from ncfix_fanuc.pitch_text import MOST, NUMBERS, Pitch, parameter_text, pitch_text
 from ncfix_fanuc.units import DEGREE, SIGN, SIGNS, UNITS, sense_of, units_of
 
-PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
 ORDER = "XYZABCUVW"
 FIRST_NUMBER = 1
 
@@ -115,35 +103,14 @@ class FanucPitch(Control):
 
     def read(self, files: Files) -> Compensation:
         """As the control sums them up. Raises `ConfigError` NCF491."""
-        terms, remarks = self._read(files)
+        terms, remarks = read_pitches(files)
         for each in remarks:
             each.check()
         return Compensation(terms)
 
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Values beyond the range, point numbers that do not fit, turns that do not close."""
-        return tuple(message for each in self._read(files)[1] for message in each.messages)
-
-    def _read(self, files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
-        head = Remarks.of(SETTINGS, files.get(SETTINGS, b""))
-        words = files.get(SETTINGS, b"").decode("latin-1").split()
-        if len(words) != 4 or words[0] not in SIGNS:
-            head.refuse(0, "should hold the sign, two detection units and the axes", "PITCH-1")
-            return (), [head]
-        sense = sense_of(words[0])
-        parameters = Remarks.of(PARAMETERS, files.get(PARAMETERS, b""))
-        values = {record.number: dict(record.values) for record in read_records(parameters)}
-        remarks, terms = [head, parameters], []
-        for name in sorted(files):
-            if name.startswith("pitch_") and name.endswith(".csv"):
-                axis = name[len("pitch_") : -len(".csv")]
-                found = Remarks.of(name, files[name])
-                remarks.append(found)
-                pitch = _read_pitch(found, axis, words[3], values)
-                if pitch is not None and not found.wrong:
-                    unit = float(words[2]) * DEGREE if axis in "ABC" else float(words[1]) / 1000
-                    terms.append(Term((_grid(pitch, sense * unit),)))
-        return tuple(terms), remarks
+        return tuple(message for each in read_pitches(files)[1] for message in each.messages)
 
 
 def _axes(request: Request) -> tuple[str, ...]:
@@ -174,37 +141,3 @@ def _parameters(found: list[Pitch], axes: tuple[str, ...]) -> dict[int, list[flo
         for number, value in zip(NUMBERS.values(), values, strict=True):
             rows[number].append(float(value))
     return rows
-
-
-def _read_pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[int, str]]) -> Pitch | None:
-    first, increments = read_increments(remarks)
-    index = axes.find(axis) + 1
-    if len(axis) != 1 or not index:
-        remarks.refuse(0, f"{axis} is none of the axes {axes}")
-        return None
-    try:
-        found = {name: float(values[number][index]) for name, number in NUMBERS.items()}
-    except KeyError:
-        remarks.refuse(0, f"{PARAMETERS} has not all parameters of axis {index}")
-        return None
-    last = first + len(increments) - 1
-    if (found["low"], found["high"]) != (first, last):
-        remarks.refuse(0, f"points {first} to {last}, and the parameters say {found['low']:g} to {found['high']:g}")
-    if found["interval"] <= 0:
-        remarks.refuse(0, "an interval of zero")
-    if found["turn"] and increments.sum() != 0:
-        remarks.refuse(0, f"the increments of a turn add up to {increments.sum()}, not to zero")
-    if not first <= found["reference"] <= last:
-        remarks.doubt(0, "the reference position is outside the points")
-    magnification = int(found["magnification"])
-    return Pitch(axis, first, increments, int(found["reference"]), magnification, found["interval"], found["turn"])
-
-
-def _grid(pitch: Pitch, unit: float) -> Grid:
-    sums = np.cumsum(pitch.increments)
-    at_zero = int(np.clip(pitch.reference - pitch.first, 0, len(sums) - 1))
-    scale = DEGREE if pitch.axis in "ABC" else 1.0
-    counts = np.arange(pitch.first - pitch.reference, pitch.last - pitch.reference + 1, dtype=np.float64)
-    nodes: Array = pitch.interval * scale * counts
-    values = (sums - sums[at_zero]) * pitch.magnification * unit
-    return Grid((pitch.axis,), (nodes,), (pitch.axis,), values[:, None].astype(np.float64), (bool(pitch.turn),))

@@ -20,9 +20,10 @@ MOST = 128
 """Points of an axis."""
 NUMBERS = {"reference": 3620, "low": 3621, "high": 3622, "magnification": 3623, "interval": 3624, "turn": 3625}
 HEAD = "no,value"
-RECORD = re.compile(r"N(\d+)((?:[ASL]\d+P[-+]?\d+\.?\d*)+);?")
-PLAIN = re.compile(r"N(\d+)P([-+]?\d+\.?\d*);?")
-ENTRY = re.compile(r"([ASL])(\d+)P([-+]?\d+\.?\d*)")
+RECORD = re.compile(r"N(\d{1,6})(?:Q\d)?((?:[ASL]\d{1,3}[PM][-+]?\d{1,12}\.?\d*)+);?")
+PLAIN = re.compile(r"N(\d{1,6})(?:Q\d)?P([-+]?\d{1,12}\.?\d*);?")
+ENTRY = re.compile(r"([ASL])(\d+)[PM]([-+]?\d+\.?\d*)")
+POINT = re.compile(r"\s*(\d{1,6})\s*[,;\s]\s*([-+]?\d{1,6})\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,13 +62,13 @@ def pitch_text(pitch: Pitch) -> bytes:
 
 def read_increments(remarks: Remarks) -> tuple[int, NDArray[np.int64]]:
     """The number of the first point, and the increments."""
-    rows = [(line, row) for line, row in enumerate(remarks.rows, 1) if row.strip() and not row.startswith("#")]
-    if not rows or rows[0][1].strip() != HEAD:
+    rows = [(line, row) for line, row in enumerate(remarks.rows, 1) if row.split("#", 1)[0].strip()]
+    if not rows or rows[0][1].replace(" ", "").lower() != HEAD:
         remarks.refuse(rows[0][0] if rows else 0, f"should begin with {HEAD}")
         return 0, np.zeros(0, dtype=np.int64)
     found: list[tuple[int, int]] = []
     for line, row in rows[1:]:
-        match = re.fullmatch(r"\s*(\d+)\s*,\s*([-+]?\d+)\s*", row)
+        match = POINT.fullmatch(row.split("#", 1)[0])
         if match is None:
             remarks.refuse(line, "not a point number, a comma and a whole number")
             continue
@@ -112,7 +113,7 @@ class Record:
 
 def read_records(remarks: Remarks) -> tuple[Record, ...]:
     """The records of a punched parameter file."""
-    rows = [(line, row.strip()) for line, row in enumerate(remarks.rows, 1) if row.strip()]
+    rows = [(line, "".join(row.split()).upper()) for line, row in enumerate(remarks.rows, 1) if row.strip()]
     if len(rows) < 2 or rows[0][1] != "%" or rows[-1][1] != "%":
         remarks.refuse(0, "should begin and end with a line %")
     found = []

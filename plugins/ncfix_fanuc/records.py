@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from string import Formatter
 from typing import Any
 
 import numpy as np
@@ -13,9 +16,19 @@ from numpy.typing import NDArray
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
+from ncfix_fanuc import json_values
+from ncfix_fanuc.json_values import SMALLEST
+from ncfix_fanuc.units import SIGNS
 
 POINTS = 24
 """Of one record."""
+SIDE = 25
+"""Along an axis."""
+MOST_MAGNIFICATION = 100
+MOST_NUMBER = 99_999_999
+FIELDS = ("no", "dx", "dy", "dz", "x", "y", "z")
+FORM = re.compile(r"[+0 -]?\d{0,2}(?:\.\d)?[dfg]?")
+"""How a number of a template may be written."""
 NAME, TABLE, TEXT = "volume.json", "volume.csv", "volume-ASSUMED.txt"
 
 
@@ -141,7 +154,7 @@ def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
     remarks = Remarks.of(NAME, files.get(NAME, b""))
     try:
         volc = _volc(json.loads(files.get(NAME, b"")), remarks)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, RecursionError) as error:
         remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
         return None, remarks
     if volc is not None and files.get(TABLE) != csv_text(volc):
@@ -151,41 +164,63 @@ def read_volc(files: Files) -> tuple[Volc | None, Remarks]:
     return volc, remarks
 
 
-def _volc(found: Mapping[str, Any], remarks: Remarks) -> Volc | None:
-    counts = tuple(int(count) for count in found["counts"])
+def _volc(found: Any, remarks: Remarks) -> Volc | None:
+    records = json_values.records(found)
+    style = _style(found, remarks)
+    counts = tuple(json_values.wholes(found, "counts"))
     rows: list[int] = []
-    style = Style(int(found["first_number"]), str(found["order"]), int(found["largest"]), str(found["template"]))
-    style = replace(style, home_minus=str(found.get("home_minus", "")))
-    if not set(style.home_minus) <= set("XYZ"):
-        remarks.refuse(0, f"home_minus is {style.home_minus!r}", "axes of X, Y and Z")
-    if sorted(style.order) != ["X", "Y", "Z"]:
-        remarks.refuse(0, f"the order of the axes is {style.order!r}", "XYZ, ZYX, ...")
-    for record in found["records"]:
-        _check_record(record, len(rows) // 3 + style.first, remarks)
-        rows += [int(value) for value in record["data"]]
-    if found["sign"] not in ("correction", "error"):
+    for record in records:
+        rows += _data(record, len(rows) // 3 + style.first, remarks)
+    if found["sign"] not in SIGNS:
         remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
-    if len(counts) != 3 or not all(2 <= count <= 25 for count in counts):
-        remarks.refuse(0, f"counts {counts}: 2 to 25 points along each of three axes")
-    elif len(rows) != 3 * int(np.prod(counts)):
-        remarks.refuse(0, f"{len(rows)} values in the records, {3 * int(np.prod(counts))} expected of {counts}")
+    if len(counts) != 3 or not all(2 <= count <= SIDE for count in counts):
+        remarks.refuse(0, f"counts {counts}: 2 to {SIDE} points along each of three axes")
+    elif len(rows) != 3 * math.prod(counts):
+        remarks.refuse(0, f"{len(rows)} values in the records, {3 * math.prod(counts)} expected of {counts}")
     if any(abs(value) > style.largest for value in rows):
         remarks.refuse(0, f"a value beyond -{style.largest} to {style.largest}")
-    low, step = (tuple(float(value) for value in found[key]) for key in ("first_mm", "interval_mm"))
-    if len(low) != 3 or len(step) != 3 or not all(value > 0 for value in step):
-        remarks.refuse(0, "three first positions and three intervals above zero are needed")
+    low, step = json_values.reals(found, "first_mm", 3), json_values.reals(found, "interval_mm", 3, SMALLEST)
+    unit = json_values.real(found, "detection_unit_um", 1e-6, 10) / 1000
+    magnification = json_values.whole(found, "magnification", 1, MOST_MAGNIFICATION)
     if remarks.wrong:
         return None
     slowest = ["XYZ".index(axis) for axis in reversed(style.order)]
     stacked = np.array(rows, dtype=np.int64).reshape(*(counts[axis] for axis in slowest), 3)
     values = stacked.transpose(*np.argsort(slowest), 3)
-    unit, magnification = float(found["detection_unit_um"]) / 1000, int(found["magnification"])
     return Volc(found["sign"], low, step, unit, magnification, values, style)
 
 
-def _check_record(record: Mapping[str, Any], first: int, remarks: Remarks) -> None:
-    size = len(record["data"])
+def _style(found: Mapping[str, Any], remarks: Remarks) -> Style:
+    first, largest = (
+        json_values.whole(found, key, low, MOST_NUMBER) for key, low in (("first_number", 0), ("largest", 1))
+    )
+    order, template = json_values.text(found, "order"), json_values.text(found, "template")
+    home_minus = json_values.text({"home_minus": "", **found}, "home_minus")
+    if sorted(order) != ["X", "Y", "Z"]:
+        remarks.refuse(0, f"the order of the axes is {order!r}", "XYZ, ZYX, ...")
+    if not set(home_minus) <= set("XYZ"):
+        remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
+    if template:
+        check_template(template)
+    return Style(first, order, largest, template, home_minus)
+
+
+def check_template(template: str) -> None:
+    """Raise ValueError for a line that cannot be filled in, or says too little."""
+    names = [(name, form) for _, name, form, _ in Formatter().parse(template) if name is not None]
+    for name, form in names:
+        if name not in FIELDS or not FORM.fullmatch(form or ""):
+            raise ValueError(f"{{{name}}} with {form!r} is not known: {', '.join(FIELDS)}")
+    if not {"dx", "dy", "dz"} <= {name for name, _ in names}:
+        raise ValueError("it needs {dx}, {dy} and {dz}")
+    template.format(no=1, dx=1, dy=1, dz=1, x=0.0, y=0.0, z=0.0)
+
+
+def _data(record: Mapping[str, Any], first: int, remarks: Remarks) -> list[int]:
+    data = json_values.wholes(record, "data")
+    size = len(data)
     if record["start_no"] != first or record["num"] != size or size > 3 * POINTS:
         remarks.refuse(0, f"the record of point {record['start_no']} has {size} values and says {record['num']}")
     if record["end_no"] != first + size // 3 - 1:
         remarks.refuse(0, f"the record of point {record['start_no']} ends at {record['end_no']}")
+    return data

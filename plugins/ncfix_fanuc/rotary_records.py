@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.diagnostics import RefusedError
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
-from ncfix_fanuc.units import DEGREE, sense_of
+from ncfix_fanuc import json_values
+from ncfix_fanuc.json_values import SMALLEST
+from ncfix_fanuc.units import DEGREE, SIGNS, sense_of
 
 SIDE = 25
+MOST_MAGNIFICATION = 10_000
 MOST_ROTARY = 400
 LARGEST = 127
 ANGLES = ("A", "B", "C")
@@ -79,6 +83,9 @@ class Lattice:
         factors, whole = [], []
         for grid, unit in zip(grids, units, strict=True):
             factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST * unit) - 1e-9)))
+            if factors[-1] > MOST_MAGNIFICATION:
+                text = f"a value needs a magnification of {factors[-1]}, and {MOST_MAGNIFICATION} is the most"
+                raise RefusedError.of("NCF484", text, hint="a larger detection unit, or is the error in mm and rad?")
             whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
         inputs = grids[0].inputs
         lines = [line / _unit(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
@@ -128,50 +135,73 @@ def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | Non
     remarks = Remarks.of(name, content)
     try:
         return _checked(json.loads(content), remarks, linear), remarks
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, RecursionError) as error:
         remarks.refuse(0, f"is not what ncfix writes: {type(error).__name__}: {error}")
     return None, remarks
 
 
-def _checked(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> Lattice | None:
-    counts = tuple(int(count) for count in found["counts"])
-    inputs = LINEAR if linear else tuple(str(axis) for axis in found["axes"])
+def _checked(found: Any, remarks: Remarks, linear: bool) -> Lattice | None:
+    records = json_values.records(found)
+    counts, inputs = tuple(json_values.wholes(found, "counts")), _inputs(found, remarks, linear)
     words = ("three", SIDE) if linear else ("one or two", MOST_ROTARY)
-    if found["sign"] not in ("correction", "error"):
+    if found["sign"] not in SIGNS:
         remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
-    if not linear and not (len(inputs) in (1, 2) and set(inputs) <= set(ANGLES)):
-        remarks.refuse(0, f"the axes are {' '.join(inputs)}", "one or two of A, B and C")
     if len(counts) != len(inputs) or not all(2 <= count <= words[1] for count in counts):
         remarks.refuse(0, f"counts {counts}: 2 to {words[1]} points along each of {words[0]} axes")
-    _check_records(found["records"], counts, remarks)
+    rows = {key: [json_values.wholes(record, key) for record in records] for key in ("lin", "rot")}
+    _check_records(records, rows, counts, remarks)
     if remarks.wrong:
         return None
     order = [*reversed(range(len(counts))), len(counts)]
-    parts = []
-    for key in ("lin", "rot"):
-        rows = np.array([record[key] for record in found["records"]], dtype=np.int64)
-        parts.append(rows.reshape(*counts[::-1], 3).transpose(order))
-    end = "mm" if linear else "deg"
-    low, step = (tuple(float(value) for value in found[f"{key}_{end}"]) for key in ("first", "interval"))
-    units = (float(found["detection_unit_um"]) / 1000, float(found["detection_unit_deg"]) * DEGREE)
-    scale = Scale(found["sign"], units, (int(found["magnification"]), int(found["angle_magnification"])))
-    centre = () if linear else tuple(float(value) for value in found["centre_mm"])
-    if not linear and len(centre) != 3:
-        remarks.refuse(0, "centre_mm should be three lengths")
-    if not len(low) == len(step) == len(inputs) or not all(value > 0 for value in step):
-        remarks.refuse(0, "a first position and an interval above zero are needed for each axis")
-    home_minus = str(found.get("home_minus", ""))
+    lin, rot = (np.array(rows[key], dtype=np.int64).reshape(*counts[::-1], 3).transpose(order) for key in rows)
+    return Lattice(inputs, *_ends(found, inputs), _scale(found), lin, rot, *_rest(found, remarks, linear))
+
+
+def _inputs(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[str, ...]:
+    if linear:
+        return LINEAR
+    axes = found["axes"]
+    if not isinstance(axes, list) or len(axes) not in (1, 2) or any(axis not in ANGLES for axis in axes):
+        remarks.refuse(0, f"the axes are {axes}", "one or two of A, B and C")
+        return ()
+    return tuple(axes)
+
+
+def _ends(found: Mapping[str, Any], inputs: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    end = "mm" if inputs == LINEAR else "deg"
+    low = json_values.reals(found, f"first_{end}", len(inputs))
+    return low, json_values.reals(found, f"interval_{end}", len(inputs), SMALLEST)
+
+
+def _scale(found: Mapping[str, Any]) -> Scale:
+    length, angle = (json_values.real(found, key, 1e-6, 10) for key in ("detection_unit_um", "detection_unit_deg"))
+    keys = ("magnification", "angle_magnification")
+    lengths, angles = (json_values.whole(found, key, 1, MOST_MAGNIFICATION) for key in keys)
+    return Scale(found["sign"], (length / 1000, angle * DEGREE), (lengths, angles))
+
+
+def _rest(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[tuple[float, ...], str]:
+    """The centre of a table's turns, or the way home of the linear axes."""
+    if not linear:
+        return json_values.reals(found, "centre_mm", 3), ""
+    home_minus = json_values.text({"home_minus": "", **found}, "home_minus")
     if not set(home_minus) <= set(LINEAR):
         remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
-    return None if remarks.wrong else Lattice(inputs, low, step, scale, parts[0], parts[1], centre, home_minus)
+    return (), home_minus
 
 
-def _check_records(records: list[Mapping[str, Any]], counts: tuple[int, ...], remarks: Remarks) -> None:
+def _check_records(
+    records: Sequence[Mapping[str, Any]],
+    rows: Mapping[str, list[list[int]]],
+    counts: tuple[int, ...],
+    remarks: Remarks,
+) -> None:
     if [record["no"] for record in records] != list(range(1, len(records) + 1)):
         remarks.refuse(0, "the records are not numbered 1, 2, 3, ...")
-    if len(records) != int(np.prod(counts)):
-        remarks.refuse(0, f"{len(records)} records, {int(np.prod(counts))} expected of {counts}")
-    if any(len(record[key]) != 3 for record in records for key in ("lin", "rot")):
+    if len(records) != math.prod(counts):
+        remarks.refuse(0, f"{len(records)} records, {math.prod(counts)} expected of {counts}")
+    values = [row for part in rows.values() for row in part]
+    if any(len(row) != 3 for row in values):
         remarks.refuse(0, "a record without three lengths and three angles")
-    if any(abs(int(value)) > LARGEST for record in records for key in ("lin", "rot") for value in record[key]):
+    if any(abs(value) > LARGEST for row in values for value in row):
         remarks.refuse(0, f"a value beyond -{LARGEST} to {LARGEST}")

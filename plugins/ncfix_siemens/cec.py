@@ -14,6 +14,7 @@ from ncfix_siemens.table import PLACES, Table, number
 
 FIELDS = ("INPUT_AXIS", "OUTPUT_AXIS", "STEP", "MIN", "MAX", "DIRECTION", "MULT_BY_TABLE", "IS_MODULO")
 NEEDED = FIELDS[:5]
+LINKS = ("INPUT_NCU", "OUTPUT_NCU")
 VALUE = "AN_CEC"
 STEEP = 0.01
 """mm per mm: no machine errs that fast."""
@@ -70,6 +71,9 @@ def read_cec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
 def _sort(each: Assignment, found: dict[int, Assigned], remarks: Remarks) -> None:
     name = each.name.upper()
     field = name.removeprefix(f"{VALUE}_")
+    if field in LINKS:
+        remarks.doubt(each.line, f"${each.name}: axes of other control units are not followed")
+        return
     wanted = 2 if name == VALUE else 1
     if name != VALUE and field not in FIELDS:
         remarks.refuse(each.line, f"${each.name} is not a variable of these tables")

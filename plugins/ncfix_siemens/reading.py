@@ -36,11 +36,11 @@ def read_folder(files: Files) -> Folder:
     said: dict[str, str] = {}
     remarks = []
     for name, content in sorted(files.items()):
-        found = Remarks.of(name, content)
+        found = Remarks.of(name, content, ";")
         remarks.append(found)
         if b"\r\n" in content and content.count(b"\r\n") < content.count(b"\n"):
             found.doubt(0, "lines end in two ways", "LF or CR LF, but not both")
-        lines = parsed(content.decode("latin-1"))
+        lines = parsed("\n".join(found.rows))
         said |= settings(lines)
         tables = read_eec(lines, found) if VALUE_FILES["eec"] in content.upper() else read_cec(lines, found)
         (eec if VALUE_FILES["eec"] in content.upper() else cec).extend(tables)

@@ -90,7 +90,7 @@ BROKEN = {
     "too large": (lambda found: found["records"][0]["data"].__setitem__(0, 128), "beyond -127 to 127"),
     "too many points": (lambda found: found.update(counts=[26, 2, 2]), "2 to 25 points"),
     "one point": (lambda found: found.update(counts=[1, 2, 4]), "2 to 25 points"),
-    "no interval": (lambda found: found.update(interval_mm=[0, 400, 300]), "intervals above zero"),
+    "no interval": (lambda found: found.update(interval_mm=[0, 400, 300]), "interval_mm is 0, not a number"),
     "no sign": (lambda found: found.update(sign=""), "the sign is"),
     "a wrong number": (lambda found: found["records"][0].update(start_no=2), "record of point 2"),
     "another value than the CSV": (

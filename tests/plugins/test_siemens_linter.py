@@ -38,7 +38,7 @@ WRONG = {
     "inches": (GOOD.replace(b"CHANDATA", b"INCH\nCHANDATA"), "INCH"),
     "cut off": (GOOD.removesuffix(b"M17\n"), "does not end with M17"),
     "more after the end": (GOOD + ONE, "stands after the end"),
-    "not ASCII": (GOOD.replace(b"; ncfix", "; µm\n; ncfix".encode()), "not ASCII"),
+    "not ASCII": (GOOD.replace(b"0.003", b"0.003\xa0"), "not ASCII"),
     "no sign": (GOOD.replace(b"value_sign=error ", b""), "errors or corrections (value_sign)"),
     "what products add unsaid": (PAIR.replace(b"product_terms=only ", b""), "what a product adds (product_terms)"),
     "too many tables": (PAIR.replace(b"most_tables=40", b"most_tables=1"), "2 tables, and the control has 1"),
@@ -51,6 +51,9 @@ WRONG = {
     "EEC: no axis": (EEC.replace(b"[0,1,AX1]", b"[0,1]"), "encoder, number and axis"),
 }
 DOUBTFUL = {
+    "not ASCII in a comment": (GOOD.replace(b"; ncfix", "; µm\n; ncfix".encode()), "not ASCII"),
+    "a byte order mark": (b"\xef\xbb\xbf" + GOOD, "byte order mark"),
+    "an axis of another control unit": (GOOD.replace(b"M17", b"$AN_CEC_INPUT_NCU[0]=1\nM17"), "control units"),
     "no header": (GOOD.replace(b"%_N_NC_CEC_INI\n", b""), "does not name the file"),
     "assigned twice": (GOOD.replace(b"$AN_CEC_INPUT", b"$AN_CEC[0,1]=0.0\n$AN_CEC_INPUT"), "keeps the last"),
     "ends that differ": (GOOD.replace(b"MODULO[0]=0", b"MODULO[0]=1"), "ends on another value than it begins"),

@@ -2,9 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import re
 from dataclasses import dataclass, field
 
 from ncfix.diagnostics import ConfigError, Message, Place
+
+NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+BYTE_ORDER = "\u00ef\u00bb\u00bf"
+"""The mark at the beginning of some UTF-8 files, taken as Latin-1."""
+
+
+def as_number(text: str) -> float | None:
+    """A decimal number as controls write it, finite; None for anything else."""
+    if not NUMBER.fullmatch(text):
+        return None
+    found = float(text)
+    return found if math.isfinite(found) else None
 
 
 @dataclass(slots=True)
@@ -17,12 +31,17 @@ class Remarks:
     doubtful: list[Message] = field(default_factory=list)
 
     @classmethod
-    def of(cls, path: str, content: bytes) -> Remarks:
-        """An empty list for a file; a byte that is not ASCII is noted, once."""
-        remarks = cls(path, content.decode("latin-1").splitlines())
+    def of(cls, path: str, content: bytes, comment: str = "") -> Remarks:
+        """An empty list for a file; a byte that is not ASCII is noted, once: after `comment` it is only doubtful."""
+        text = content.decode("latin-1")
+        remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)))
+        if text.startswith(BYTE_ORDER):
+            remarks.doubt(1, "begins with a byte order mark", "controls read plain ASCII")
         for number, row in enumerate(remarks.rows, 1):
             if not row.isascii():
-                remarks.refuse(number, "a character that is not ASCII", "controls read plain ASCII")
+                inside = comment and row.split(comment, 1)[0].isascii()
+                note = remarks.doubt if inside else remarks.refuse
+                note(number, "a character that is not ASCII", "controls read plain ASCII")
                 break
         return remarks
 
@@ -46,3 +65,9 @@ class Remarks:
 
     def _place(self, line: int) -> Place:
         return Place(self.path, line, 0, self.rows[line - 1] if 0 < line <= len(self.rows) else "")
+
+
+def _rows(text: str) -> list[str]:
+    """The lines, whether they end in LF, CR LF or CR."""
+    rows = re.split("\r\n|\n|\r", text)
+    return rows if rows[-1] else rows[:-1]

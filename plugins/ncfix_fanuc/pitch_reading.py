@@ -1,0 +1,88 @@
+"""Stored pitch errors as the control sums them up, read back from their files, with remarks on what does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ncfix.tables.control import Files
+from ncfix.tables.grid import Array, Grid
+from ncfix.tables.lines import Remarks, as_number
+from ncfix.tables.neutral import Term
+from ncfix_fanuc.pitch_text import NUMBERS, Pitch, read_increments, read_records
+from ncfix_fanuc.units import DEGREE, SIGNS, sense_of
+
+PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
+MOST_MAGNIFICATION = 100
+FAR = 1e6
+"""mm or degree: no interval is that long."""
+
+
+def read_pitches(files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
+    """The tables of all axes, with remarks on every file."""
+    head = Remarks.of(SETTINGS, files.get(SETTINGS, b""))
+    words = " ".join(head.rows).split()
+    units = [as_number(word) or 0.0 for word in words[1:3]]
+    if len(words) != 4 or words[0] not in SIGNS or not all(1e-6 <= unit <= 10 for unit in units):
+        head.refuse(0, "should hold the sign, two detection units and the axes", "PITCH-1")
+        return (), [head]
+    parameters = Remarks.of(PARAMETERS, files.get(PARAMETERS, b""))
+    values = {record.number: dict(record.values) for record in read_records(parameters)}
+    remarks, terms = [head, parameters], []
+    for name in sorted(files):
+        if name.startswith("pitch_") and name.endswith(".csv"):
+            axis = name[len("pitch_") : -len(".csv")]
+            found = Remarks.of(name, files[name])
+            remarks.append(found)
+            pitch = _pitch(found, axis, words[3], values)
+            if pitch is not None and not found.wrong:
+                unit = units[1] * DEGREE if axis in "ABC" else units[0] / 1000
+                terms.append(Term((_grid(pitch, sense_of(words[0]) * unit),)))
+    return tuple(terms), remarks
+
+
+def _pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[int, str]]) -> Pitch | None:
+    first, increments = read_increments(remarks)
+    index = axes.find(axis) + 1
+    if len(axis) != 1 or not index:
+        remarks.refuse(0, f"{axis} is none of the axes {axes}")
+        return None
+    try:
+        found = {name: float(values[number][index]) for name, number in NUMBERS.items()}
+    except KeyError:
+        remarks.refuse(0, f"{PARAMETERS} has not all parameters of axis {index}")
+        return None
+    last = first + len(increments) - 1
+    _check(remarks, found, first, last)
+    if found["turn"] and increments.sum() != 0:
+        remarks.refuse(0, f"the increments of a turn add up to {increments.sum()}, not to zero")
+    if remarks.wrong:
+        return None
+    reference, magnification = int(found["reference"]), int(found["magnification"])
+    return Pitch(axis, first, increments, reference, magnification, found["interval"], found["turn"])
+
+
+def _check(remarks: Remarks, found: Mapping[str, float], first: int, last: int) -> None:
+    if (found["low"], found["high"]) != (first, last):
+        remarks.refuse(0, f"points {first} to {last}, and the parameters say {found['low']:g} to {found['high']:g}")
+    if found["interval"] == 0:
+        remarks.refuse(0, "an interval of zero")
+    elif not 0 < found["interval"] <= FAR:
+        remarks.refuse(0, f"an interval of {found['interval']:g}")
+    if found["magnification"] not in range(MOST_MAGNIFICATION + 1):
+        remarks.refuse(0, f"a magnification of {found['magnification']:g}", f"0 to {MOST_MAGNIFICATION}")
+    if found["reference"] not in range(100_000):
+        remarks.refuse(0, f"a reference position at point {found['reference']:g}")
+    elif not first <= found["reference"] <= last:
+        remarks.doubt(0, "the reference position is outside the points")
+
+
+def _grid(pitch: Pitch, unit: float) -> Grid:
+    sums = np.cumsum(pitch.increments)
+    at_zero = int(np.clip(pitch.reference - pitch.first, 0, len(sums) - 1))
+    scale = DEGREE if pitch.axis in "ABC" else 1.0
+    counts = np.arange(pitch.first - pitch.reference, pitch.last - pitch.reference + 1, dtype=np.float64)
+    nodes: Array = pitch.interval * scale * counts
+    values = (sums - sums[at_zero]) * pitch.magnification * unit
+    return Grid((pitch.axis,), (nodes,), (pitch.axis,), values[:, None].astype(np.float64), (bool(pitch.turn),))
