@@ -80,7 +80,7 @@ def fix_program(
 
     proof = proven(program, attempt, follow)
     suspicion = suspected(proof.settled, machine.least_increment[0], program.path, options.force)
-    errors = _errors(on_machine, proof.settled) if options.verify else None
+    errors = _errors(on_machine, proof.settled, options.split_rapids) if options.verify else None
     if errors is not None:
         _check_sane(program, proof.settled, errors)
     report = _report(program, machine, followed, proof.settled, errors, options)
@@ -120,11 +120,12 @@ def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: t
     return words[: (program.dialect.line_limit or 250) - 10]
 
 
-def _errors(machine: Machine, settled: Settled) -> PathError:
+def _errors(machine: Machine, settled: Settled, split_rapids: bool) -> PathError:
     """Tip errors before and after, with the numbers as the control will understand them."""
     emission = settled.emission
     pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
-    return path_error(machine, settled.moves, pieces, emission.start, tilts=False, known=settled.plan.known)
+    rows, known = settled.shown(split_rapids), settled.plan.known
+    return path_error(machine, settled.moves, pieces, emission.start, rows=rows, tilts=False, known=known)
 
 
 def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:

@@ -68,6 +68,11 @@ class Settled:
     kept: Mask
     reasons: dict[int, Reason]
 
+    def shown(self, rapids: bool) -> Mask:
+        """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them."""
+        shown: Mask = self.moves.cuts & ~self.kept
+        return shown | (rapids & (self.moves.kind == Kind.RAPID) & ~self.kept)
+
     @property
     def shift(self) -> Array:
         """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""

@@ -16,7 +16,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners
 from ncfix.compensate.sampling import interior, merged
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.moves import Kind, Moves
 
 LEAST = 4
 """Fewest samples between the ends of a motion."""
@@ -92,10 +92,10 @@ def tip_error(machine: Machine, moves: Moves, state: State = State()) -> TipErro
 def samples(intent: Intent) -> tuple[Index, Array]:
     """Where to look: motions and fractions, ends included, as densely as the error model may bend."""
     moves = intent.moves
-    known = np.isfinite(moves.end).all(axis=1) & (moves.rule != Rule.PASS)
-    cut = ((moves.kind == Kind.FEED) | (moves.kind == Kind.ARC)) & np.isfinite(moves.start).all(axis=1)
-    along = np.flatnonzero(known & cut)
-    at_end = np.flatnonzero(known & (moves.kind == Kind.CYCLE))
+    known = np.isfinite(moves.end).all(axis=1) & moves.cuts
+    hole = moves.kind == Kind.CYCLE
+    along = np.flatnonzero(known & ~hole & np.isfinite(moves.start).all(axis=1))
+    at_end = np.flatnonzero(known & hole)
     counts, between = interior(intent, intent.segments, along, DENSITY, LEAST)
     each, ends = np.arange(len(along)), np.ones(len(along))
     counts, fraction = merged(len(along), (owners(counts), between), (each, 0 * ends), (each, ends))
@@ -107,9 +107,8 @@ def samples(intent: Intent) -> tuple[Index, Array]:
 def unseen(moves: Moves) -> Index:
     """The motions that cut and cannot be looked at, since where they begin or end is not known."""
     ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
-    drawn = (moves.kind == Kind.FEED) | (moves.kind == Kind.ARC)
-    lost = np.where(drawn, ~(ends & starts), ~ends)
-    return np.flatnonzero((drawn | (moves.kind == Kind.CYCLE)) & (moves.rule != Rule.PASS) & lost)
+    lost = np.where(moves.kind == Kind.CYCLE, ~ends, ~(ends & starts))
+    return np.flatnonzero(moves.cuts & lost)
 
 
 def batches(n: int) -> list[slice]:

@@ -215,7 +215,7 @@ class Corrector:
             pieces,
             emission.start,
             state=State() if unit.head is None else State(direction=unit.direction),
-            rows=own & ~settled.kept,
+            rows=own & settled.shown(self.task.options.split_rapids),
             tilts=False,
             known=settled.plan.known,
         )

@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import solve
-from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.moves import Moves, Rule
 
 SQUARE = 1 - 1e-9
 """An axis that makes no smaller a component of a unit normal is square to its plane."""
@@ -34,8 +34,7 @@ def stays(moves: Moves, kept: Mask, shift: Array, before: Array | None) -> Mask:
 
 def left_in_cuts(moves: Moves) -> dict[str, Index]:
     """Axis letter -> motions that cut and may be corrected, but not along that linear axis."""
-    cuts = (moves.kind == Kind.FEED) | (moves.kind == Kind.ARC) | (moves.kind == Kind.CYCLE)
-    lacking = moves.wordless & (cuts & (moves.rule == Rule.CORRECT))[:, None]
+    lacking = moves.wordless & (moves.cuts & (moves.rule == Rule.CORRECT))[:, None]
     columns = np.flatnonzero(lacking.any(axis=0) & ~moves.rotary)
     return {moves.axes[column]: np.flatnonzero(lacking[:, column]) for column in columns}
 

@@ -165,6 +165,12 @@ class Moves:
         return wordless
 
     @property
+    def cuts(self) -> NDArray[np.bool_]:
+        """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
+        cuts: NDArray[np.bool_] = (self.kind != Kind.RAPID) & (self.kind != Kind.DWELL) & (self.rule != Rule.PASS)
+        return cuts
+
+    @property
     def moved(self) -> NDArray[np.bool_]:
         """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
         all_axes = (self.rule == Rule.PASS) & (self.kind != Kind.DWELL) & ~self.programmed.any(axis=1)
