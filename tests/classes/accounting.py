@@ -77,11 +77,15 @@ STORED = re.compile(r".*?__[0-9a-f]{6}_(?P<name>.*)", re.DOTALL)
 
 def beside(folder: Path) -> Callable[[str], bytes | None]:
     """The text of a subprogram by the name by which programs call it: a file of the folder."""
-    names = {(found["name"] if (found := STORED.fullmatch(path.name)) else path.name): path for path in folder.iterdir()}
+    names = {
+        (found["name"] if (found := STORED.fullmatch(path.name)) else path.name): path for path in folder.iterdir()
+    }
     return lambda name: names[name].read_bytes() if name in names else None
 
 
-def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False, only: str = "") -> Account:
+def account(
+    folder: Path, dialect: str, machine: Machine, *, flat: bool = False, only: str = "", setup: Setup = SETUP
+) -> Account:
     """Correct every program of a folder, or one of them, and keep the books; subprograms are found in the folder."""
     books = Account()
     fix = fix_flat if flat else fix_program
@@ -96,7 +100,7 @@ def account(folder: Path, dialect: str, machine: Machine, *, flat: bool = False,
             books.files["of another family" if error.messages[0].code in FOREIGN else "unreadable"] += 1
             continue
         try:
-            report = fix(program, machine, SETUP, FixOptions(verify=False, tolerance_um=5.0), resolve).report
+            report = fix(program, machine, setup, FixOptions(verify=False, tolerance_um=5.0), resolve).report
         except NcfixError as error:
             books.files["not followed"] += 1
             books.stopped[f"{error.messages[0].code} {error.messages[0].text}"] += 1
