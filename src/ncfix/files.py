@@ -14,6 +14,15 @@ from pathlib import Path
 
 from ncfix.diagnostics import Place, SourceError, UsageError
 
+READING = {errno.EACCES: "get the right to read it", errno.EISDIR: "name a file, not a folder"}
+WRITING = {
+    errno.EACCES: "another -o, or the right to write there",
+    errno.EROFS: "another -o",
+    errno.ENAMETOOLONG: "a shorter name",
+    errno.ENOTDIR: "another -o: a part of this path is a file",
+}
+"""What to do about what the system says."""
+
 
 def read_bytes(path: str) -> bytes:
     """The content of a file; raises `SourceError` NCF002."""
@@ -26,12 +35,14 @@ def read_bytes(path: str) -> bytes:
 
 def unreadable(path: str, error: OSError) -> SourceError:
     """The error NCF002 for what the system says of an input."""
-    return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), "give an existing file's path")
+    hint = READING.get(error.errno or 0, "give an existing file's path")
+    return SourceError.of("NCF002", f"cannot be read: {error.strerror}", Place(path), hint)
 
 
 def unwritable(path: str, error: OSError) -> UsageError:
     """The error NCF007 for what the system says of an output."""
-    return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), "make room, or another -o")
+    hint = WRITING.get(error.errno or 0, "make room, or another -o")
+    return UsageError.of("NCF007", f"cannot be written: {error.strerror}", Place(path), hint)
 
 
 def exists_already(path: str) -> UsageError:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import pytest
 
 from ncfix.batch.gathering import gathered
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import SourceError, UsageError
 
 
 @pytest.fixture
@@ -40,3 +42,16 @@ def test_a_folder_without_programs_is_refused(tmp_path: Path) -> None:
         gathered([str(tmp_path)])
     assert caught.value.code == "NCF014"
     assert ".nc" in str(caught.value)
+
+
+def test_a_folder_that_cannot_be_read_is_not_passed_over(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scan = os.scandir
+
+    def locked(path: str) -> object:
+        if str(path).endswith("deep"):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", locked)
+    with pytest.raises(SourceError, match=r"deep: NCF002: cannot be read: Permission denied"):
+        gathered([str(folder)])

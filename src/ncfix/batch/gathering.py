@@ -6,6 +6,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
+from ncfix import files
 from ncfix.diagnostics import Place, UsageError
 from ncfix.plugins import registry
 
@@ -28,7 +29,8 @@ def gathered(given: Iterable[str], apart: str | None = None) -> list[Gathered]:
     apart  a folder that is left out: that of the outputs
 
     A file in a folder is a program if it has a suffix of a dialect. Hidden files and folders, symbolic links and
-    `.orig` files are none. Raises `UsageError` NCF014 for a folder without any.
+    `.orig` files are none. Raises `UsageError` NCF014 for a folder without any, `SourceError` NCF002 for one that
+    cannot be read.
     """
     found: list[Gathered] = []
     for path in given:
@@ -51,9 +53,13 @@ def _below(folder: str, apart: str | None) -> list[Gathered]:
 
 
 def _files(folder: str, apart: str | None) -> Iterator[str]:
-    for here, folders, names in os.walk(folder):
+    for here, folders, names in os.walk(folder, onerror=_unreadable):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and not _same(here, name, apart))
         yield from (os.path.join(here, name) for name in sorted(names) if not name.startswith("."))
+
+
+def _unreadable(error: OSError) -> None:
+    raise files.unreadable(str(error.filename), error) from error
 
 
 def _same(here: str, name: str, apart: str | None) -> bool:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Place
+from ncfix.files import READING
 from ncfix.machine import topology
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad, Vector
 from ncfix.machine.effect import Effect
@@ -40,7 +41,8 @@ def load(path: str | Path) -> Machine:
             source = handle.read()
     except OSError as error:
         text = f"cannot read the machine file: {error.strerror}"
-        raise ConfigError.of("NCF300", text, Place(str(path)), "give an existing file's path") from error
+        hint = READING.get(error.errno or 0, "give an existing file's path")
+        raise ConfigError.of("NCF300", text, Place(str(path)), hint) from error
     return loads(source, str(path))
 
 

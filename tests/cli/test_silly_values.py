@@ -1,0 +1,68 @@
+"""What nobody should type, and scripts do: empty names, misspelled verbs, values of the wrong kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from cli.conftest import Ncfix, Shop
+
+SILLY = [
+    (["fiix"], 2, "NCF001: there is no verb 'fiix'; did you mean 'fix'?"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o"], 2, "hint: ncfix fix --help"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", ""], 2, "NCF003: the name of the output is empty"),
+    (["fix", "part.ngc", "-m", "", "-o", "a"], 3, "'': NCF300: cannot read the machine file: No such file"),
+    (["fix", "", "-m", "machine.toml", "-o", "a"], 3, "'': NCF002: cannot be read: No such file"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--setup", ""], 3, "'': NCF002"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool-table", ""], 3, "'': NCF002"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool", "-5=1"], 2, "'-5' is not a tool number"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tool", "5=1_0"], 2, "'1_0' is not a number"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=a"], 2, "'' is not a number"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--offset", "G54=1;2"], 2, "'1;2' is not a number"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a", "--tolerance-um", "nan"], 2, "not a number above zero"),
+    (["fix", "part.ngc", "-m", "machine.toml", "-o", "a\0b"], 2, "NCF001: an argument has a NUL character"),
+    (["check", "nothing.ngc"], 3, "nothing.ngc: NCF002: cannot be read: No such file"),
+    (["machine", "check", "."], 3, "hint: name a file, not a folder"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "code", "said"), SILLY)
+def test_silly_values_are_refused(
+    shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch, arguments: list[str], code: int, said: str
+) -> None:
+    monkeypatch.chdir(shop.folder)
+    before = {path: path.read_bytes() for path in Path().iterdir()}
+    result = ncfix(*arguments)
+    assert said in result.err
+    assert result.code == code
+    assert "NCF000" not in result.err
+    assert {path: path.read_bytes() for path in Path().iterdir()} == before
+
+
+def test_every_message_in_json_has_a_hint(shop: Shop, ncfix: Ncfix) -> None:
+    shop.machine.write_text("x = 1\n")
+    result = ncfix("machine", "check", shop.machine, "--json")
+    assert result.code == 3
+    assert all(message["hint"] for message in result.json()["errors"])
+
+
+def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix.cli import job
+
+    other = shop.folder / "other.ngc"
+    other.write_bytes(shop.program.read_bytes())
+    whole = job.Job._whole
+
+    def broken(self: job.Job, source: job.Source, *rest: object) -> object:
+        if source.path.endswith("part.ngc"):
+            raise KeyError("nobody foresaw this")
+        return whole(self, source, *rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(job.Job, "_whole", broken)
+    arguments = ("fix", shop.program, other, "-m", shop.machine, "-o", shop.folder / "out", "--assume-zero", "--json")
+    result = ncfix(*arguments)
+    assert result.code == 5
+    assert [file["output"] is None for file in result.json()["files"]] == [True, False]
+    assert "Traceback" not in result.err
+    assert "Traceback" in ncfix("--debug", *arguments, "--force").err
