@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
     from ncfix.compensate.stream import Stamp
 
-LONG = 4
+LONG = 2
 """Parts from which on a program is long; a shorter one is read as a whole."""
-COMPILED = 4
+COMPILED = 2
 """Parts from which on compiled kernels save more time than it takes to load them."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""

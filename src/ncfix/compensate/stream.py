@@ -42,7 +42,7 @@ from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
 
-PART_BYTES = 3 << 18
+PART_BYTES = 3 << 19
 """How much text is a part: the columns of a part take about thirty times as much memory."""
 
 

@@ -15,7 +15,7 @@ from ncfix.compensate.options import FixOptions
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves, Rule, Trace
-from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, rows_of, stretch
+from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 
@@ -173,8 +173,7 @@ class Units:
     def _head(self, unit: Unit) -> tuple[Part, Signs]:
         """The last motion with its block, and the way in which the axes came there."""
         part, direction = unit.part, unit.direction
-        row, block = len(part.moves) - 1, int(part.moves.block[-1])
-        head = Part(stretch(part.program, block, block + 1), rows_of(part.moves, row, row + 1, block), False)
+        head = Part(*last_of(part.program, part.moves), False)
         if matters(self.machine):
             moves = unit.together().moves
             arrival = Intent(self.placed, moves, State(direction=direction)).arrival

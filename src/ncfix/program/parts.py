@@ -6,7 +6,7 @@ templates, frames and reasons have the same numbers in all parts, so that parts 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -187,9 +187,13 @@ def _joined_columns(columns: list[Any], parts: list[Moves]) -> Any:
     return np.concatenate([blank if column is None else column for column, blank in zip(columns, empty, strict=True)])
 
 
-def rows_of(moves: Moves, start: int, stop: int, block: int) -> Moves:
-    """Some of the motions; blocks are counted from `block`."""
-    found = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
-    columns: dict[str, Any] = {name: None if column is None else column[start:stop] for name, column in found}
-    columns["block"] = columns["block"] - np.int32(block)
-    return Moves(**columns, **{name: getattr(moves, name) for name in TABLES})
+def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
+    """The last motion and its block, as copies: the rest need not be kept for them."""
+    block = int(moves.block[-1])
+    found = stretch(program, block, block + 1)
+    columns = ("template", "blocks", "first_number", "number_spans", "numbers")
+    alone = replace(found, **{name: getattr(found, name).copy() for name in columns})
+    rows = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
+    row: dict[str, Any] = {name: None if column is None else column[-1:].copy() for name, column in rows}
+    row["block"] -= np.int32(block)
+    return alone, Moves(**row, **{name: getattr(moves, name) for name in TABLES})
