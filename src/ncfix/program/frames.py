@@ -28,7 +28,7 @@ class FrameMap:
         """Program numbers of a command."""
         values = command - self.frame.offset
         if self.rotated:
-            values[..., self.spatial] = values[..., self.spatial] @ self.rotation
+            values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
         return values / self.scale
 
     def still(self, unmoved: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -46,7 +46,7 @@ class FrameMap:
         """Command of program numbers."""
         values = program * self.scale
         if self.rotated:
-            values[..., self.spatial] = values[..., self.spatial] @ self.rotation.T
+            values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation.T)
         return values + self.frame.offset
 
     def program_point(self, point: FloatArray, axes: tuple[str, ...]) -> FloatArray:
@@ -58,3 +58,13 @@ class FrameMap:
         """The inverse of `program_point`."""
         offset = np.array([self.frame.offset[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
         return np.asarray((point * self.unit) @ self.frame.rotation.T + offset)
+
+
+def _turned(points: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Points (..., k) times a rotation; what is not known (NaN) stays with the coordinates that are made of it."""
+    lost = np.isnan(points)
+    if not lost.any():
+        return np.asarray(points @ rotation)
+    result: FloatArray = np.where(lost, 0.0, points) @ rotation
+    result[(lost.astype(float) @ (rotation != 0.0)) > 0] = np.nan
+    return result

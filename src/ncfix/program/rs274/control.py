@@ -205,7 +205,7 @@ class Control:
 
     def spatial_anchor(self, index: int) -> Hashable:
         """The same for what X, Y and Z have of their own: turns, the tip of the tool, the tool's length."""
-        centre = tuple(self.offsets.centre) if self.is_rotated else None
+        centre = tuple(self.offsets.centre) if self.rotation[index] != IDENTITY[index] else None
         length = self.tools.offset if self.tcp or index == Z else None
         return self.rotation[index], centre, self.offsets.feature[index], self.tcp, length
 
