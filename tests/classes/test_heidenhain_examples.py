@@ -176,6 +176,24 @@ def test_the_holes_of_the_shipped_program_are_right_down_to_their_bottom(root: P
     assert np.linalg.norm(real - wanted, axis=1).max() < 0.5e-3
 
 
+def test_after_a_retract_of_plane_axes_of_the_plane_may_be_named_one_after_another(root: Path) -> None:
+    """X and Y of a tilted plane are made of all three axes of the machine; what is known of them is not lost."""
+    lines = ("L X+5 Y+6 FMAX", "L Z+20 FMAX", "L Z+7 F500", "L X+8 F500")
+    moves = moves_of(root, program("PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN MB MAX FMAX SEQ+", *lines))
+    at_once = moves_of(root, program("PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX SEQ+", "L X+5 Y+6 Z+7 FMAX"))
+    assert moves.rule[-4:].tolist() == [1, 0, 0, 0]
+    assert np.abs(moves.end[-2] - at_once.end[-1]).max() < 1e-9
+
+
+def test_of_two_ways_to_turn_one_within_the_travel_is_taken(root: Path) -> None:
+    """B of this machine goes from 0 to 180 degrees: the nearer of the two ways would lead it below zero."""
+    vector = "TX+0 TY-0.3 TZ+0.9539392014"
+    moves = moves_of(root, program("L B+5 C+180 FMAX", "M128", f"LN X+5 Y+6 Z+7 NX+0 NY+0 NZ+1 {vector} F500"))
+    assert moves.axes[:2] == ("C", "B")
+    assert moves.rule[-1] == 0
+    assert np.degrees(moves.end[-1][:2]) == pytest.approx([278.832, 24.786], abs=1e-3)
+
+
 @pytest.mark.parametrize("words", ["MB50 F1000", "MB MAX FMAX"])
 def test_after_a_retract_of_plane_the_position_has_to_be_said(root: Path, words: str) -> None:
     moves = moves_of(

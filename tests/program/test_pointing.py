@@ -11,7 +11,7 @@ import pytest
 from ncfix.compensate.following import kinematics_of
 from ncfix.machine import Machine, load
 from ncfix.program.moves import TcpState
-from ncfix.program.pointing import Pointing
+from ncfix.program.pointing import Pointing, within
 
 MACHINES = ("wCAYFXZSt", "wCBXFZYSt", "dmu50", "angle_head")
 LENGTH = 128.0
@@ -68,3 +68,19 @@ def test_along_the_outer_axis_it_stays_where_it_is(root: Path) -> None:
     upright = np.array([0.0, 0.0, 1.0])
     assert pointing.at_pole(upright)
     assert pointing.angles(upright, (0.3, 0.1))[0] == pytest.approx((0.3, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("ways", "travel", "near", "found"),
+    [
+        ([(10, 20), (190, -20)], [(-360, 360), (0, 90)], (0, 0), [(10, 20)]),
+        ([(10, 20), (190, -20)], [(-math.inf, math.inf), (-30, 90)], (170, 0), [(190, -20), (10, 20)]),
+        ([(-24, 5)], [(0, 360), (0, 90)], (0, 0), [(336, 5)]),
+        ([(350, 5)], [(-180, 180), (0, 90)], (0, 0), [(-10, 5)]),
+        ([(0, 95)], [(0, 360), (0, 90)], (0, 0), []),
+        ([(-1e-5, 0)], [(0, 300), (0, 90)], (0, 0), [(-1e-5, 0)]),
+    ],
+)
+def test_only_ways_within_the_travels_are_taken(ways: list, travel: list, near: tuple, found: list) -> None:
+    turned = within(np.radians(ways).tolist(), np.radians(travel).tolist(), (math.radians(near[0]), 0.0))
+    assert [tuple(np.degrees(way)) for way in turned] == [pytest.approx(way) for way in found]

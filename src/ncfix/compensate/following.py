@@ -46,20 +46,29 @@ def traced(program: Program, machine: Machine, setup: Setup, resolve: Resolve | 
     return trace(program, setup, names, rotary, resolve, kinematics=kinematics_of(machine))
 
 
-def kinematics_of(machine: Machine) -> Kinematics | None:
-    """How commands with and without tool-centre-point control say the same position; None without X, Y and Z."""
-    if not {"X", "Y", "Z"} <= set(machine.axis_names):
-        return None
+@dataclass(frozen=True, slots=True)
+class Positions:
+    """What a machine's kinematics say about positions of its axes."""
 
-    def convert(command: Sequence[float], before: TcpState, after: TcpState) -> Sequence[float]:
+    machine: Machine
+
+    @property
+    def travel(self) -> Sequence[tuple[float, float]]:
+        """How far each axis goes, mm and rad."""
+        return [(low, high) for low, high in self.machine.ranges.tolist()]
+
+    def __call__(self, command: Sequence[float], before: TcpState, after: TcpState, /) -> Sequence[float]:
+        """A command as it is with tool-centre-point control or without, said as it is under another state."""
         row = np.array([command], dtype=np.float64)
-        q = joints_from_commands(machine, row, np.array([before.on]), np.array([before.tool_length]))
-        result: list[float] = commands_from_joints(machine, q, np.array([after.on]), np.array([after.tool_length]))[
-            0
-        ].tolist()
+        q = joints_from_commands(self.machine, row, np.array([before.on]), np.array([before.tool_length]))
+        found = commands_from_joints(self.machine, q, np.array([after.on]), np.array([after.tool_length]))
+        result: list[float] = found[0].tolist()
         return result
 
-    return convert
+
+def kinematics_of(machine: Machine) -> Kinematics | None:
+    """The kinematics of a machine; None without X, Y and Z."""
+    return Positions(machine) if {"X", "Y", "Z"} <= set(machine.axis_names) else None
 
 
 def placed(machine: Machine, setup: Setup) -> Machine:

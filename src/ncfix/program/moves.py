@@ -8,9 +8,10 @@ make axis positions of that, this floor does not.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,15 @@ class TcpState:
         return self.tool_length if self.on else 0.0
 
 
-Kinematics = Callable[[Sequence[float], TcpState, TcpState], Sequence[float]]
-"""A machine's own: a command (one number per axis) as it is under one state, said as it is under another."""
+class Kinematics(Protocol):
+    """What a machine's own kinematics say about positions of its axes."""
+
+    @property
+    def travel(self) -> Sequence[tuple[float, float]]:
+        """How far each axis goes, mm and rad; infinite where it is endless."""
+
+    def __call__(self, command: Sequence[float], before: TcpState, after: TcpState, /) -> Sequence[float]:
+        """A command (one number per axis) as it is under one state, said as it is under another."""
 
 
 @dataclass(frozen=True, slots=True)

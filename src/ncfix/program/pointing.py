@@ -8,7 +8,7 @@ lie shows in three positions of each axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,10 @@ LEAST = 1e-3
 """A smaller circle, relative to the tool's length, says nothing about its axis."""
 
 SAME = 1e-9
+TURNS = 2
+AT_END = 1e-6
+"""rad; so far past its travel an axis is still at the end of it."""
+
 POLE = 1e-7
 """rad; nearer to the outer axis than that the tool may turn about it at will."""
 
@@ -95,6 +99,25 @@ class Pointing:
             return near
         angle = math.atan2(dot(outer, cross(start, stop)), dot(start, stop))
         return near + wrapped(angle - near)
+
+
+def within(
+    ways: Iterable[tuple[float, float]], travel: Sequence[tuple[float, float]], near: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """The ways that two axes can go within their travels, whole turns away if need be; the nearest first."""
+    found = []
+    for way in ways:
+        places = [_in_travel(angle, *span, to) for angle, span, to in zip(way, travel, near, strict=True)]
+        if places[0] is not None and places[1] is not None:
+            found.append((places[0], places[1]))
+    return sorted(found, key=lambda way: abs(way[0] - near[0]) + abs(way[1] - near[1]))
+
+
+def _in_travel(angle: float, low: float, high: float, near: float) -> float | None:
+    """An angle, or whole turns away from it, within a travel and nearest to another; None if none is."""
+    turns = (angle + 2 * math.pi * count for count in range(-TURNS, TURNS + 1))
+    possible = [each for each in turns if low - AT_END <= each <= high + AT_END]
+    return min(possible, key=lambda each: abs(each - near), default=None)
 
 
 def dot(a: Triple, b: Triple) -> float:

@@ -94,6 +94,27 @@ def test_a_table_of_datums_by_trans() -> None:
 POCKET = "CYCL DEF 251 POCKET ~\n Q218=+60 ~\n Q201=-20 ~\n Q200=+2 ~\n Q203=+5 ~\n Q204=+50"
 
 
+def test_spatial_angles_of_tcpm_leave_the_rotary_axes_where_the_control_works_out() -> None:
+    body = "L X+0 Y+0 Z+90 B+0 C+0 FMAX\nFUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\nL X+5 Y+5 Z+50 A+10 B+20 C+0 F100"
+    body += "\nFUNCTION RESET TCPM\nL Z+80 FMAX\nL X+0 Y+0 Z+80 B+0 C+0 FMAX\nL X+1 F100"
+    found = fates(body, "XYZBC")
+    assert found[1] == (Rule.REFUSE, "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes")
+    assert [rule for rule, _ in found[2:]] == [Rule.PASS, Rule.CORRECT, Rule.CORRECT]
+
+
+def test_a_row_of_the_preset_table_by_its_function() -> None:
+    assert ends("PRESET SELECT #1\nL X+1 Y+1 Z+1 FMAX") == ends("CYCL DEF 247 P Q339=+1\nL X+1 Y+1 Z+1 FMAX")
+    tilted = "CYCL DEF 10.0 R\nCYCL DEF 10.1 ROT+5\nPRESET SELECT #1\nL X+1 Y+1 Z+1 FMAX"
+    assert "PRESET SELECT" in fates(tilted)[-1][1]
+    assert "PRESET SELECT" in fates("PRESET SELECT #1 KEEP TRANS\nL X+1 Y+1 Z+1 FMAX")[-1][1]
+
+
+def test_a_called_program_does_not_end_by_m30() -> None:
+    sub = "BEGIN PGM S MM\nL X+5 FMAX M30\nL X+7 FMAX\nEND PGM S MM\n"
+    moves = follow("L X+1 Y+1 Z+1 FMAX\nCALL PGM S\nL X+9 FMAX", files={"S.h": sub}).moves
+    assert "which the manuals do not allow" in moves.reasons[moves.reason[-1]]
+
+
 def test_a_pocket_is_corrected_at_its_place_and_bottom_which_is_said() -> None:
     trace = follow(f"L X+1 Y+1 Z+90 FMAX\n{POCKET}\nL X+50 Y+40 FMAX M99\nL X+80 FMAX M99\nL X+5 Y+6 FMAX")
     moves = trace.moves

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.machine import load
 from ncfix.program.klartext.turns import extremes, on_its_side
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+from program.klartext.tnc import program
+
+SETUP = Setup(work_offsets={"PRESET": {"Z": 120.0}}, initial=dict.fromkeys("XYZBC", 0.0), assume_zero=True)
 
 BELOW, PAST = b"L C-5\nL B+1 C+10 F100", b"L C+400\nL C0"
 
@@ -32,3 +42,17 @@ def test_a_correction_does_not_cross_what_the_program_never_crosses(
     source: bytes, nominal: float, angle: float, kept: float
 ) -> None:
     assert on_its_side(source, "C", nominal, angle, 0.001) == pytest.approx(kept)
+
+
+def test_pieces_of_a_motion_that_begins_below_zero_stay_there() -> None:
+    """A direction (TX TY TZ) or an increment may lead a table below zero where no word of the program does."""
+    machine = load(str(Path(__file__).parents[3] / "examples/machines/dmu50.toml"))
+    body = "L X+0 Y+0 Z+100 B+0 C+0 R0 FMAX\nM128\nLN X+10 Y+3 Z+20 NX+0 NY+0 NZ+1 TX+0 TY-0.31 TZ+0.9507366 F500"
+    source = program(body + "\nL X+12 Y+3 Z+20 B+30 C+45")
+    done = fix_program(read(source, "t.h"), machine, SETUP, FixOptions(allow_refused=True))
+    assert done.report.refused == ()
+    turns = [float(found) for found in re.findall(r"C([+-][\d.]+)", done.text.decode().split("TZ+0.9507366")[-1])]
+    assert len(turns) > 2
+    assert turns[0] < -10
+    assert sorted(turns) == turns
+    assert turns[-1] == 45

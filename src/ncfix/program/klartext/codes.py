@@ -90,6 +90,6 @@ def after_motion(control: Control, code: int, own: Words, flags: frozenset[str])
     """What acts at the end of the block."""
     if code == 129:
         tip_control(control, on=False)
-        control.path.by_vector = False
+        control.path.by_vector = control.path.spatial = False
     elif code == 140:
         control.pass_here(RETRACT, RETRACTED, "XYZ" if control.tcp else "Z")

@@ -36,7 +36,8 @@ DEPARTED = "where the axis {} stands after a departure (DEP) depends on the radi
 AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
 FREELY = "where the axis {} stands after a free contour (FK) the control works out"
 AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is not followed"
-LED_BY_CONTROL = frozenset({RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
+SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control works out"
+LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
 """Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the
 next block that names the axis is corrected."""
 
@@ -51,6 +52,8 @@ class Path:
     tangent  the direction in which the last path element ended, commands; None where there is none
     corner   the block before was a corner (RND, CHF)
     ahead    the block that follows is one
+    spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
+    said     what words of a turned frame have said of where the tool stands (`targets.Said`)
     by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
     """
 
@@ -61,6 +64,8 @@ class Path:
     corner: bool = False
     ahead: bool = False
     by_vector: bool = False
+    spatial: bool = False
+    said: object = None
 
 
 @dataclass(slots=True)

@@ -33,6 +33,7 @@ NO_END = "NCF234"
 SKIPPED_BLOCKS = "NCF235"
 WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
+ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
 """Addresses in motion blocks that lead nowhere."""
@@ -240,12 +241,16 @@ class Interpreter:
         self.move(plan, step)
         for code, own in plan.codes:
             after_motion(control, code, self.evaluated(own), plan.flags)
+        if codes & {2, 30} and control.external:
+            control.refusal = control.refusal or ENDS_INSIDE
         return bool(codes & {2, 30}) and not control.external
 
     def note_foreign(self, plan: Plan, step: Step) -> None:
         """Note axes that the program moves and the machine lacks."""
         control = self.control
         for letter in axis_letters(step.words):
+            if control.path.spatial and letter in "ABC":
+                continue
             if INDEX[letter] not in control.machine and letter not in control.foreign:
                 self.span = plan.spans.get(letter) or plan.spans.get("I" + letter)
                 control.note_foreign(letter)

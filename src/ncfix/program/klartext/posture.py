@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
-from ncfix.program.pointing import Pointing
+from ncfix.program.pointing import Pointing, within
 from ncfix.program.rs274.coordinates import Rotation, Vector, X, Y, Z, as_rotation, zeros
 
 FloatArray = NDArray[np.float64]
@@ -96,7 +96,7 @@ def pointing_of(control: Control) -> Pointing | None:
 
 
 def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
-    """The ways to point the tool, letter index -> rad, the nearest first; empty if there is none or none is known."""
+    """The ways to point the tool within the travels, letter index -> rad, the nearest first; empty if none is known."""
     pointing = pointing_of(control)
     if pointing is None:
         return []
@@ -104,7 +104,10 @@ def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
     control.settle((first, second))
     if first in control.unknown or second in control.unknown:
         return []
-    ways = pointing.angles(np.array(direction), (control.position[first], control.position[second]))
+    assert control.kinematics is not None, "they have shown how the tool is pointed"
+    near = control.position[first], control.position[second]
+    travel = [control.kinematics.travel[column] for column in pointing.columns]
+    ways = within(pointing.angles(np.array(direction), near), travel, near)
     return [{first: outer, second: inner} for outer, inner in ways]
 
 

@@ -66,7 +66,7 @@ class Renderer(HoleWriter):
             if arcs[piece]:
                 position = self._further_arc(position, piece, centres[piece])
             else:
-                position = self._further_line(position, target.ends[piece])
+                position = self._further_line(position, piece)
             self.out.ends.append(position)
         self._move_late_codes()
         if not self.own_pole or not is_relied_on(self.program.source, int(self.program.blocks[self.block, 1])):
@@ -105,14 +105,14 @@ class Renderer(HoleWriter):
             self._straightened()
         return position
 
-    def _further_line(self, position: FloatArray, end: FloatArray) -> FloatArray:
-        position = position.copy()
+    def _further_line(self, position: FloatArray, piece: int) -> FloatArray:
+        position, end = position.copy(), self.target.ends[piece]
         words = ["L" if not self.layout.vector else "LN"]
         for column, letter in self.columns:
             bare = letter not in self.layout.axes and self._left_alone(column)
             if column in self._turning() or bare or not abs(end[column] - position[column]) >= self.half[column]:
                 continue
-            text = self._number(self._turned(column, float(end[column])), column)
+            text = self._number(self._turned(column, float(end[column]), piece), column)
             words.append(letter + text)
             position[column] = value_of(text)
         if self.layout.vector:

@@ -40,6 +40,8 @@ HARMLESS_FUNCTIONS = re.compile(
 WRITING = re.compile(r"FN\s*(17|25)\b", re.IGNORECASE)
 """They write into the control's own data: datums, presets, tools."""
 
+CHOSEN_PRESET = re.compile(r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
+SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
 CHOSEN = re.compile(r"(SEL\s+(PGM|CYCLE|TABLE)|CALL\s+SELECTED|POLARKIN)", re.IGNORECASE)
 
 
@@ -55,6 +57,8 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
         free_contour(control)
     elif re.match(r"TCH\s*PROBE", text, re.IGNORECASE):
         probe(control, text)
+    elif found := CHOSEN_PRESET.match(text):
+        select_preset(control, found)
     elif re.match("TRANS", text, re.IGNORECASE):
         transform(control, text)
     elif CHOSEN.match(text):
@@ -67,6 +71,16 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
         control.cycle.places = pattern_of(text, control.scope.parameters)
     elif READING.match(text):
         read_values(control, text)
+
+
+def select_preset(control: Control, found: re.Match[str]) -> None:
+    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
+    trans = control.transformations
+    control.suspended.pop(PRESET, None)
+    if found["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
+        control.suspended[PRESET] = SELECTED
+        return
+    control.load_preset(f"PRESET{int(found['row'])}")
 
 
 def free_contour(control: Control) -> None:
@@ -91,12 +105,13 @@ def read_values(control: Control, text: str) -> None:
 def tcpm(control: Control, found: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.suspended.pop("tcpm", None)
-    control.path.by_vector = False
+    control.path.by_vector = control.path.spatial = False
     if found["reset"]:
         tip_control(control, on=False)
         return
     words = found["rest"].upper()
-    if "AXIS SPAT" in words:
+    control.path.spatial = "AXIS SPAT" in " ".join(words.split())
+    if control.path.spatial:
         control.suspended["tcpm"] = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
     if "REFPNT" in words and "TIP-TIP" not in words:
         control.suspended["tcpm"] = "FUNCTION TCPM with a reference point other than the tip"

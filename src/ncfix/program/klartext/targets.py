@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.control import SPATIAL, Control
 from ncfix.program.rs274.control import ADRIFT, AT_START, Unknown
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.program.rs274.faults import Fault
@@ -60,9 +60,26 @@ class Where:
     unknown: Unknown
 
 
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What words of a turned frame have said of a position, of which the machine's axes alone do not tell as much."""
+
+    where: Where
+    target: Vector
+    frame: tuple[object, ...]
+
+
 def here(control: Control) -> Where:
     """Where the control stands."""
+    said = control.path.said
+    if isinstance(said, Said) and control.unknown and said.target is control.position and said.frame == frame(control):
+        return Where(said.where.inner[:], dict(said.where.unknown))
     return Where(control.inner(), inner_unknown(control, control.unknown))
+
+
+def frame(control: Control) -> tuple[object, ...]:
+    """What the words of a program mean."""
+    return control.rotation, tuple(control.offset), control.modal.unit, control.tcp
 
 
 def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
@@ -105,6 +122,7 @@ def led(control: Control, words: Words) -> Where:
         where.inner[index] += control.scale[index] * value
         if address in words.runtime:
             where.unknown[index] = RUNTIME
+    by_spatial_angles(control, words, where)
     return where
 
 
@@ -118,6 +136,12 @@ def derived(control: Control, words: Words, axes: int) -> str:
         own |= polar_axes(control, words)
     index = next((i for i in control.machine if axes & ~own & control.places.adrift >> i & 1), None)
     return "" if index is None else ADRIFT.format(LETTERS[index])
+
+
+def by_spatial_angles(control: Control, words: Words, where: Where) -> None:
+    """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
+    if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
+        where.unknown |= {index: SPATIAL for index in control.machine if control.rotary[index]}
 
 
 def settle(control: Control, words: Words) -> None:
@@ -136,7 +160,10 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
         spatial = turned and index < 3 and any(control.rotation[index][k] and axes >> k & 1 for k in range(3))
         if not spatial and not axes >> index & 1:
             target[index] = position
-    unknown = mixed(control.rotation, where.unknown) if control.is_rotated and where.unknown else where.unknown
+    unknown = where.unknown
+    if control.is_rotated and unknown:
+        unknown = mixed(control.rotation, unknown)
+        control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
     return target, {index: why for index, why in unknown.items() if index in control.machine}
 
 

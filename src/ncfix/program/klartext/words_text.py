@@ -76,13 +76,17 @@ class WordWriter:
             return not turned and (bare or tilts(self.program.source))
         return (layout.corner or layout.name.startswith("dep")) and column == target.spatial[2]
 
-    def _turned(self, column: int, end: float) -> float:
-        """An end, of a rotary axis on its side of zero and of a full turn."""
+    def _turned(self, column: int, end: float, piece: int = 0) -> float:
+        """The end of a piece, of a rotary axis on its side of zero and of a full turn."""
         target = self.target
         if not target.rotary or not target.rotary[column] or not np.isfinite(end):
             return end
+        nominal = float(target.nominal[column])
+        if piece < len(target.ends) - 1:
+            done = float(target.shares[: piece + 1].sum())
+            nominal = float(target.start[column]) * (1 - done) + nominal * done
         step = 10.0 ** -float(target.decimals[column])
-        return on_its_side(self.program.source, target.letters[column], float(target.nominal[column]), end, step)
+        return on_its_side(self.program.source, target.letters[column], nominal, end, step)
 
     def _present(self, position: FloatArray, column: int, end: float, word: Word) -> None:
         base = float(position[column]) if word.address[0] == "I" else 0.0
