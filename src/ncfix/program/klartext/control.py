@@ -149,13 +149,15 @@ class Control(base.Control):
         self.refresh()
 
     def anchors(self) -> list[Hashable]:
-        """As for the RS274 family, but datum shifts are stated by the program."""
+        """As for the RS274 family, but shift, rotation, mirror and scale are stated by the program in numbers."""
         if not hasattr(self, "preset"):
             return [None] * len(LETTERS)
-        tool = zeros() if self.tcp else self.offsets.tool
+        trans, tool = self.transformations, zeros() if self.tcp else self.offsets.tool
+        stated = self.tcp, trans.tilt if trans.tilted else None
+        length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]
         return [
-            (self.preset, preset, tool[i], self.spatial_anchor(i) if i in (X, Y, Z) else None)
-            for i, preset in enumerate(self.transformations.preset)
+            (self.preset, preset, tool[i], (*stated, length[i]) if i in (X, Y, Z) else None)
+            for i, preset in enumerate(trans.preset)
         ]
 
     def use(self) -> None:
@@ -214,6 +216,8 @@ class Control(base.Control):
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.modal.compensated = before or 41
         super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
+        if self.is_rotated:
+            self.places.settle(settles)
         self.modal.compensated = before
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:

@@ -129,12 +129,14 @@ def led(control: Control, words: Words) -> Where:
 def derived(control: Control, words: Words, axes: int) -> str:
     """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
 
-    Polar words, and arcs of which an end has one word, count from a place that the program may not have said.
+    Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place that the program may not have said.
     """
     own = words.axes
     if {"PR", "PA"} <= words.values.keys():
         own |= polar_axes(control, words)
-    index = next((i for i in control.machine if axes & ~own & control.places.adrift >> i & 1), None)
+    if words.values.keys() & {"TX", "TY", "TZ"}:
+        own |= sum(1 << i for i in control.machine if control.rotary[i])
+    index = next((i for i in control.machine if (axes & ~own & control.places.adrift) >> i & 1), None)
     return "" if index is None else ADRIFT.format(LETTERS[index])
 
 

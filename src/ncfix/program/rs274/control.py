@@ -319,7 +319,7 @@ class Control:
         moved = mask_of(i for i in self.machine if target[i] != self.position[i])
         if self.is_rotated and axes & self._turned():
             moved |= self._turned()
-        index = next((i for i in self.machine if adrift & moved & ~axes & self.places.adrift >> i & 1), None)
+        index = next((i for i in self.machine if (adrift & moved & ~axes & self.places.adrift) >> i & 1), None)
         return "" if index is None else ADRIFT.format(LETTERS[index])
 
     def _ask_for_start(self, kind: Kind, unknown: Unknown) -> None:
