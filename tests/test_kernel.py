@@ -91,3 +91,26 @@ def test_arrays_of_another_type_are_refused() -> None:
         fewest(counts.astype(np.int32), nodes, commands, follow, 1e-3, ends, worst)
     with pytest.raises(TypeError, match="instead of f8"):
         fewest(counts, nodes, commands.T, follow, 1e-3, ends, worst)
+
+
+def test_the_way_in_which_arguments_are_passed_is_tried() -> None:
+    from ncfix import kernel, kernel_trial
+
+    assert kernel_trial.passes()
+    assert kernel.trusted()
+
+
+def test_an_environment_that_fails_the_trial_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix import kernel
+
+    (tmp_path / "failing_trial.py").write_text("import os; os.abort()")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    assert not kernel.trusted("failing_trial")
+    (tmp_path / "failing_trial.py").write_text("def passes():\n    return False\n")
+    assert not kernel.trusted("failing_trial")
+    (tmp_path / "failing_trial.py").write_text("def passes():\n    return True\n")
+    monkeypatch.setattr(kernel, "places", lambda source, kind: iter([tmp_path / kind]))
+    assert kernel.trusted("failing_trial")
+    assert (tmp_path / "passed").exists()
+    monkeypatch.setattr(kernel.subprocess, "run", None)
+    assert kernel.trusted("failing_trial")

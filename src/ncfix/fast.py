@@ -15,7 +15,7 @@ _engaged = False
 def engage() -> bool:
     """Use compiled kernels from here on, if they are installed and wanted; whether they are."""
     global _engaged
-    _engaged = _engaged or (wanted() and find_spec("numba") is not None)
+    _engaged = _engaged or (wanted() and _usable())
     return _engaged
 
 
@@ -28,6 +28,15 @@ def disengage() -> None:
     """Go back to the plain way."""
     global _engaged
     _engaged = False
+
+
+def _usable() -> bool:
+    """Whether numba is installed, and one that kernels can be compiled with."""
+    if find_spec("numba") is None:
+        return False
+    from ncfix.kernel import trusted
+
+    return trusted()
 
 
 def wanted() -> bool:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -148,16 +149,9 @@ class Library:
 
     # -- on the disk --------------------------------------------------------------------------------------------------
 
-    def _places(self) -> Iterator[Path]:
-        """Where the code may be kept: beside what Python keeps of the module, or in the user's own cache."""
-        name = f"{Path(self.source).stem}.{environment()[:12]}.o"
-        yield Path(self.source).parent / "__pycache__" / name
-        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        yield caches / "ncfix" / f"{Path(self.source).parent.name}-{name}"
-
     def _kept(self) -> bytes | None:
         """The code that is kept, if it is of these sources."""
-        for place in self._places():
+        for place in places(self.source, "o"):
             with suppress(OSError):
                 data = place.read_bytes()
                 if data[:64] == self._digest(data[64:]):
@@ -165,13 +159,7 @@ class Library:
         return None
 
     def _keep(self, code: bytes) -> None:
-        for place in self._places():
-            with suppress(OSError):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                temporary = place.with_suffix(f".{os.getpid()}")
-                temporary.write_bytes(self._digest(code) + code)
-                os.replace(temporary, place)
-                return
+        keep(self.source, "o", self._digest(code) + code)
 
     def _digest(self, code: bytes) -> bytes:
         """What tells whether code belongs to the sources, and is whole."""
@@ -180,6 +168,41 @@ class Library:
         for text in (*(Path(file).read_bytes() for file in sorted(files)), code):
             found.update(hashlib.sha256(text).digest())
         return found.hexdigest().encode()
+
+
+def trusted(trial: str = "ncfix.kernel_trial") -> bool:
+    """Whether this numba passes arguments as `Kernel` says, which it does not promise.
+
+    Tried once for each environment in a process of its own, where a wrong guess can do no harm.
+    """
+    source = str(Path(__file__).parent / f"{trial.rpartition('.')[2]}.py")
+    if not any(place.exists() for place in places(source, "passed")):
+        script = f"import sys, {trial} as trial; sys.exit(not trial.passes())"
+        try:
+            subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+        except (OSError, subprocess.SubprocessError):
+            return False
+        keep(source, "passed", b"")
+    return True
+
+
+def places(source: str, kind: str) -> Iterator[Path]:
+    """Where something about a module may be kept: beside what Python keeps of it, or in the user's own cache."""
+    name = f"{Path(source).stem}.{environment()[:12]}.{kind}"
+    yield Path(source).parent / "__pycache__" / name
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    yield caches / "ncfix" / f"{Path(source).parent.name}-{name}"
+
+
+def keep(source: str, kind: str, data: bytes) -> None:
+    """Keep it at the first place that can be written to."""
+    for place in places(source, kind):
+        with suppress(OSError):
+            place.parent.mkdir(parents=True, exist_ok=True)
+            temporary = place.with_suffix(f".{os.getpid()}")
+            temporary.write_bytes(data)
+            os.replace(temporary, place)
+            return
 
 
 def flat(nested: Any) -> Iterator[Any]:
