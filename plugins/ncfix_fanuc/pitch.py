@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ncfix.diagnostics import Message, RefusedError
+from ncfix.diagnostics import Message
+from ncfix.tables.axes import DEGREE, TURNING, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
@@ -17,9 +18,8 @@ from ncfix.tables.settings import choice
 from ncfix_fanuc.increments import curves, pitch_of
 from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
 from ncfix_fanuc.pitch_text import MOST, NUMBERS, Pitch, parameter_text, pitch_text
-from ncfix_fanuc.units import DEGREE, SIGN, SIGNS, UNITS, sense_of, units_of
+from ncfix_fanuc.units import SIGN, SIGNS, UNITS, sense_of, units_of
 
-ORDER = "XYZABCUVW"
 FIRST_NUMBER = 1
 
 
@@ -82,7 +82,7 @@ class FanucPitch(Control):
         settings = self.settings(request.settings)
         sense = sense_of(choice(settings, "sign", SIGNS))
         units = units_of(settings)
-        axes = _axes(request)
+        axes = in_order(request.machine)
         tables, notes = curves(request), []
         found: list[Pitch] = []
         for axis in axes:
@@ -113,15 +113,8 @@ class FanucPitch(Control):
         return tuple(message for each in read_pitches(files)[1] for message in each.messages)
 
 
-def _axes(request: Request) -> tuple[str, ...]:
-    names = request.machine.axis_names
-    if not set(names) <= set(ORDER):
-        raise RefusedError.of("NCF484", f"axes beyond {' '.join(ORDER)}: {' '.join(names)}")
-    return tuple(letter for letter in ORDER if letter in names)
-
-
 def _said(pitch: Pitch, units: tuple[float, float]) -> str:
-    rotary = pitch.axis in "ABC"
+    rotary = pitch.axis in TURNING
     half = 0.5 * pitch.magnification * (units[1] / DEGREE if rotary else 1000 * units[0])
     unit = "degree" if rotary else "um"
     return (

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ncfix.tables.axes import TURNING, unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks, as_number
 from ncfix.tables.neutral import Term
 from ncfix_fanuc.pitch_text import NUMBERS, Pitch, read_increments, read_records
-from ncfix_fanuc.units import DEGREE, SIGNS, sense_of
+from ncfix_fanuc.units import SIGNS, sense_of
 
 PARAMETERS, SETTINGS = "parameters.txt", "settings.txt"
 MOST_MAGNIFICATION = 100
@@ -37,7 +38,7 @@ def read_pitches(files: Files) -> tuple[tuple[Term, ...], list[Remarks]]:
             remarks.append(found)
             pitch = _pitch(found, axis, words[3], values)
             if pitch is not None and not found.wrong:
-                unit = units[1] * DEGREE if axis in "ABC" else units[0] / 1000
+                unit = unit_of(axis) * (units[1] if axis in TURNING else units[0] / 1000)
                 terms.append(Term((_grid(pitch, sense_of(words[0]) * unit),)))
     return tuple(terms), remarks
 
@@ -81,8 +82,7 @@ def _check(remarks: Remarks, found: Mapping[str, float], first: int, last: int) 
 def _grid(pitch: Pitch, unit: float) -> Grid:
     sums = np.cumsum(pitch.increments)
     at_zero = int(np.clip(pitch.reference - pitch.first, 0, len(sums) - 1))
-    scale = DEGREE if pitch.axis in "ABC" else 1.0
     counts = np.arange(pitch.first - pitch.reference, pitch.last - pitch.reference + 1, dtype=np.float64)
-    nodes: Array = pitch.interval * scale * counts
+    nodes: Array = pitch.interval * unit_of(pitch.axis) * counts
     values = (sums - sums[at_zero]) * pitch.magnification * unit
     return Grid((pitch.axis,), (nodes,), (pitch.axis,), values[:, None].astype(np.float64), (bool(pitch.turn),))

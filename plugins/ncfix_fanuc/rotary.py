@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
+from ncfix.tables.axes import DEGREE, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
@@ -27,7 +28,7 @@ from ncfix.tables.settings import choice, whole
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
 from ncfix_fanuc.rotary_fill import PART, LatticeFilling, table_axes
 from ncfix_fanuc.rotary_records import LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
-from ncfix_fanuc.units import DEGREE, SIGN, SIGNS, UNITS, units_of
+from ncfix_fanuc.units import SIGN, SIGNS, UNITS, units_of
 
 NAME, SECOND = "rotary.json", "rotary-axes.json"
 
@@ -159,6 +160,7 @@ class FanucRotary(Control):
         settings = self.settings(request.settings)
         sign, rotary = choice(settings, "sign", SIGNS), choice(settings, "rotary", ("yes", "no"))
         machine = request.machine
+        in_order(machine)
         if not set(LINEAR) <= set(machine.axis_names):
             raise RefusedError.of("NCF484", f"the grid is over X, Y and Z; the machine has {machine.axis_names}")
         if not np.allclose(machine.tool.direction, (0, 0, 1), atol=1e-9):

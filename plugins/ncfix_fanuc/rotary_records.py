@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError
+from ncfix.tables.axes import DEGREE, unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
-from ncfix_fanuc.units import DEGREE, SIGNS, sense_of
+from ncfix_fanuc.units import SIGNS, sense_of
 
 SIDE = 25
 MOST_MAGNIFICATION = 10_000
@@ -88,7 +89,7 @@ class Lattice:
                 raise RefusedError.of("NCF484", text, hint="a larger detection unit, or is the error in mm and rad?")
             whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
         inputs = grids[0].inputs
-        lines = [line / _unit(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
+        lines = [line / unit_of(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
         low = tuple(round(float(line[0]), 6) for line in lines)
         step = tuple(round(float(line[-1] - line[0]) / (len(line) - 1), 6) for line in lines)
         scale = Scale(sign, units, (factors[0], factors[1]))
@@ -97,7 +98,7 @@ class Lattice:
     def grids(self) -> tuple[Grid, Grid]:
         """Lengths and angles as corrections, mm and rad."""
         nodes = tuple(
-            (low + step * np.arange(count)) * _unit(name)
+            (low + step * np.arange(count)) * unit_of(name)
             for name, low, step, count in zip(self.inputs, self.low, self.step, self.lin.shape, strict=False)
         )
         length, angle = self.scale.factors
@@ -124,10 +125,6 @@ class Lattice:
         rows = zip(*(part.transpose(order).reshape(-1, 3).tolist() for part in (self.lin, self.rot)), strict=True)
         records = ",\n".join(f'  {{"no": {n}, "lin": {lin}, "rot": {rot}}}' for n, (lin, rot) in enumerate(rows, 1))
         return f'{{\n{"".join(lines)} "records": [\n{records}\n ]\n}}\n'.encode()
-
-
-def _unit(name: str) -> float:
-    return 1.0 if name in LINEAR else DEGREE
 
 
 def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | None, Remarks]:

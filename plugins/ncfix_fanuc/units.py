@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
+from ncfix.tables.axes import DEGREE
 from ncfix.tables.control import Option
 from ncfix.tables.settings import number
 
-DEGREE = np.pi / 180
 SIGNS = ("correction", "error")
 SIGN = Option(None, "correction: values are added to the command; error: they are taken off it")
 UNITS: Mapping[str, Option] = {

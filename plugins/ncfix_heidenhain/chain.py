@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix.tables.axes import TURNING, unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
@@ -25,7 +26,6 @@ MOST_COORDS = 50
 MOST_ERRORS = 100
 """Less the number of MachAxis."""
 LETTERS = "XYZABC"
-DEGREE = np.pi / 180
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +102,10 @@ class Kinematics:
     def _value(self, row: Row, names: Sequence[str], q: Array, wrong: bool, way: float) -> Array:
         if row.key == "MachAxis":
             return way * q[:, names.index(row.axis)]
-        turned = row.axis in "ABC"
-        value: Array = np.full(len(q), (row.coord or 0.0) * (DEGREE if turned else 1.0))
+        value: Array = np.full(len(q), (row.coord or 0.0) * unit_of(row.axis))
         if not wrong or row.error is None:
             return value
-        unit = self.sense * (self.angle if turned else 1.0)
+        unit = self.sense * (self.angle if row.axis in TURNING else 1.0)
         if not isinstance(row.error, tuple):
             return value + unit * row.error
         grid = self.components[row.error]

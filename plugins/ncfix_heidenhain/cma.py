@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ncfix.tables.axes import ORDER
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
 from ncfix_heidenhain.table_text import Column, TextTable, read_table
 
 ACTIVE = "ACTIVE"
 CONFIG = "config.cma"
-LETTERS = "XYZABCUVW"
 
 
 def cma_text(axes: Sequence[str], tables: Mapping[str, str]) -> bytes:
@@ -34,7 +34,7 @@ def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
         return (), {}, remarks
     axes = tuple(column.name for column in table.columns if column.name not in ("NR", ACTIVE))
     for axis in axes:
-        if len(axis) != 1 or axis not in LETTERS or axes.count(axis) > 1:
+        if len(axis) != 1 or axis not in ORDER or axes.count(axis) > 1:
             remarks.refuse(0, f"the column {axis} is no axis, or is there twice")
     marked = [row for row, cell in enumerate(table.cells(ACTIVE)) if cell == "*"]
     if len(marked) != 1:

@@ -13,15 +13,16 @@ import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.tables.additive import Line, additive
+from ncfix.tables.axes import DEGREE, ORDER, in_order, unit_of
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_sums
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
-from ncfix_heidenhain.cma import CONFIG, LETTERS, cma_text, read_cma
+from ncfix.tables.settings import choice, whole
+from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
 
-DEGREE = np.pi / 180
 MOST = 256
 """Entries of a file of the older controls; of the newer ones no number is public."""
 SIGN = "sign.txt"
@@ -44,7 +45,7 @@ class Heidenhain(Control):
         extrapolation="taken as held at the first and last row (HEID-2)",
         bidirectional=True,
         max_points=MOST,
-        max_tables=len(LETTERS),
+        max_tables=len(ORDER),
         combine="sum over the axes that are looked up",
     )
     assumptions = (
@@ -109,7 +110,7 @@ class Heidenhain(Control):
         sense = sign_of(settings["sign"])
         old = choice(settings, "family", ("tnc640", "itnc530")) == "itnc530"
         both = choice(settings, "backlash", ("off", "on")) == "on"
-        axes = axes_of(request)
+        axes = in_order(request.machine)
         machine = request.machine
         most = whole(settings, "points", 2, MOST)
         lines = additive(machine, request.space, request.tool_length, most, request.target, both=both)
@@ -182,10 +183,10 @@ def _terms(axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Re
 
 
 def _letter(name: str, axes: tuple[str, ...], remarks: Remarks | None) -> str | None:
-    if not name.isdigit():
+    if not name.isdecimal():
         if name in axes:
             return name
-        text = f"{name} is no axis of config.cma" if name in LETTERS else f"{name} needs a kinematics table"
+        text = f"{name} is no axis of config.cma" if name in ORDER else f"{name} needs a kinematics table"
     elif 1 <= int(name) <= len(axes):
         return axes[int(name) - 1]
     else:
@@ -193,11 +194,6 @@ def _letter(name: str, axes: tuple[str, ...], remarks: Remarks | None) -> str | 
     if remarks is not None:
         remarks.refuse(0, text)
     return None
-
-
-def unit_of(axis: str) -> float:
-    """Internal units per unit of the file."""
-    return DEGREE if axis in "ABC" else 1.0
 
 
 def _rounded(line: Line) -> Line:
@@ -212,7 +208,7 @@ def _rounded(line: Line) -> Line:
 def _as_file(line: Line, sense: float, numbered: tuple[str, ...] | None, both: bool) -> Com:
     columns = {
         (str(numbered.index(name) + 1) if numbered else name): sense * line.values[:, i] / unit_of(name)
-        for i, name in sorted(enumerate(line.outputs), key=lambda pair: LETTERS.index(pair[1]))
+        for i, name in sorted(enumerate(line.outputs), key=lambda pair: ORDER.index(pair[1]))
     }
     unit = unit_of(line.input)
     own: Array = sense * line.reverse / unit
@@ -228,34 +224,11 @@ def _check_size(com: Com, name: str) -> None:
         raise RefusedError.of("NCF484", text, hint="is the error in mm?")
 
 
-def axes_of(request: Request) -> tuple[str, ...]:
-    """The axes of the machine in the control's order; raises `RefusedError` NCF484 for one that it cannot have."""
-    names = request.machine.axis_names
-    if not set(names) <= set(LETTERS):
-        raise RefusedError.of("NCF484", f"the control knows {' '.join(LETTERS)}; the machine has {' '.join(names)}")
-    return tuple(letter for letter in LETTERS if letter in names)
-
-
 def sign_of(text: str) -> float:
     """What turns a correction into a value."""
     if text not in ("error", "correction"):
         raise UsageError.of("NCF485", f"sign={text}", hint="error or correction; HEID-1 says how to find out")
     return 1.0 if text == "correction" else -1.0
-
-
-def choice(settings: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
-    """A setting that is one of a few words; raises `UsageError` NCF485."""
-    if settings[key] not in allowed:
-        raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=f"one of {', '.join(allowed)}")
-    return settings[key]
-
-
-def whole(settings: Mapping[str, str], key: str, low: int, high: int) -> int:
-    """A setting that is a whole number; raises `UsageError` NCF485."""
-    text = settings[key]
-    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
-        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
-    return int(text)
 
 
 def _notes(lines: tuple[Line, ...], most: int, both: bool) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.machine import Axis, Machine, State
+from ncfix.tables.axes import DEGREE
 from ncfix.tables.fit import projector
 from ncfix.tables.grid import Array
 from ncfix.tables.poses import even_poses
@@ -25,7 +26,6 @@ OTHERS = 16
 REACH = 1000.0
 """mm: the lever with which an angle may act."""
 NOTHING = 1e-9
-DEGREE = np.pi / 180
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,20 +8,23 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
+from ncfix.machine import Machine
+from ncfix.tables.axes import DEGREE, in_order, unit_of
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import reversal_note
+from ncfix.tables.settings import choice, whole
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import LARGE, Com, old_text, read_com
-from ncfix_heidenhain.control import MOST, axes_of, choice, sign_of, unit_of, whole
+from ncfix_heidenhain.control import MOST, sign_of
 from ncfix_heidenhain.described import Component, component, rows
 
 TABLE = "kinematics.tab"
 UNITS = "units.txt"
-ANGLES = {"deg": np.pi / 180, "rad": 1.0}
+ANGLES = {"deg": DEGREE, "rad": 1.0}
 
 
 class KinematicsComp(Control):
@@ -105,8 +108,7 @@ class KinematicsComp(Control):
         settings = self.settings(request.settings)
         sense = -sign_of(settings["sign"])
         angle = ANGLES[choice(settings, "angle_unit", tuple(ANGLES))]
-        machine, axes = request.machine, axes_of(request)
-        _check_axes(machine.axis_names)
+        machine, axes = request.machine, _axes(request.machine)
         most = whole(settings, "points", 2, MOST)
         play = choice(settings, "backlash", ("off", "on")) == "on"
         found = [component(machine, request.space, i, most, request.target, play) for i in range(len(axes))]
@@ -158,10 +160,12 @@ class KinematicsComp(Control):
         return Kinematics(chain, sense, angle, components, tuple(own)), remarks
 
 
-def _check_axes(names: tuple[str, ...]) -> None:
-    if not {"X", "Y", "Z"} <= set(names) <= set(LETTERS):
-        text = f"the chain needs X, Y and Z and takes A, B and C; the machine has {' '.join(names)}"
+def _axes(machine: Machine) -> tuple[str, ...]:
+    found = in_order(machine, LETTERS)
+    if not {"X", "Y", "Z"} <= set(found):
+        text = f"the chain needs X, Y and Z; the machine has {' '.join(found)}"
         raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
+    return found
 
 
 def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -> Com:
@@ -189,7 +193,7 @@ def _take(
     for name, values in com.columns.items():
         if name.startswith("C") and name != "C":
             components[axis, name] = Grid((axis,), (nodes,), (axis,), values[:, None])
-        elif name.isdigit() and 1 <= int(name) <= len(axes) and axes[int(name) - 1] == axis:
+        elif name.isdecimal() and 1 <= int(name) <= len(axes) and axes[int(name) - 1] == axis:
             own += _own(axis, nodes, -sense * unit_of(axis) * values, com, -sense * unit_of(axis))
         else:
             remarks.refuse(0, f"the column {name} is not that of the axis itself, nor C1 to C6")

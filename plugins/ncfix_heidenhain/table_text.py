@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ncfix.tables.lines import Remarks
+from ncfix.tables.lines import Remarks, as_number
 
 END = "[END]"
 NAME = re.compile(r"\S+")
@@ -74,8 +74,8 @@ def read_table(remarks: Remarks, content: bytes) -> TextTable | None:
     if not lines:
         remarks.refuse(0, "is empty")
         return None
-    begin = lines.pop(0)[1][len("BEGIN ") :] if lines[0][1].startswith("BEGIN ") else ""
-    ended = bool(lines) and lines[-1][1].strip() == END
+    begin = lines.pop(0)[1][len("BEGIN ") :] if lines[0][1].upper().startswith("BEGIN ") else ""
+    ended = bool(lines) and lines[-1][1].strip().upper() == END
     body = lines[: len(lines) - ended]
     if not body or not body[0][1].startswith("NR"):
         remarks.refuse(body[0][0] if body else 0, "no line of column names, which begins with NR")
@@ -102,7 +102,7 @@ def _cells(remarks: Remarks, number: int, line: str, columns: Sequence[Column]) 
         if index + 1 < len(columns) and len(cell) == column.width and not cell.endswith(" ") and cell.strip():
             remarks.refuse(number, f"what stands under {column.name} runs into the next column")
         if cell.startswith(" ") and cell.strip():
-            remarks.refuse(number, f"what stands under {column.name} does not begin where the column does")
+            remarks.doubt(number, f"what stands under {column.name} does not begin where the column does")
         cells.append(cell.strip())
         start = stop
     if len(cells[-1].split()) > 1:
@@ -119,12 +119,9 @@ def _look_for_tabs(remarks: Remarks) -> None:
 
 def number(remarks: Remarks, line: int, cell: str, name: str) -> float:
     """A number in a cell; a remark and nan where it is none."""
-    try:
-        found = float(cell)
-        if found - found == 0:
-            return found
-    except ValueError:
-        pass
+    found = as_number(cell)
+    if found is not None:
+        return found
     what = "a decimal comma" if "," in cell else f"{cell!r} is no number" if cell else "nothing"
     remarks.refuse(line, f"{what} under {name}")
     return float("nan")

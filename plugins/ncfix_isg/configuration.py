@@ -49,7 +49,7 @@ def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
     """The list, and remarks on it; lists of single axes are none of its business."""
     lists = [name for name, content in files.items() if name.lower().endswith(".lis") and MARK not in content]
     path = lists[0] if len(lists) == 1 else "volcomp.lis"
-    remarks = Remarks.of(path, files[path] if len(lists) == 1 else b"")
+    remarks = Remarks.of(path, files[path] if len(lists) == 1 else b"", "#")
     if len(lists) != 1:
         remarks.refuse(0, f"{len(lists)} configuration lists instead of one")
         return Configuration(), remarks
@@ -62,6 +62,9 @@ def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
 
 
 Entries = dict[str, tuple[int, str]]
+SPELT = {name.lower(): name for name in (*HEAD, *TAIL)}
+"""The control does not tell small letters from large ones."""
+TRUTH = {"1": "TRUE", "0": "FALSE"}
 
 
 def _entries(remarks: Remarks) -> Entries:
@@ -71,7 +74,7 @@ def _entries(remarks: Remarks) -> Entries:
         if len(words) == 1:
             remarks.refuse(number, f"{words[0]!r} has no value")
         elif words:
-            name, value = words[0], words[1].strip()
+            name, value = _spelt(words[0]), words[1].strip()
             if name in found:
                 remarks.refuse(number, f"{name} is there twice")
             if name not in HEAD and name not in TAIL and name not in LETTERS and not name.startswith("file"):
@@ -80,24 +83,35 @@ def _entries(remarks: Remarks) -> Entries:
     return found
 
 
+def _spelt(name: str) -> str:
+    """A name as the documentation has it."""
+    if len(name) == 1:
+        return name.upper()
+    return SPELT.get(name.lower(), name.lower() if name.lower().startswith("file") else name)
+
+
 def _check_switches(entries: Entries, remarks: Remarks) -> None:
     for name, value in (("workpiece_axes", "0"), ("Interpolation", "GRID"), ("alternative_model", "FALSE")):
         line, found = entries.get(name, (0, ""))
-        if found != value:
+        if _truth(found) != value and found != value:
             remarks.refuse(line, f"{name} is {found or 'missing'}", f"these grids need {name} {value}")
     line, steps = entries.get("filter_steps", (0, "0"))
-    if not steps.isdigit():
+    if not steps.isdecimal():
         remarks.refuse(line, f"filter_steps is {steps}", "a whole number")
     line, manual = entries.get("manual_activation", (0, "FALSE"))
-    if manual not in ("TRUE", "FALSE"):
+    if _truth(manual) not in TRUTH.values():
         remarks.refuse(line, f"manual_activation is {manual}", "TRUE or FALSE")
+
+
+def _truth(value: str) -> str:
+    return TRUTH.get(value, value.upper())
 
 
 def _check_axes(entries: Entries, axes: list[str], remarks: Remarks) -> None:
     seen: dict[str, str] = {}
     for axis in axes:
         line, number = entries[axis]
-        if not number.isdigit():
+        if not number.isdecimal():
             remarks.refuse(line, f"the number of axis {axis} is {number}")
         elif number in seen:
             remarks.refuse(line, f"axes {seen[number]} and {axis} have the same number {number}")
@@ -111,13 +125,14 @@ def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
         if not path:
             break
         form_line, form = entries.get(f"file_format[{index}]", (line, ""))
-        if form != FORMAT:
+        if form.upper() != FORMAT:
             remarks.refuse(form_line, f"file_format[{index}] is {form or 'missing'}", FORMAT)
-        name = path.replace("\\", "/").rsplit("/", 1)[-1]
-        if name not in files:
+        name = path.strip('"').replace("\\", "/").rsplit("/", 1)[-1]
+        here = [each for each in files if each.lower() == name.lower()]
+        if not here:
             remarks.refuse(line, f"the file {name} is missing")
         else:
-            found.append(name)
+            found.append(name if name in here else here[0])
     known = {f"{key}[{index}]" for index in range(len(found)) for key in ("file", "file_format")}
     for name, (line, _) in entries.items():
         if name.startswith("file") and name not in known and not remarks.wrong:

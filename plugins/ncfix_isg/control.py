@@ -13,7 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import Message, RefusedError
+from ncfix.tables.axes import in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.faces import faces, searched
 from ncfix.tables.grid import Grid
@@ -21,6 +22,7 @@ from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import AIM, search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import Reversal, reversal_note, reversals
+from ncfix.tables.settings import choice, whole, wrong
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, read_configuration
 from ncfix_isg.csv_file import grid_text, parameters, read_grids
@@ -35,6 +37,7 @@ CHOICES = {
     "grids": ("auto", "one", "sum"),
     "play": ("yes", "no"),
 }
+MOST_NODES = 1_000_000
 ONE = 3
 """Up to so many inputs a single grid does."""
 
@@ -53,7 +56,7 @@ class Isg(Control):
         quantum=(1e-6, 1e-6),
         extrapolation="taken as held at the outermost nodes (ISG-2)",
         bidirectional=True,
-        max_points=1_000_000,
+        max_points=MOST_NODES,
         max_tables=50,
         combine="sum: EXX, EXY and EXZ are all in the direction of X",
     )
@@ -128,12 +131,11 @@ class Isg(Control):
     def write(self, request: Request) -> Written:
         """`volcomp.lis` and the grids over the axes that matter."""
         settings = self.settings(request.settings)
-        most = _whole(settings, "points", 8)
-        filter_steps = _whole(settings, "filter_steps", 0)
+        most = whole(settings, "points", 8, MOST_NODES)
+        filter_steps = whole(settings, "filter_steps", 0, MOST_NODES)
         numbers = _numbers(request, settings["axes"])
         for key, allowed in CHOICES.items():
-            if settings[key] not in allowed:
-                raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=" or ".join(allowed))
+            choice(settings, key, allowed)
         inputs = inputs_that_matter(request.machine, request.space, request.tool_length)
         inputs = tuple(sorted(inputs, key=LETTERS.index))
         volume = Volume.of(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")
@@ -191,24 +193,17 @@ def _made(volume: Volume, target: float, most: int, how: str) -> _Made:
 def _numbers(request: Request, given: str) -> dict[str, int]:
     """Axis letter -> logical axis number."""
     names = request.machine.axis_names
-    odd = [name for name in names if name not in LETTERS]
-    if odd or not {"X", "Y", "Z"} <= set(names):
-        text = f"VOLCOMP needs X, Y and Z and knows A, B and C; the machine has {' '.join(names)}"
+    ordered = in_order(request.machine, LETTERS)
+    if not {"X", "Y", "Z"} <= set(names):
+        text = f"VOLCOMP needs X, Y and Z; the machine has {' '.join(names)}"
         raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
     if not given:
-        return {name: number for number, name in enumerate(sorted(names, key=LETTERS.index), 1)}
+        return {name: number for number, name in enumerate(ordered, 1)}
     pairs = [pair.strip().split(":") for pair in given.split(",")]
-    wrong = any(len(pair) != 2 or not (pair[1].isascii() and pair[1].isdigit()) for pair in pairs)
-    if wrong or sorted(pair[0] for pair in pairs) != sorted(names):
-        raise UsageError.of("NCF485", f"axes={given}", hint="LETTER:NUMBER for each axis, separated by commas")
+    odd = any(len(pair) != 2 or not pair[1].isdecimal() for pair in pairs)
+    if odd or sorted(pair[0] for pair in pairs) != sorted(names):
+        raise wrong({"axes": given}, "axes", "LETTER:NUMBER for each axis, separated by commas")
     return {name: int(number) for name, number in sorted(pairs, key=lambda pair: LETTERS.index(pair[0]))}
-
-
-def _whole(settings: Mapping[str, str], key: str, low: int) -> int:
-    text = settings[key]
-    if not (text.isascii() and text.isdigit() and low <= int(text) <= Isg.properties.max_points):
-        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low}")
-    return int(text)
 
 
 def _play(request: Request, settings: Mapping[str, str]) -> tuple[Reversal, ...]:

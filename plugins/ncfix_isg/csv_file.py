@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from ncfix.tables.axes import unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
+from ncfix.tables.lines import Remarks, as_number
 from ncfix_isg.configuration import LETTERS
 
-ANGLES = "ABC"
-DEGREE = np.pi / 180
 PARAMETER = re.compile(r"E[XYZABC]0?[XYZABC]")
 POSITION = re.compile(r"E([XYZ])([XYZABC])")
 LARGE = 1.0
@@ -30,7 +28,7 @@ def parameters(grid: Grid, owner: str = "") -> list[str]:
 
 def grid_text(grid: Grid, owner: str = "") -> bytes:
     """The file of a grid of corrections: errors, that is the opposite, in mm; positions in mm and degree."""
-    units = [DEGREE if name in ANGLES else 1.0 for name in grid.inputs]
+    units = [unit_of(name) for name in grid.inputs]
     lines = [nodes / unit for nodes, unit in zip(grid.nodes, units, strict=True)]
     places = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, len(lines))
     values = np.round(-grid.values.reshape(-1, len(grid.outputs)), 6) + 0.0
@@ -54,19 +52,32 @@ def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tup
     remarks = []
     seen: dict[str, str] = {}
     for name in names:
-        found = Remarks.of(name, files[name])
+        found = Remarks.of(name, files[name], "//")
         remarks.append(found)
-        rows = [(number, row.split("//", 1)[0].split()) for number, row in enumerate(found.rows, 1)]
-        rows = [(number, words) for number, words in rows if words]
-        if not rows:
+        parts = _parts(found.rows)
+        if not parts:
             found.refuse(0, "is empty")
-            continue
-        head_line, head = rows[0]
-        inputs, outputs = _header(found, head_line, head, axes, seen)
-        table = _numbers(found, rows[1:], len(head))
-        if not found.wrong:
-            grids += _grids(found, [number for number, _ in rows[1:]], inputs, outputs, table)
+        for (head_line, names_of), *rows in parts:
+            head = [word.upper() for word in names_of]
+            inputs, outputs = _header(found, head_line, head, axes, seen)
+            table = _numbers(found, rows, len(head))
+            if not found.wrong:
+                grids += _grids(found, [number for number, _ in rows], inputs, outputs, table)
     return grids, remarks
+
+
+Words = tuple[int, list[str]]
+
+
+def _parts(rows: Sequence[str]) -> list[list[Words]]:
+    """The lines of each table, as words, without comments; a line that begins with # stands between two tables."""
+    parts: list[list[Words]] = [[]]
+    for number, row in enumerate(rows, 1):
+        if row.lstrip().startswith("#"):
+            parts.append([])
+        elif words := row.split("//", 1)[0].split():
+            parts[-1].append((number, words))
+    return [part for part in parts if part]
 
 
 def _header(
@@ -97,14 +108,12 @@ def _numbers(remarks: Remarks, rows: Sequence[tuple[int, list[str]]], width: int
         if len(words) != width:
             remarks.refuse(number, f"{len(words)} values under {width} names")
             continue
-        try:
-            values = [float(word) for word in words]
-        except ValueError:
+        values = [as_number(word) for word in words]
+        if None in values:
             comma = any("," in word for word in words)
-            remarks.refuse(number, "a decimal comma" if comma else "something that is not a number")
-            continue
-        if not all(map(math.isfinite, values)):
-            remarks.refuse(number, "a value that is not finite")
+            endless = any(word.strip("+-").lower() in ("nan", "inf", "infinity") for word in words)
+            other = "a value that is not finite" if endless else "something that is not a number"
+            remarks.refuse(number, "a decimal comma" if comma else other)
             continue
         table.append(values)
     return np.array(table, dtype=np.float64).reshape(-1, width)
@@ -132,7 +141,7 @@ def _grids(
     ordered = np.zeros((*counts, len(outputs)))
     ordered[at] = values
     _look_for_jumps(remarks, nodes, ordered)
-    units = [DEGREE if name in ANGLES else 1.0 for name in inputs]
+    units = [unit_of(name) for name in inputs]
     scaled = tuple(line * unit for line, unit in zip(nodes, units, strict=True))
     axes = tuple(sorted({name[1] for name in outputs}))
     error = np.stack([sum(ordered[..., i] for i, name in enumerate(outputs) if name[1] == axis) for axis in axes], -1)

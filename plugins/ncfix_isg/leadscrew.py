@@ -29,8 +29,8 @@ NAME = "leadscrew_{}.lis"
 HEAD = {"interval": "0", "unit": "1", "bilateral": "1"}
 LARGE = 10_000
 """1 mm: no machine has so much."""
-POINT = re.compile(r"kw\.ssfk\.table\[(\d+)\]\.(setpoint|pos|neg)")
-WHOLE = re.compile(r"[-+]?\d+")
+POINT = re.compile(r"kw\.ssfk\.table\[(\d{1,6})\]\.(setpoint|pos|neg)")
+WHOLE = re.compile(r"[-+]?\d{1,12}")
 
 
 def list_text(reversal: Reversal, number: int) -> bytes:
@@ -52,7 +52,7 @@ def read_leadscrews(files: Files, numbers: Mapping[str, str]) -> tuple[list[Term
     remarks = []
     for name, content in sorted(files.items()):
         if MARK in content:
-            found = Remarks.of(name, content)
+            found = Remarks.of(name, content, "#")
             remarks.append(found)
             terms += _terms(found, numbers)
     axes = [term.outputs[0] for term in terms[::2]]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.tables.axes import ORDER, TURNING, unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
@@ -21,7 +22,9 @@ LONGEST = 255
 STEEP = 0.01
 """Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-TRIPLE = re.compile(rf"\s*({NUMBER})\s+({NUMBER})\s+({NUMBER})(.*)")
+GAP = r"(?:\s+|(?=[-+]))"
+"""What sscanf takes between two numbers."""
+TRIPLE = re.compile(rf"\s*({NUMBER}){GAP}({NUMBER}){GAP}({NUMBER})(.*)")
 SECTION = re.compile(r"\s*\[(\w+)\]\s*")
 ENTRY = re.compile(r"\s*(\w+)\s*=\s*(.*?)\s*")
 UNITS = {"mm": 1.0, "metric": 1.0, "inch": 25.4, "in": 25.4, "imperial": 25.4}
@@ -44,7 +47,7 @@ class Joint:
 
     def terms(self) -> Iterator[Term]:
         """The two columns as tables, mm or rad."""
-        unit = np.pi / 180 if self.axis in "ABC" else 1.0
+        unit = unit_of(self.axis)
         for way, values in ((1, self.forward), (-1, self.reverse)):
             grid = Grid((self.axis,), (self.nodes * unit,), (self.axis,), (values * unit)[:, None])
             yield Term((grid,), (self.axis, way))
@@ -70,14 +73,17 @@ def ini_text(joints: list[Joint], letters: str, kind: int) -> bytes:
 
 def read_joints(files: Files) -> tuple[list[Joint], list[Remarks]]:
     """The tables that an ini file among these loads, with remarks on every file."""
-    inis = [name for name in files if name.endswith(".ini")]
+    inis = [name for name in files if name.lower().endswith(".ini")]
     path = inis[0] if len(inis) == 1 else "comp.ini"
-    ini = Remarks.of(path, files[path] if len(inis) == 1 else b"")
+    ini = Remarks.of(path, files[path] if len(inis) == 1 else b"", "#")
     if len(inis) != 1:
         ini.refuse(0, f"{len(inis)} ini files instead of one")
         return [], [ini]
     sections = _sections(ini)
-    letters = sections.get("TRAJ", {}).get("COORDINATES", (0, ""))[1].replace(" ", "").upper()
+    line, coordinates = sections.get("TRAJ", {}).get("COORDINATES", (0, ""))
+    letters = "".join(coordinates.split()).upper()
+    if not set(letters) <= set(ORDER):
+        ini.refuse(line, f"COORDINATES = {coordinates}", f"letters of {ORDER}")
     scale = _scale(sections, ini)
     remarks, joints = [ini], []
     for name, entries in sections.items():
@@ -115,10 +121,12 @@ def _joint(
 ) -> Joint | None:
     line, name = entries["COMP_FILE"]
     number = section.removeprefix("JOINT_")
-    if not number.isdigit() or int(number) >= len(letters):
+    if not number.isdecimal() or int(number[:4]) >= len(letters):
         ini.refuse(line, f"[{section}] is no axis of COORDINATES = {letters or 'nothing'}")
         return None
-    kind_line, kind = entries.get("COMP_FILE_TYPE", (line, ""))
+    kind_line, kind = entries.get("COMP_FILE_TYPE", (line, "0"))
+    if "COMP_FILE_TYPE" not in entries:
+        ini.doubt(line, f"[{section}] has no COMP_FILE_TYPE: LinuxCNC takes 0, actual positions")
     if kind not in ("0", "1"):
         ini.refuse(kind_line, f"COMP_FILE_TYPE = {kind or 'nothing'}", "1: corrections, 0: actual positions")
     if "BACKLASH" in entries:
@@ -129,7 +137,7 @@ def _joint(
     found = Remarks.of(name, files[name])
     remarks.append(found)
     axis = letters[int(number)]
-    return _table(found, int(number), axis, kind == "0", 1.0 if axis in "ABC" else scale)
+    return _table(found, int(number), axis, kind == "0", 1.0 if axis in TURNING else scale)
 
 
 def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: float) -> Joint | None:

@@ -10,17 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-import numpy as np
-
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import Message
+from ncfix.tables.axes import DEGREE, in_order, unit_of
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.positioning import positioning
+from ncfix.tables.settings import choice, whole, wrong
 from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, read_joints
-
-ORDER = "XYZABCUVW"
-DEGREE = np.pi / 180
 
 
 class LinuxCnc(Control):
@@ -75,8 +72,8 @@ class LinuxCnc(Control):
     def write(self, request: Request) -> Written:
         """One file for each axis that has something to correct, and `comp.ini`."""
         settings = self.settings(request.settings)
-        kind = _choice(settings, "type", ("0", "1"))
-        most = _whole(settings, "points", 2, MOST)
+        kind = choice(settings, "type", ("0", "1"))
+        most = whole(settings, "points", 2, MOST)
         letters = _coordinates(request, settings["coordinates"])
         tables = positioning(request.machine, request.space, request.tool_length, most, request.target)
         joints = _joints(tables, letters)
@@ -102,7 +99,7 @@ def _joints(tables: Compensation, letters: str) -> list[Joint]:
     for term in tables.terms[::2]:
         (axis,) = term.outputs
         pair = [each.factors[0] for each in tables.terms if each.outputs == (axis,)]
-        unit = DEGREE if axis in "ABC" else 1.0
+        unit = unit_of(axis)
         nodes = pair[0].nodes[0] / unit
         forward, reverse = (grid.values[:, 0] / unit for grid in pair)
         found.append(Joint(letters.index(axis), axis, nodes, forward, reverse))
@@ -110,26 +107,11 @@ def _joints(tables: Compensation, letters: str) -> list[Joint]:
 
 
 def _coordinates(request: Request, given: str) -> str:
-    names = request.machine.axis_names
-    letters = given.replace(" ", "").upper() or "".join(letter for letter in ORDER if letter in names)
+    names = "".join(in_order(request.machine))
+    letters = given.replace(" ", "").upper() or names
     if sorted(letters) != sorted(names):
-        if given:
-            raise UsageError.of("NCF485", f"coordinates={given} are not the axes of the machine: {' '.join(names)}")
-        raise RefusedError.of("NCF484", f"LinuxCNC has no axes but {ORDER}; the machine has {' '.join(names)}")
+        raise wrong({"coordinates": given}, "coordinates", f"the axes of the machine: {' '.join(names)}")
     return letters
-
-
-def _choice(settings: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
-    if settings[key] not in allowed:
-        raise UsageError.of("NCF485", f"{key}={settings[key]}", hint=f"one of {', '.join(allowed)}")
-    return settings[key]
-
-
-def _whole(settings: Mapping[str, str], key: str, low: int, high: int) -> int:
-    text = settings[key]
-    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
-        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
-    return int(text)
 
 
 def _notes(request: Request) -> tuple[str, ...]:

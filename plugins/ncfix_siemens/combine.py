@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix.tables.axes import unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.neutral import Compensation, Term
-from ncfix_siemens.table import BOTH, DEGREE, DIGITS, PLACES, Table
+from ncfix_siemens.table import BOTH, DIGITS, PLACES, Table
 
 TERMS = ("only", "plus_multiplier", "plus_base", "plus_both")
 """What a product adds: itself, and its multiplier, or its base, or both of them by themselves as well."""
-LETTERS = "ABC"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Reading:
 
     def unit(self, letter: str) -> float:
         """mm or rad per unit of the file."""
-        return DEGREE if letter in LETTERS else 1.0
+        return unit_of(letter)
 
 
 def tables_of(terms: Iterable[Term], reading: Reading) -> list[Table]:

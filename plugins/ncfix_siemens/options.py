@@ -6,19 +6,19 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Machine
+from ncfix.tables.axes import in_order
 from ncfix.tables.control import Option
 from ncfix.tables.scheme import Limits
+from ncfix.tables.settings import choice, whole, wrong
 from ncfix_siemens.cec import Style
-from ncfix_siemens.combine import LETTERS, TERMS
+from ncfix_siemens.combine import TERMS
 
 MODELS = {"840D": (40, 1000), "828D": (8, 200), "802D": (2, 350)}
 """Tables and points of each. 828D and 802D sl from the manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
 MOST_TABLES, MOST_POINTS = 128, 5000
 SCHEMES = ("auto", "poly25", "trigo23", "fik40", "fik20")
 SIGNS = ("error", "correction")
-ORDER = "XYZABCUVW"
 AXIS = re.compile(r"\w{1,16}", re.ASCII)
 
 OPTIONS: Mapping[str, Option] = {
@@ -58,22 +58,22 @@ class Settings:
 
 def checked(given: Mapping[str, str], machine: Machine) -> Settings:
     """The settings for a machine; raises `UsageError` NCF485, `RefusedError` NCF484."""
-    model = _one_of(given, "model", tuple(MODELS))
+    model = choice(given, "model", tuple(MODELS))
     tables, points = MODELS[model]
-    eec = _one_of(given, "positioning", ("cec", "eec")) == "eec"
+    eec = choice(given, "positioning", ("cec", "eec")) == "eec"
     limits = Limits(
-        _whole(given, "tables", 1, MOST_TABLES) if given["tables"] else tables,
-        _whole(given, "points", 3, MOST_POINTS) if given["points"] else points,
+        whole(given, "tables", 1, MOST_TABLES) if given["tables"] else tables,
+        whole(given, "points", 3, MOST_POINTS) if given["points"] else points,
         eec,
     )
     style = Style(_yes(given, "brackets"), _yes(given, "metric_line"), given["path_line"])
     return Settings(
-        _one_of(given, "value_sign", ("", *SIGNS)),
-        _one_of(given, "product_terms", ("", *TERMS)),
-        _one_of(given, "scheme", SCHEMES),
+        choice(given, "value_sign", ("", *SIGNS)),
+        choice(given, "product_terms", ("", *TERMS)),
+        choice(given, "scheme", SCHEMES),
         model,
         limits,
-        _one_of(given, "rotary", ("auto", "correct", "keep")),
+        choice(given, "rotary", ("auto", "correct", "keep")),
         machine_axes(given["axes"], machine),
         style,
     )
@@ -82,35 +82,16 @@ def checked(given: Mapping[str, str], machine: Machine) -> Settings:
 def machine_axes(given: str, machine: Machine) -> dict[str, str]:
     """Axis letter -> machine axis. The letter tells whether a position is in degree, so it must be one of its kind."""
     names = machine.axis_names
-    odd = [axis.name for axis in machine.axes if axis.name not in ORDER or (axis.name in LETTERS) != axis.rotary]
-    if odd:
-        text = f"axes {' '.join(odd)}: linear axes are X Y Z U V W, rotary axes A B C"
-        raise RefusedError.of(
-            "NCF484", text, hint="name them so in the machine file, or correct its programs: ncfix fix"
-        )
+    ordered = in_order(machine)
     if not given:
-        return {name: f"AX{number}" for number, name in enumerate(sorted(names, key=ORDER.index), 1)}
+        return {name: f"AX{number}" for number, name in enumerate(ordered, 1)}
     pairs = [pair.strip().partition(":")[::2] for pair in given.split(",")]
     found = {letter.strip().upper(): axis.strip().upper() for letter, axis in pairs}
     fine = all(AXIS.fullmatch(axis) for axis in found.values()) and len(set(found.values())) == len(pairs)
     if not fine or sorted(found) != sorted(names):
-        hint = f"LETTER:AXIS for each of {' '.join(names)}, separated by commas"
-        raise UsageError.of("NCF485", f"axes={given}", hint=hint)
-    return {name: found[name] for name in sorted(found, key=ORDER.index)}
-
-
-def _one_of(given: Mapping[str, str], key: str, allowed: tuple[str, ...]) -> str:
-    if given[key] not in allowed:
-        raise UsageError.of("NCF485", f"{key}={given[key]}", hint=f"one of {', '.join(filter(None, allowed))}")
-    return given[key]
+        raise wrong({"axes": given}, "axes", f"LETTER:AXIS for each of {' '.join(names)}, separated by commas")
+    return {name: found[name] for name in ordered}
 
 
 def _yes(given: Mapping[str, str], key: str) -> bool:
-    return _one_of(given, key, ("yes", "no")) == "yes"
-
-
-def _whole(given: Mapping[str, str], key: str, low: int, high: int) -> int:
-    text = given[key]
-    if not (text.isascii() and text.isdigit() and low <= int(text) <= high):
-        raise UsageError.of("NCF485", f"{key}={text}", hint=f"a whole number from {low} to {high}")
-    return int(text)
+    return choice(given, key, ("yes", "no")) == "yes"

@@ -12,7 +12,6 @@ DIGITS = 7
 """Decimals of values: 0.1 nm, so that factors of products keep theirs."""
 PLACES = 4
 """Decimals of positions."""
-DEGREE = np.pi / 180
 BOTH = 0
 
 

@@ -148,7 +148,7 @@ def test_axes_beyond_the_chain_are_refused(root: Path) -> None:
     machine = load(root / "examples" / "machines" / "three_axis.toml")
     renamed = machine.replace(axes=(*machine.axes[:2], machine.axes[2].__class__("W", False, False, (0, 0, 1))))
     space = np.array([[0.0, 1.0]] * 3)
-    with pytest.raises(RefusedError, match="needs X, Y and Z"):
+    with pytest.raises(RefusedError, match="axes W: linear axes are X Y Z here"):
         CONTROL.write(Request(renamed.replace(effects=()), space, 0.0, 0.001, SETTINGS))
 
 

@@ -83,7 +83,7 @@ BROKEN = {
     "an angle": (GRID.replace(b"EYY", b"EAX"), "position errors only"),
     "micrometres": (GRID.replace(b"0.004", b"4.0"), "not um"),
     "empty": (b"// nothing\n", "is empty"),
-    "not ASCII": (GRID.replace(b"// errors", "// µm".encode()), "not ASCII"),
+    "not ASCII": (GRID.replace(b"X Y EXX", b"X Y\xa0EXX"), "not ASCII"),
 }
 BROKEN_CONFIG = {
     "an unknown name": (CONFIG.replace(b"filter_steps ", b"filter_stops "), "70468"),

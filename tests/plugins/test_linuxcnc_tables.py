@@ -77,7 +77,7 @@ BROKEN = {
     "a word": (GOOD.replace(b"0.001", b"nan"), "not three numbers"),
 }
 BROKEN_INI = {
-    "no type": (INI.replace(b"COMP_FILE_TYPE = 1\n", b""), "COMP_FILE_TYPE = nothing"),
+    "no type": (INI.replace(b"COMP_FILE_TYPE = 1\n", b""), "has no COMP_FILE_TYPE"),
     "type 2": (INI.replace(b"TYPE = 1", b"TYPE = 2"), "COMP_FILE_TYPE = 2"),
     "no such file": (INI.replace(b"x.comp", b"y.comp"), "y.comp is missing"),
     "no such joint": (INI.replace(b"JOINT_0", b"JOINT_7"), "no axis of COORDINATES"),
