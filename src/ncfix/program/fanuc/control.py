@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.rules import RULES
@@ -10,6 +12,7 @@ from ncfix.program.moves import Kinematics
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.setup import POINTLESS, Setup
+from ncfix.program.tree import Template
 
 NO_POINT = "NCF240"
 DEFAULT_SYSTEM = "IS-B"
@@ -22,6 +25,7 @@ class MacroControl(Control):
     mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
     length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
     length_number  the last H; None if the program has named none
+    coming         gives the shapes of the blocks that follow in the text
     """
 
     def __init__(
@@ -38,6 +42,7 @@ class MacroControl(Control):
         self.mirrored: dict[int, float] = {}
         self.length_code = 0
         self.length_number: int | None = None
+        self.coming: Callable[[], Iterable[Template]] = lambda: ()
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

@@ -90,7 +90,13 @@ class MacroInterpreter(Interpreter):
         control.parameters.position = self.position_read
         control.parameters.unset = self.not_set
         control.parameters.inherits = is_called(self.main.program)
+        control.coming = self.coming
         return MacroFlow(control, self.main, self.find)
+
+    def coming(self) -> Iterator[Template]:
+        """The shapes of the blocks that follow in the text."""
+        unit = self.flow.unit
+        return (unit.program.templates[unit.program.template[block]] for block in range(self.flow.block, len(unit)))
 
     def takes_stretches(self) -> bool:
         """Not while a macro is called after every motion, words are polar, or a corner is put in."""

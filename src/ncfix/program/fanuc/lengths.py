@@ -12,6 +12,7 @@ from ncfix.program.rs274 import lengths
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.coordinates import Z
 from ncfix.program.rs274.groups import LENGTH
+from ncfix.program.tree import Comment, Tape, Word
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
@@ -32,6 +33,12 @@ TIP_CONTROL = (434, 435)
 NOTHING = 1e-12
 PLAIN_CANCEL = 490
 CANCEL = (PLAIN_CANCEL, 491)
+G91 = 910
+REFERENCE = frozenset((280, 300, 530))
+ENDS = frozenset((20, 300))
+CALLS = frozenset((970, 980, 990, 1980))
+MOVING = frozenset("XYABCUVWIJKRP")
+"""Addresses of blocks that move something, or call what may."""
 
 
 def tool_offset(control: MacroControl, block: Block, code: int) -> None:
@@ -46,8 +53,24 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         if code in TIP_CONTROL:
             note_turned(control)
     lengths.tool_offset(control, block, PLAIN_CANCEL if code in CANCEL else code)
-    if control.offsets.tool[Z] != before and "Z" not in block.values:
+    if control.offsets.tool[Z] != before and "Z" not in block.values and not settled(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
+
+
+def settled(control: MacroControl) -> bool:
+    """Whether Z is named, or the program ends, before anything else moves: then nothing rests on where Z stands."""
+    for shape in control.coming():
+        words = {word.address for word in shape.words}
+        if not all(isinstance(item, Word | Comment | Tape) for item in shape.items):
+            return False
+        if "Z" in words:
+            incremental = control.modal.incremental or G91 in shape.g_codes
+            return not incremental or not REFERENCE.isdisjoint(shape.g_codes)
+        if not ENDS.isdisjoint(shape.m_codes):
+            return True
+        if words & MOVING or not CALLS.isdisjoint(shape.m_codes):
+            return False
+    return False
 
 
 def note_turned(control: MacroControl) -> None:
