@@ -71,7 +71,7 @@ ISG: dict[str, Change] = {
     "blank lines": lambda content: content.replace(b"\n", b"\n\n"),
     "blanks at the ends": lambda content: re.sub(rb"^(.*)$", rb"  \1  ", content, flags=re.M),
     "comments in the list": lambda content: content.replace(b"GRID\n", b"GRID   # regular\n# more\n"),
-    "comments in the grid": lambda content: content.replace(b"X Y", b"// positions\nX Y"),
+    "comments in the grid": each_line(rb"^([XYZABC ]+E.*)$", rb"// positions\n\1 // mm"),
     "small letters in the list": lambda content: content.replace(b"Interpolation", b"interpolation").replace(
         b"FALSE", b"false"
     ),

@@ -121,3 +121,27 @@ def test_any_numbers_come_back_as_they_were(numbers: list[Decimal], eol: str) ->
     document, remarks = read(BY_NAME["weihong"], "x", content)
     assert not remarks.wrong
     assert document.content() == content
+
+
+VARIED = {
+    "tnc306": b"Y = F(Z)  \n\nDATUM POINT  -990\nSETUP        14\n  0  Z-990      Y+0\n1  Z-973.616  Y-0.06 \n",
+    "g10": b"; page 3\n(axis 1)\ng10 l52;\nn8312 p2 r0;\nG11;\n",
+    "isg-csv": b"X  EXX EYX // mm\n 0.0\t0.02 0.01 // first\n# next\nY EYY\n0 1e-3\n",
+    "isg-list": b"  # head\nkw.ssfk.unit\t1   # 0.1 um\n\n",
+    "etalon": b"[EXY]\nGridpoints = {\n\t-280.0\t-0.0013 // edge\n}\n\n[C0B]\nVALUE=0.1 \n",
+    "elmo": ELMO.replace(b"3\t4\n", b" 3 4 \n\n"),
+    "pmac": b"; by the maker\ndefine comp 5, #1D,#1 ,20000 ; X\n 10 -12\n\n-3\n",
+    "weihong": b"unit=mm\n; by laser\n[X] \n0.0,0,0.002\n\n 10.0 , 0.003 , 0.005\n",
+    "hexagon": b"STARTX\n10.0 = 10.002\n\nEND\n",
+    "centroid": b"24 -1448819  0 -32\t-38\n\n",
+    "rtl": b"TARGET DATA::\nTarget-count:2\nTargets:\n0.000\t50.000 \n",
+    "ini": b"  # note\n[JOINT_0]\nCOMP_FILE=x.dat\nCOMMENT =\n",
+}
+
+
+@pytest.mark.parametrize("form", VARIED)
+def test_what_a_form_allows_is_kept(form: str) -> None:
+    content = VARIED[form]
+    document, remarks = read(BY_NAME[form], "x", content)
+    assert not remarks.wrong, remarks.wrong
+    assert document.content() == content

@@ -1,122 +1,13 @@
-"""Table files of controls that ncfix makes no tables for: read line by line, and written again to the byte.
-
-A form is a list of the lines that it may have. A line is kept as its words and its numbers; a number keeps its
-decimals, its sign and its place, so that it may be changed and the file written again as its control likes it.
-"""
+"""The forms that are known: what lines each kind of file has, and what must hold between them."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from decimal import Decimal
 from itertools import pairwise
 
+from ncfix.tables.form import GAP, Check, Document, Form, N, read
 from ncfix.tables.lines import Remarks
 
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-N = f"({NUMBER})"
-GAP = r"[ \t]+"
-END = re.compile(rb"\r\n|\n")
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A line: what it is, its text with a slot for every number, and the numbers with the width of their slots."""
-
-    kind: str
-    text: str
-    numbers: tuple[Decimal, ...] = ()
-    plus: tuple[bool, ...] = ()
-
-    def written(self) -> str:
-        """The line."""
-        words = (f"{'+' if plus else ''}{number}" for number, plus in zip(self.numbers, self.plus, strict=True))
-        return "".join(part for pair in zip(self.text.split("\0"), [*words, ""], strict=True) for part in pair)
-
-
-@dataclass(frozen=True, slots=True)
-class Document:
-    """A file of a known form. `eol` after each line; `last` whether also after the last."""
-
-    form: str
-    lines: tuple[Line, ...]
-    eol: str = "\n"
-    last: bool = True
-
-    def content(self) -> bytes:
-        """The file."""
-        text = self.eol.join(line.written() for line in self.lines)
-        return (text + (self.eol if self.last else "")).encode("latin-1")
-
-    def rows(self, kind: str) -> list[tuple[float, ...]]:
-        """The numbers of all lines of a kind."""
-        return [tuple(map(float, line.numbers)) for line in self.lines if line.kind == kind]
-
-    def sections(self, kind: str) -> dict[str, list[tuple[float, ...]]]:
-        """The numbers of the lines after each line of a kind, `[X]`, under what that has between its brackets."""
-        found: dict[str, list[tuple[float, ...]]] = {}
-        rows: list[tuple[float, ...]] = []
-        for line in self.lines:
-            if line.kind == kind:
-                rows = found.setdefault(line.text.strip("[]"), [])
-            elif line.numbers:
-                rows.append(tuple(map(float, line.numbers)))
-        return found
-
-    def with_numbers(self, index: int, *numbers: Decimal) -> Document:
-        """With other numbers in one line."""
-        line = replace(self.lines[index], numbers=numbers)
-        return replace(self, lines=(*self.lines[:index], line, *self.lines[index + 1 :]))
-
-
-Check = Callable[[Document, Remarks], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them."""
-
-    name: str
-    title: str
-    kinds: Mapping[str, str]
-    check: Check = lambda document, remarks: None
-
-
-def read(form: Form, path: str, content: bytes) -> tuple[Document, Remarks]:
-    """A file of a form, with remarks on lines that the form does not have."""
-    remarks = Remarks.of(path, content)
-    eol = "\r\n" if b"\r\n" in content else "\n"
-    lines = [_line(form, remarks, number, row) for number, row in enumerate(remarks.rows, 1)]
-    document = Document(form.name, tuple(lines), eol, bool(END.search(content[-2:])))
-    if not lines:
-        remarks.refuse(0, "is empty")
-    if not remarks.wrong:
-        form.check(document, remarks)
-    return document, remarks
-
-
-def _line(form: Form, remarks: Remarks, number: int, row: str) -> Line:
-    for kind, pattern in form.kinds.items():
-        match = re.fullmatch(pattern, row)
-        if match:
-            return _slotted(kind, row, match)
-    comma = re.search(r"\d,\d", row)
-    remarks.refuse(number, "a decimal comma" if comma else f"is no line of {form.title}", "see docs/controllers.md")
-    return Line("?", row)
-
-
-def _slotted(kind: str, row: str, match: re.Match[str]) -> Line:
-    spans = [match.span(group) for group in range(1, match.re.groups + 1) if match[group] is not None]
-    text, at = "", 0
-    for start, stop in spans:
-        text += row[at:start] + "\0"
-        at = stop
-    words = [row[start:stop] for start, stop in spans]
-    numbers = tuple(Decimal(word) for word in words)
-    if any(str(value) != word.lstrip("+") for value, word in zip(numbers, words, strict=True)):
-        return Line(kind, row)  # a way of writing that a number does not keep: such a line stays as it is
-    return Line(kind, text + row[at:], numbers, tuple(word.startswith("+") for word in words))
+__all__ = ["BY_NAME", "FORMS", "read", "recognised"]
 
 
 def _ascending(kind: str) -> Check:
@@ -130,6 +21,8 @@ def _ascending(kind: str) -> Check:
 
 
 def _elmo(document: Document, remarks: Remarks) -> None:
+    if not any(line.kind == "mark" for line in document.lines):
+        remarks.refuse(0, "no [header] and no [table]")
     sizes = document.rows("dimensions")
     shape = tuple(map(int, sizes[0])) if sizes else ()
     rows = document.rows("row")
@@ -177,12 +70,18 @@ def _headed(document: Document, remarks: Remarks) -> None:
     if not lines or lines[0].kind != "head":
         remarks.refuse(0, "should begin with a line of names")
         return
+    names = 0
     for number, line in enumerate(document.lines, 1):
-        if line.kind == "row" and len(line.numbers) != len(lines[0].text.split()):
-            remarks.refuse(number, f"{len(line.numbers)} numbers under {len(lines[0].text.split())} names")
+        count = len(line.written().split("//", 1)[0].split())
+        if line.kind == "head":
+            names = count
+        elif line.kind == "row" and count != names:
+            remarks.refuse(number, f"{count} numbers under {names} names")
 
 
 BLANK = r"[ \t]*"
+NOTES = {"comment": rf"{BLANK}(?:;|//|#).*", "blank": BLANK}
+"""Lines that say nothing, where a form may have them."""
 LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}(?:#.*)?", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}(?:#.*)?"}
 FORMS = (
     Form("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row")),
@@ -192,8 +91,8 @@ FORMS = (
         {
             "section": r"\[\w+\]",
             "entry": rf"\w+ *= *{N}",
-            "word": r"\w+ *= *\S.*",
-            "comment": r"[#;].*",
+            "word": r"\w+ *=.*",
+            "comment": rf"{BLANK}[#;].*",
             "blank": BLANK,
         },
     ),
@@ -201,17 +100,24 @@ FORMS = (
         "tnc306",
         "the TNC 306",
         {
-            "rule": r"[XYZ] = F\([XYZ]\)",
-            "datum": rf"DATUM POINT +{N}",
-            "setup": rf"SETUP +{N}",
-            "row": rf"{N} +[XYZ]{N} +[XYZ]{N}",
+            "rule": rf"[XYZ] *= *F\([XYZ]\){BLANK}",
+            "datum": rf"DATUM POINT +{N}{BLANK}",
+            "setup": rf"SETUP +{N}{BLANK}",
+            "row": rf"{BLANK}{N} +[XYZ]{N} +[XYZ]{N}{BLANK}",
+            "blank": BLANK,
         },
         _framed("rule", "row"),
     ),
     Form(
         "g10",
         "programmable parameter input",
-        {"begin": r"G10 ?L5[02]", "record": rf"N{N}(?: P{N})? R{N}", "end": "G11", "comment": r";.*", "blank": BLANK},
+        {
+            "begin": rf"(?i:G10 *L5[02]);?{BLANK}",
+            "record": rf"(?i:N){N}(?: *(?i:P){N})? *(?i:R){N};?{BLANK}",
+            "end": rf"(?i:G11);?{BLANK}",
+            "comment": rf"{BLANK}(?:;.*|\(.*\)|%)",
+            "blank": BLANK,
+        },
         _framed("begin", "end"),
     ),
     Form(
@@ -219,23 +125,24 @@ FORMS = (
         "ISG_CSV",
         {
             "comment": r"//.*",
-            "head": r"[XYZABC](?:[ \t]+[A-Z]\w*)+",
-            "row": rf"{N}" + rf"(?:{GAP}{N})?" * 23,
+            "head": rf"{BLANK}[XYZABC](?:[ \t]+[A-Z]\w*)+{BLANK}(?://.*)?",
+            "row": rf"{BLANK}{N}" + rf"(?:{GAP}{N})?" * 23 + rf"{BLANK}(?://.*)?",
+            "next": r"#.*",
             "blank": BLANK,
         },
         _headed,
     ),
-    Form("isg-list", "an ISG list", {**LIST, "comment": r"#.*", "blank": BLANK}),
+    Form("isg-list", "an ISG list", {**LIST, "comment": rf"{BLANK}#.*", "blank": BLANK}),
     Form(
         "etalon",
         "the Etalon exchange format",
         {
             "comment": r"//.*",
             "section": r"\[\w+\]",
-            "value": rf"VALUE = {N}",
-            "open": r"Gridpoints = \{",
-            "point": rf" *{N} {N}",
-            "close": r"\} *(?://.*)?",
+            "value": rf"{BLANK}VALUE *= *{N}{BLANK}(?://.*)?",
+            "open": rf"{BLANK}Gridpoints *= *\{{{BLANK}",
+            "point": rf"{BLANK}{N}{GAP}{N}{BLANK}(?://.*)?",
+            "close": rf"{BLANK}\}}{BLANK}(?://.*)?",
             "blank": BLANK,
         },
     ),
@@ -251,7 +158,8 @@ FORMS = (
             "grid": rf"Axis grid size(?:\t{N})(?:\t{N})?(?:\t{N})?",
             "dimensions": rf"Table dimensions(?:\t{N})(?:\t{N})?(?:\t{N})?",
             "block": r"Table #\d+ (?:Start|End) Data",
-            "row": rf"{N}" + rf"(?:\t{N})?" * 24,
+            "row": rf"{BLANK}{N}" + rf"(?:[ \t]+{N})?" * 60 + BLANK,
+            "blank": BLANK,
         },
         _elmo,
     ),
@@ -260,33 +168,44 @@ FORMS = (
         "PMAC",
         {
             "comment": r";.*",
-            "define": r"DEFINE COMP \d+(?:\.\d+)*(?:, ?#\d+D?)+(?:, ?\d+)+",
-            "row": rf"{N}" + rf"(?:{GAP}{N})?" * 24,
+            "define": rf"{BLANK}(?i:DEFINE +COMP) *\d+(?:\.\d+)*(?: *, *#\d+[dD]?)+(?: *, *\d+)+{BLANK}(?:;.*)?",
+            "row": rf"{BLANK}{N}" + rf"(?:{GAP}{N})?" * 24 + rf"{BLANK}(?:;.*)?",
+            "blank": BLANK,
         },
         _defined,
     ),
     Form(
         "weihong",
         "NcStudio's axeserr.dat",
-        {"unit": r"unit = (?:mm|inch)", "axis": r"\[\w\]", "row": rf"{N}, {N}, {N}"},
+        {
+            "unit": rf"unit *= *(?:mm|inch){BLANK}",
+            "axis": rf"\[\w\]{BLANK}",
+            "row": rf"{BLANK}{N} *, *{N} *, *{N}{BLANK}",
+            **NOTES,
+        },
         _united,
     ),
     Form(
         "hexagon",
         "COMP.ERR",
-        {"start": "START[A-Z]", "row": rf"{N}={N}", "end": "END"},
+        {
+            "start": rf"START[A-Z]{BLANK}",
+            "row": rf"{BLANK}{N} *= *{N}{BLANK}",
+            "end": rf"END[A-Z]?{BLANK}",
+            "blank": BLANK,
+        },
         _framed("start", "end"),
     ),
-    Form("centroid", "Centroid's .tab", {"row": rf"{N} {N} {N} {N} {N}"}),
+    Form("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}),
     Form(
         "rtl",
         "Renishaw's .rtl",
         {
             "section": r"[A-Z -]+::",
-            "target-count": rf"Target-count: {N}",
-            "run-count": rf"Run-count: {N}",
+            "target-count": rf"Target-count: *{N}{BLANK}",
+            "run-count": rf"Run-count: *{N}{BLANK}",
             "entry": r"[\w -]+:.*",
-            "numbers": rf"{N}" + rf"(?: {N})?" * 24,
+            "numbers": rf"{BLANK}{N}" + rf"(?:{GAP}{N})?" * 60 + BLANK,
             "blank": BLANK,
         },
         _runs,
