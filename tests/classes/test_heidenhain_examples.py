@@ -32,7 +32,7 @@ def test_a_shipped_program_is_corrected(root: Path, name: str, strategy: str) ->
     before, after = fixed.report.error_before_um["max"], fixed.report.error_after_um["max"]
     assert before is not None
     assert after is not None
-    assert after < before / 3
+    assert after < before / 2
     if strategy == "full":
         return
     row = next(line for line in (root / "docs/dialects.md").read_text().splitlines() if f"`{name}`" in line)

@@ -55,6 +55,35 @@ def test_how_far_back_a_refusal_reaches(text: str, refused: int, expected: list[
     assert pinned(text, refused) == expected
 
 
+@pytest.mark.parametrize(
+    ("text", "refused", "expected"),
+    [
+        ("G1 X1 Y1\nG91 G2 X2 Y0 I1 J0", 2, []),
+        ("G1 X1 Y1\nG91 G2 X2 Y0 I=AC(2) J=AC(1)", 2, [1]),
+        ("G1 X1 Y1\nG2 X=IC(2) Y=IC(0) I1 J0", 2, []),
+        ("G1 X1 Y1\nG2 X=IC(2) Y1 I1 J0", 2, [1]),
+        ("G1 X1 Y1\nX=IC(1)\nG2 X4 Y1 I1 J0", 3, [1, 2]),
+        ("G91 G1 X1 Y1\nX=AC(1)\nY=AC(1)\nG90 G2 X3 Y1 I1 J0", 4, [2, 3]),
+        ("G1 X1 Y1\nG111 X0 Y0\nG1 X1 Y0\nG3 AP=90 RP=1", 3, [2]),
+    ],
+)
+def test_words_that_say_how_they_are_meant(text: str, refused: int, expected: list[int]) -> None:
+    assert pinned(text, refused, "siemens") == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("C IX+2 IY+0 DR-", [1]), ("CR IX+2 IY+0 R+1 DR-", []), ("CR X+3 Y+1 R+1 DR-", [1]), ("CP IPA-90 DR-", [])],
+)
+def test_arcs_of_klartext(text: str, expected: list[int]) -> None:
+    body = f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 FMAX\nL X+1 Y+1 F100\nCC X+2 Y+1\n{text}\nEND PGM A MM\n"
+    moves = trace(
+        read(body.encode(), "part.h", "heidenhain"), Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()
+    ).moves
+    found, _ = closure_of_refusals(moves, np.array([False, False, True]))
+    assert np.flatnonzero(found[:2]).tolist() == expected
+
+
 def test_holes_are_drilled_where_their_blocks_say() -> None:
     assert pinned("G0 X1. Y1.\nG81 X2. Z-1. R1.\nX3.", 3, "fanuc") == []
 

@@ -70,8 +70,9 @@ class Settled:
 
     def shown(self, rapids: bool) -> Mask:
         """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them."""
-        shown: Mask = self.moves.cuts & ~self.kept
-        return shown | (rapids & (self.moves.kind == Kind.RAPID) & ~self.kept)
+        wanted = self.moves.cuts | (self.moves.kind == Kind.RAPID) if rapids else self.moves.cuts
+        shown: Mask = wanted & ~self.kept
+        return shown
 
     @property
     def shift(self) -> Array:

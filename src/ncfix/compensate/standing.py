@@ -46,7 +46,7 @@ def standing(
     if not kept.any() and not staying.any() and _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
         return Standing(moves.start + np.concatenate([first, shift[:-1]]), moves.end + shift)
-    decides = ~staying & (~kept[:, None] | (moves.moved & ~moves.incremental[:, None]))
+    decides = ~staying & (~kept[:, None] | (moves.moved & ~moves.increments))
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
     jumps, risen = _risen(moves, approaches)

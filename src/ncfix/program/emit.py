@@ -114,7 +114,7 @@ class _Emitter:
         self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
-        self.wordless = moves.wordless
+        self.wordless, self.increments = moves.wordless, moves.increments
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
@@ -219,9 +219,8 @@ class _Emitter:
         moves = self.moves
         if self.reading.end is not None:
             return np.asarray(self.reading.end[row])
-        if moves.incremental[row] and moves.rule[row] != Rule.PASS:
-            return np.asarray(self.position + (moves.end[row] - moves.start[row]))
-        return np.asarray(moves.end[row])
+        way = moves.end[row] - moves.start[row]
+        return np.asarray(np.where(self.increments[row], self.position + way, moves.end[row]))
 
     def _check_code(self, row: int) -> None:
         """A motion that is kept must not rely on a code that was replaced."""

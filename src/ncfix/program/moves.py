@@ -130,6 +130,8 @@ class Moves:
                  which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
     placed       (n, n_axes) the program itself has brought the axis to where it stands, in the coordinates in force:
                  only then may it get a word that its block lacks (see `rs274.places`). None: all are
+    fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
+    counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
     """
 
     axes: tuple[str, ...]
@@ -160,6 +162,8 @@ class Moves:
     pointing: Pointing | None = None
     approach: NDArray[np.float64] | None = None
     placed: NDArray[np.bool_] | None = None
+    fixed_centre: NDArray[np.bool_] | None = None
+    counted: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -171,6 +175,20 @@ class Moves:
             return np.zeros(self.end.shape, dtype=bool)
         wordless: NDArray[np.bool_] = ~(self.placed | self.programmed)
         return wordless
+
+    @property
+    def increments(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes along which a motion makes the same way wherever it starts."""
+        counted = self.incremental[:, None] if self.counted is None else self.counted
+        return np.broadcast_to(counted & (self.rule != Rule.PASS)[:, None], self.end.shape)
+
+    @property
+    def about_fixed_point(self) -> NDArray[np.bool_]:
+        """(n,) arcs whose centre is where a word says, wherever they start."""
+        if self.fixed_centre is None:
+            return self.arc_absolute
+        fixed: NDArray[np.bool_] = self.arc_absolute | self.fixed_centre
+        return fixed
 
     @property
     def cuts(self) -> NDArray[np.bool_]:

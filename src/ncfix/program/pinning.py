@@ -44,15 +44,16 @@ class _Walk:
         self.reached = len(moves)
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
+        self.said = moves.programmed & ~moves.increments
         self.anchored = ((moves.kind == Kind.ARC) & ~self._floating() | bound) & ~self.passed
 
     def _floating(self) -> Mask:
-        """Arcs of which both end and centre count from where they start: incremental ones, and full circles."""
+        """Arcs of which both end and centre count from where they start, full circles among them."""
         moves = self.moves
-        named = [moves.programmed[:, column] for column in self.columns if column >= 0]
+        named = [self.said[:, column] for column in self.columns if column >= 0]
         in_plane = np.abs(moves.normal) < 1 - STILL
         own = np.stack(named, axis=1) & in_plane[:, [k for k, column in enumerate(self.columns) if column >= 0]]
-        return np.asarray(~moves.arc_absolute & (moves.incremental | ~own.any(axis=1)))
+        return np.asarray(~moves.about_fixed_point & ~own.any(axis=1))
 
     def back_from(self, arc: int) -> None:
         """Keep the motions before an arc until every axis of its plane has been named by one."""
@@ -86,9 +87,7 @@ class _Walk:
         moves = self.moves
         if self.passed[row]:
             return np.asarray(moves.moved[row])
-        decided = moves.programmed[row] & (moves.end[row] == moves.start[row + 1])
-        if moves.incremental[row]:
-            return np.zeros_like(decided)
+        decided = self.said[row] & (moves.end[row] == moves.start[row + 1])
         turned = [
             column
             for column, own in zip(self.columns, moves.frames[moves.frame[row]].rotation, strict=True)

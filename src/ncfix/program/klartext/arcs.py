@@ -148,7 +148,7 @@ def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
     sweep = hand * circle.sweep
     relative = step.name in ("ct", "ctp", "cp") or step.words.incremental
     with_increments(control, relative)
-    arc = Arc(centre, normal, sweep)  # type: ignore[arg-type]
+    arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
     code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
     control.move(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc)
     with_increments(control, False)

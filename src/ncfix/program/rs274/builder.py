@@ -47,11 +47,15 @@ DTYPES: dict[str, type[np.generic]] = {
 
 
 class Arc(NamedTuple):
-    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep."""
+    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep.
+
+    fixed  a word says where its centre is, not how far that is from the start
+    """
 
     centre: tuple[float, float, float]
     normal: tuple[float, float, float]
     sweep: float
+    fixed: bool = False
 
 
 @dataclass(slots=True)
@@ -111,6 +115,7 @@ class Builder:
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
         self._approaches: dict[int, Vector] = {}
+        self._counted: dict[int, int] = {}
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
@@ -165,6 +170,10 @@ class Builder:
         """The command at the level R of the canned cycle that is added next."""
         self._approaches[self.count] = command
 
+    def counted(self, axes: int) -> None:
+        """The motion that is added next has words that count from where it starts for these axes, and only these."""
+        self._counted[self.count] = axes
+
     def extend(self, stretch: Stretch) -> None:
         """Many motions."""
         self._flush()
@@ -191,6 +200,7 @@ class Builder:
             for name in ("start", "end")
         )
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
+        styles = self._style_columns(style)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
             axes=self.axes,
@@ -208,13 +218,15 @@ class Builder:
             pointing=None,
             approach=self._approach_column(len(block)),
             placed=(adrift[:, None] & bits) == 0,
-            **self._style_columns(style),
+            fixed_centre=self._fixed_column(len(block)),
+            counted=self._counted_column(styles["incremental"]),
+            **styles,
         )
 
     def clear(self) -> None:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
-        self._buffer, self._stretches, self._arcs, self._approaches = Buffer(), [], {}, {}
+        self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
@@ -235,6 +247,23 @@ class Builder:
             return None
         column = np.full((count, len(self.columns)), np.nan)
         column[list(self._approaches)] = np.array(list(self._approaches.values()))[:, self.columns]
+        return column
+
+    def _fixed_column(self, count: int) -> NDArray[np.bool_] | None:
+        rows = [row for row, arc in self._arcs.items() if arc.fixed]
+        if not rows:
+            return None
+        column = np.zeros(count, dtype=np.bool_)
+        column[rows] = True
+        return column
+
+    def _counted_column(self, incremental: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+        if not self._counted:
+            return None
+        column = np.repeat(incremental[:, None], len(self.columns), axis=1)
+        bits = np.array([1 << column for column in self.columns], dtype=np.int64)
+        masks = np.array(list(self._counted.values()), dtype=np.int64)
+        column[list(self._counted)] = (masks[:, None] & bits) != 0
         return column
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -191,10 +191,10 @@ class Control:
         if self.modal.diameter:
             self.scale[0] /= 2
         self._frame = -1
-        self.places.watch(self.anchors())
+        self.places.watch(self.anchors(), self.rotation)
 
     def anchors(self) -> list[Hashable]:
-        """For each letter what its numbers count from, besides shifts that the program states in numbers (G52)."""
+        """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
         offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool
         own = [a + b for a, b in zip(offsets.origin, offsets.shift, strict=True)]
         system = self.modal.system, self.extended_name
@@ -204,10 +204,8 @@ class Control:
         ]
 
     def spatial_anchor(self, index: int) -> Hashable:
-        """The same for what X, Y and Z have of their own: turns, the tip of the tool, the tool's length."""
-        centre = tuple(self.offsets.centre) if self.rotation[index] != IDENTITY[index] else None
-        length = self.tools.offset if self.tcp or index == Z else None
-        return self.rotation[index], centre, self.offsets.feature[index], self.tcp, length
+        """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
+        return self.tcp, self.tools.offset if self.tcp or index == Z else None
 
     @property
     def frame(self) -> int:
@@ -280,7 +278,9 @@ class Control:
         if settles is None:
             settles = 0 if passing or self.modal.incremental else axes
         adrift = self._adrift(settles)
-        if not (passing or refusal) and (why := self._dragged(axes, adrift, target)):
+        if not passing and settles & axes != (0 if self.modal.incremental else axes):
+            self.builder.counted(axes & ~settles)
+        if not (passing or refusal or unknown) and (why := self._dragged(axes, adrift, target)):
             refusal, passing = ("", why) if kind in (Kind.RAPID, Kind.FEED) else (why, "")
         elif passing and kind != Kind.DWELL:
             self.places.lose(mask_of(i for i in self.machine if axes >> i & 1 or target[i] != self.position[i]))

@@ -22,11 +22,13 @@ class Places:
 
     adrift   axes that the program has not brought to where they stand
     anchors  for each letter what its numbers count from, besides what the program states in numbers itself
+    rotation how X Y Z of the program are turned: its rows, for comparison only
     begun    there has been a motion
     """
 
     adrift: int
     anchors: Sequence[Hashable] = field(default_factory=list)
+    rotation: Sequence[Hashable] = ()
     begun: bool = False
 
     @classmethod
@@ -35,11 +37,16 @@ class Places:
         given = () if setup.assume_zero else setup.initial
         return cls(sum(1 << letters.index(axis) for axis in axes if axis not in given))
 
-    def watch(self, anchors: Sequence[Hashable]) -> None:
-        """What numbers count from now; an axis for which that has changed since the first motion is adrift."""
+    def watch(self, anchors: Sequence[Hashable], rotation: Sequence[Hashable]) -> None:
+        """What numbers count from now; an axis for which that has changed since the first motion is adrift.
+
+        Of axes that the program turns (G68, ROT) each is made of all: they are adrift together.
+        """
         if self.begun:
-            self.adrift |= mask_of(i for i, (a, b) in enumerate(zip(self.anchors, anchors, strict=True)) if a != b)
-        self.anchors = anchors
+            self.adrift |= changed(self.anchors, anchors)
+            turned = changed(self.rotation, rotation)
+            self.adrift |= turned if self.adrift & turned else 0
+        self.anchors, self.rotation = anchors, rotation
 
     def lose(self, axes: int) -> None:
         """Something else than a word of the program has moved these axes, or may have."""
@@ -48,6 +55,11 @@ class Places:
     def settle(self, axes: int) -> None:
         """The program says where these axes stand."""
         self.adrift &= ~axes
+
+
+def changed(before: Sequence[Hashable], now: Sequence[Hashable]) -> int:
+    """The places at which two sequences differ, as a bit mask."""
+    return mask_of(index for index, (a, b) in enumerate(zip(before, now, strict=True)) if a != b)
 
 
 def mask_of(indices: Iterable[int]) -> int:

@@ -43,8 +43,14 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
     step = in_frame(control, [b - a for a, b in zip(control.position, end.target, strict=True)])
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
-    circle = circle_of(control, plane, centre, sweep)
+    circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
     control.go(Kind.ARC, words, end, code, refusal=refusal, arc=circle)
+
+
+def is_fixed(words: Words, plane: Plane) -> bool:
+    """Whether words say where the centre is: by `AC`, or as the pole."""
+    letters = (CENTRE_LETTERS[index] for index in (plane.first, plane.second))
+    return bool({"AP", "RP"} & words.values.keys()) or any(words.forms.get(each) == ABSOLUTE for each in letters)
 
 
 def refusal_of(words: Words, plane: Plane) -> str:

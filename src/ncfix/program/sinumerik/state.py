@@ -103,7 +103,7 @@ class Sinumerik(Control):
         self._frame = -1
         if self.rotation != before:
             self.hide_in_turned_frame()
-        self.places.watch(self.anchors())
+        self.places.watch(self.anchors(), self.rotation)
 
     def anchors(self) -> list[Hashable]:
         """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
@@ -114,11 +114,10 @@ class Sinumerik(Control):
         ]
 
     def spatial_anchor(self, index: int) -> Hashable:
-        """Turns, the tip of the tool, and the edge that is in force across the plane."""
+        """Whether these are coordinates of the tip, and the edge that is in force across the plane."""
         if index not in GEOMETRY:
             return None
-        edge = (self.tools.offset, self.edge) if self.tcp or index == Z else None
-        return self.rotation[index], self.tcp, edge
+        return self.tcp, (self.tools.offset, self.edge) if self.tcp or index == Z else None
 
     def hide_in_turned_frame(self) -> None:
         """Coordinates of a frame that has just been turned are known if all of them are."""
