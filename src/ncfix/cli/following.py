@@ -102,14 +102,14 @@ class Following:
 
     def compared(self, original: str, fixed: str, tolerance_um: float) -> Compared:
         """What this machine does with two programs, measured against what the first one means."""
-        from ncfix.compensate.comparison import compare
+        from ncfix.compensate.comparison import compare, error_of
         from ncfix.compensate.simulation import unseen
         from ncfix.compensate.wordless import left_in_cuts
 
         program, machine, meant = self._on_machine(original)
         other, _, done = self._on_machine(fixed, like=program)
         there, back = compare(machine, meant, done)
-        before, _ = compare(machine, meant, meant)
+        before = error_of(machine, meant)
         lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
         limit = tolerance_um / 1e3
         return Compared(

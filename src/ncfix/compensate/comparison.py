@@ -78,21 +78,43 @@ def compare(machine: Machine, original: Moves, other: Moves, state: State = Stat
     are not the same cut at all.
     """
     meant, done = Intent(machine, original, state), Intent(machine, other, state)
-    intended = Curve.of(meant, meant.tip)
-    actual = Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
+    intended, actual = Curve.of(meant, meant.tip), _as_made(done)
     _check_alike(intended, actual)
-    there = TipError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
-    back = TipError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
-    turning = uncertain(done, actual.rows, actual.fraction)
-    if turning.any():
-        there, back = _on_either_side(done, turning, intended, actual, there, back)
+    there, back = _there(intended, actual), _back(intended, actual)
+    flank = _on_other_side(done, actual)
+    if flank is not None:
+        there, back = _nearer(there, _there(intended, flank)), _nearer(back, _back(intended, flank))
     return there, back
 
 
-def _on_either_side(
-    done: Intent, turning: Mask, intended: Curve, actual: Curve, there: TipError, back: TipError
-) -> tuple[TipError, TipError]:
-    """The same where axes that turn round may be on either side of their play: of both sides the nearer one."""
+def error_of(machine: Machine, moves: Moves, state: State = State()) -> TipError:  # noqa: B008
+    """How far a program on this machine is from what it means, along what is made: in the measure of `compare`."""
+    intent = Intent(machine, moves, state)
+    intended, actual = Curve.of(intent, intent.tip), _as_made(intent)
+    there, flank = _there(intended, actual), _on_other_side(intent, actual)
+    return there if flank is None else _nearer(there, _there(intended, flank))
+
+
+def _as_made(done: Intent) -> Curve:
+    """The path of a program on the real machine."""
+    return Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
+
+
+def _there(intended: Curve, actual: Curve) -> TipError:
+    """From what is made to what is meant."""
+    return TipError(actual.rows, actual.fraction, nearest(intended, actual), actual.points)
+
+
+def _back(intended: Curve, actual: Curve) -> TipError:
+    """From what is meant to what is made."""
+    return TipError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
+
+
+def _on_other_side(done: Intent, actual: Curve) -> Curve | None:
+    """The path with axes that turn round on the other side of their play, where they may be; None if none does."""
+    turning = uncertain(done, actual.rows, actual.fraction)
+    if not turning.any():
+        return None
     motions = np.zeros((len(done.moves), turning.shape[1]), dtype=bool)
     np.logical_or.at(motions, actual.rows, turning)
 
@@ -101,10 +123,7 @@ def _on_either_side(
 
     parts = batches(len(actual.rows))
     sides = [other_side(done, actual.rows[part], actual.fraction[part], turning[part]) for part in parts]
-    points = np.concatenate(sides)
-    other = replace(actual, points=points, tip=tip)
-    on_curve = TipError(actual.rows, actual.fraction, nearest(intended, other), points)
-    return _nearer(there, on_curve), _nearer(back, replace(back, actual=nearest(other, intended)))
+    return replace(actual, points=np.concatenate(sides), tip=tip)
 
 
 def _nearer(one: TipError, other: TipError) -> TipError:
