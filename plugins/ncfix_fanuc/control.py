@@ -100,7 +100,10 @@ class Fanuc(Control):
         "Read cnc_rdvolccomp at one pose and compare it with volume.csv.",
         "Measure one line again: the error must have become smaller, not twice as large.",
     )
-    switch_off = "Switch the function off by its parameter, or set the magnification to zero."
+    switch_off = (
+        "Switch the function off by its parameter, or set the magnification to zero; give parameter 1851 its old "
+        "values if backlash.txt was there. Power off and on, home all axes."
+    )
 
     def write(self, request: Request) -> Written:
         """`volume.json` with the FOCAS records, the same as `volume.csv`, as text if asked for, and the play."""

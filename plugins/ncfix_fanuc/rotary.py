@@ -153,7 +153,10 @@ class FanucRotary(Control):
         "Write the records with cnc_wrrotvolc, switch power off and on, home all axes.",
         "Measure one line with a short and with a long tool: both errors must have become smaller.",
     )
-    switch_off = "Switch the function off by its parameter."
+    switch_off = (
+        "Switch the function off by its parameter; give parameter 1851 its old values if backlash.txt was there. Power "
+        "off and on, home all axes."
+    )
 
     def write(self, request: Request) -> Written:
         """`rotary.json`, and `rotary-axes.json` for machines with a table that turns."""

@@ -11,7 +11,7 @@ import click
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.following import Following
-from ncfix.cli.options import Positive, dialect_option, force_option, json_option, machine_option
+from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.diagnostics import ExitCode, Place, UsageError
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @machine_option
 @click.option("-o", "--output", metavar="DIR", required=True, help="The folder for the files.")
 @click.option(
-    "--tool-length", type=float, default=0.0, show_default=True, help="The length that the tables hold for, mm."
+    "--tool-length", type=Length(), default=0.0, show_default=True, help="The length that the tables hold for, mm."
 )
 @click.option(
     "--target-um",

@@ -33,6 +33,10 @@ SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".SPF", ".mpf", ".MPF")
 """Under what a subprogram's file may go besides its name."""
 
 
+LONGEST = 5000.0
+"""mm: no tool is longer."""
+
+
 class Positive(click.ParamType):  # type: ignore[type-arg]
     """A finite number above zero."""
 
@@ -46,6 +50,22 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
             found = math.nan
         if not 0 < found < math.inf:
             self.fail(f"{value!r} is not a number above zero", param, ctx)
+        return found
+
+
+class Length(click.ParamType):  # type: ignore[type-arg]
+    """A length in mm that a tool can have, or none at all."""
+
+    name = "mm"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number."""
+        try:
+            found = float(value)
+        except ValueError:
+            found = math.nan
+        if not 0 <= found <= LONGEST:
+            self.fail(f"{value!r} is not a length from 0 to {LONGEST:g} mm", param, ctx)
         return found
 
 

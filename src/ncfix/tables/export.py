@@ -112,6 +112,12 @@ def _remarks(control: Control, request: Request, left: Residual, written: Writte
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."
+    for axis, (low, high) in zip(request.machine.axes, request.space.tolist(), strict=True):
+        travel = request.machine.ranges[request.machine.axis_names.index(axis.name)].tolist()
+        if np.isfinite(travel).all() and (low > travel[0] + 1e-9 or high < travel[1] - 1e-9):
+            sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
+            covered = f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
+            yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
     if not control.any_tool and not request.tool_length and request.machine.depends_on_tool_length:
         yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from html import escape
 
+import numpy as np
+
 from ncfix.tables.control import Control, Request, Written
+from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
+from ncfix.tables.poses import corners
 from ncfix.tables.residual import Residual, residual
 
 CLASSES = {
@@ -20,6 +24,17 @@ CLASSES = {
     "R-VOL+": "the same, and the direction of the tool.",
 }
 """What ISO/TR 16907 means by them: what of the machine's errors is corrected."""
+BEFORE = (
+    "Save all parameters and compensation data of the control, in a place from which they can be loaded again.",
+    "Leave in force what the control compensated while the machine was measured: these tables come on top of it. Where "
+    "they take the place of values that are there (other than zero), load the sum of both, or do not load them.",
+    "Take the workpiece out, put in no tool or a short one, go to the middle of the travel, turn the overrides down, "
+    "and keep a hand at the emergency stop: if a sign or a unit is wrong, it shows as a jump when the tables come on.",
+    "Before the machine cuts again: measure as in the last step, and run one program above the part.",
+)
+"""What is the same with every control."""
+JUMP = 1.5
+"""How many times the largest correction no axis may move by."""
 LONGER = 50.0
 """mm: the tool with which it is shown what another length leaves."""
 
@@ -43,13 +58,19 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
         yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
     else:
         yield f"- They hold for a tool of {request.tool_length:g} mm, gauge line to tip{_length_note(request, tables)}."
+    yield f"- Positions count from: {control.properties.position_frame}; looked up: {control.properties.input_signal}."
     if not control.rewrites:
         yield "- Programs that ncfix fix has corrected must not run with them: they would be corrected twice."
     yield "- Not checked: collisions, and whether the control has the options that the tables need."
     yield from _list("Largest corrections", _corrections(left))
     yield from _list("Range covered; beyond it: " + control.properties.extrapolation, _ranges(request))
     yield from _list("Settings", (f"{name} = {value}" for name, value in request.settings.items() if value))
+    if not control.rewrites:
+        yield from _list("Before you begin", (*BEFORE, *_jump(left)))
     yield from _list("What to do, in this order", control.steps, numbered=True)
+    if not control.rewrites:
+        title = "What the control must add then (mean of both ways); see that nothing is in the way of the axes"
+        yield from _list(title, _checks(request, tables))
     yield from _list("How to switch it off", [control.switch_off])
     yield from _list("Files", sorted(written.files))
     yield from _list("Remarks", written.notes)
@@ -82,7 +103,43 @@ def _length_note(request: Request, tables: Tables) -> str:
 
 def _corrections(left: Residual) -> Iterator[str]:
     for name, value, rotary in zip(left.names, left.largest, left.rotary, strict=True):
-        yield f"{name}: {1e6 * value:.1f} urad" if rotary else f"{name}: {1e3 * value:.1f} um"
+        yield f"{name}: {_moved(value, rotary)}"
+
+
+def _jump(left: Residual) -> Iterator[str]:
+    parts = [
+        f"{name} {_moved(JUMP * value, rotary)}"
+        for name, value, rotary in zip(left.names, left.largest, left.rotary, strict=True)
+        if value
+    ]
+    if parts:
+        yield f"No axis may move by more than this when the tables come on: {', '.join(parts)}."
+
+
+def _checks(request: Request, tables: Tables) -> Iterator[str]:
+    """Corrections in the middle of the travel, and where each axis is corrected most half-way from there to corners."""
+    names = request.machine.axis_names
+    space = request.space.mean(axis=1)[:, None] + (request.space - request.space.mean(axis=1)[:, None]) / 2
+    q = np.concatenate([space.mean(axis=1)[None], corners(space)])
+    q = np.unique(np.round(q / _units(request), 3), axis=0) * _units(request)
+    found = tables.for_tool(request.tool_length).at(names, q)
+    middle = int(np.argmin(np.abs(q - space.mean(axis=1)).sum(axis=1)))
+    rows = [middle, *np.argmax(np.abs(found), axis=0)[np.abs(found).max(axis=0) > 0].tolist()]
+    for row in dict.fromkeys(rows):
+        pose = " ".join(f"{name}{value:g}" for name, value in zip(names, q[row] / _units(request), strict=True))
+        added = ", ".join(
+            f"{name} {_moved(value, axis.rotary, '+')}"
+            for name, value, axis in zip(names, found[row], request.machine.axes, strict=True)
+        )
+        yield f"{pose}: {added}"
+
+
+def _units(request: Request) -> Array:
+    return np.array([axis.unit for axis in request.machine.axes])
+
+
+def _moved(value: float, rotary: bool, sign: str = "") -> str:
+    return f"{np.degrees(value) + 0.0:{sign}.5f} degree" if rotary else f"{1e3 * value + 0.0:{sign}.1f} um"
 
 
 def _ranges(request: Request) -> Iterator[str]:
