@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench tables hidden metamorphic refusals ci clean
+.PHONY: demo test lint format accuracy bench same-bytes tables hidden metamorphic refusals ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -24,6 +24,9 @@ accuracy:        ## work out docs/accuracy.md (an hour), or STUDIES="plans ..." 
 
 bench:           ## time ncfix, rs274 and Lark in turn, into docs/performance.md; SIZES="100000 1000000" RUNS=5 LONG=10000000
 	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/run.py $(if $(SIZES),--sizes $(SIZES)) $(if $(RUNS),--runs $(RUNS)) $(if $(LONG),--long $(LONG))
+
+same-bytes:      ## correct programs in all ways, compare, into docs/performance.md (an hour; MOST=20000 ten minutes)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PYTHON) benchmarks/same_bytes.py $(if $(MOST),--most $(MOST))
 
 tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
 	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py

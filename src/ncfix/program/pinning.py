@@ -56,10 +56,13 @@ class _Walk:
         return np.asarray(~moves.about_fixed_point & ~own.any(axis=1))
 
     def back_from(self, arc: int) -> None:
-        """Keep the motions before an arc until every axis of its plane has been named by one."""
+        """Keep the motions before an arc until every axis of its plane has been named by one.
+
+        The cause that is noted for a motion is the next arc behind it.
+        """
         if arc >= self.reached:
             return
-        self.reached, needed = arc, self._plane(arc)
+        self.reached, needed, cause = arc, self._plane(arc), arc
         while needed.any() and self.reached > 0:
             self.reached -= 1
             row = self.reached
@@ -67,10 +70,11 @@ class _Walk:
                 needed[:] = True
             if not self.passed[row] and not self.kept[row]:
                 self.kept[row] = True
-                self.added[row] = arc
+                self.added[row] = cause
             needed &= ~self._decided(row)
             if self.anchored[row]:
                 needed |= self._plane(row)
+                cause = row
 
     def _plane(self, row: int) -> Mask:
         """The axes of an arc's plane; of other motions those that they name."""
