@@ -52,7 +52,7 @@ SHIPPED = {
     "blade": ("linuxcnc", "dmu50.toml"),
     "fanuc": ("fanuc", "wCAYFXZSt.toml"),
     "siemens": ("siemens", "wCAYFXZSt.toml"),
-    "klartext": ("heidenhain", "wCBXFZYSt.toml"),
+    "klartext": ("heidenhain", "dmu50.toml"),
 }
 """The first word of the names of shipped programs: their dialect, and the machine that they are for."""
 

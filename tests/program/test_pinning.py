@@ -28,7 +28,8 @@ def pinned(text: str, refused: int, dialect: str = "linuxcnc") -> list[int]:
     kept[refused] = True
     found, added = closure_of_refusals(moves, kept)
     assert sorted(np.flatnonzero(found & ~kept).tolist()) == sorted(added)
-    assert set(added.values()) <= {refused}
+    arcs = [row for row in np.flatnonzero(found).tolist() if row == refused or moves.kind[row] == Kind.ARC]
+    assert all(cause == next(row for row in arcs if row > each) for each, cause in added.items())
     return sorted(added)
 
 
