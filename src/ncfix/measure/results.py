@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from ncfix import __version__
 from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine
 from ncfix.measure import words
@@ -57,6 +58,7 @@ def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[s
         start = stop
     sources = ", ".join(dict.fromkeys(each.measurement.path for each in problem.observations))
     notes = {"date": datetime.date.today(), "source": sources, "calibrated_from": problem.machine.hash}
+    notes["calibrated_by"] = f"ncfix {__version__}"
     rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in figures.items()}
     return machine.replace(effects=tuple(effects), provenance={**problem.machine.provenance, **notes, **rounded})
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ncfix import __version__
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
 from ncfix.tables import manifest as side
@@ -66,8 +67,9 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     written = replace(written, notes=(*written.notes, *_remarks(control, request, left, written)))
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
+    said = {"ncfix": __version__, **control.described(), "residual_um": left.figures(), "notes": written.notes}
     more = {
-        side.NAME: made.as_bytes(**control.described(), residual_um=left.figures(), notes=written.notes),
+        side.NAME: made.as_bytes(**said),
         f"{SHEET}.md": sheet.encode(),
         f"{SHEET}.html": as_html(sheet).encode(),
     }

@@ -7,6 +7,7 @@ from html import escape
 
 import numpy as np
 
+from ncfix import __version__
 from ncfix.tables.control import Control, Request, Written
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
@@ -49,7 +50,7 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     before, after = figures["before"], figures["after"]
     yield f"# {control.title}: compensation tables for {machine.name}"
     yield ""
-    yield f"- Machine file: {machine.hash}; the tables hold for these errors only."
+    yield f"- Machine file: {machine.hash}; the tables hold for these errors only. Made by ncfix {__version__}."
     yield f"- Tip error: max {before['max']:.2f} um, rms {before['rms']:.2f} um without the tables;"
     yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {_pose(after['at'])}."
     yield f"- Class (ISO/TR 16907): {control.reaches}. Tables: {len(tables.grids)}, points: {tables.points}."
