@@ -204,9 +204,7 @@ def test_verify_says_where_nothing_could_be_corrected(ncfix: Any, examples: Path
     program.write_text("G21 G90 G94\nG0 X50. Y100.\nG1 X150. F500\nG0 Z5.\nG1 Z-5.\nG1 X50.\nM2\n")
     options = ["-m", examples / "machines/wCBXFZYSt.toml", "--assume-zero"]
     fixed = ncfix("fix", program, "-o", out, *options, "--json").json()["files"][0]
-    assert [(left["axis"], left["first_line"], left["last_line"]) for left in fixed["left_where_it_stands"]] == [
-        ("Z", 2, 3)
-    ]
+    assert [(left["axis"], left["lines"]) for left in fixed["left_where_it_stands"]] == [("Z", [[2, 3]])]
     found = ncfix("verify", program, out, *options, "--json")
     assert found.json()["left_where_it_stands"] == [{"axis": "Z", "lines": [3]}]
     assert found.code == ExitCode.FINDINGS

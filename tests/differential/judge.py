@@ -28,6 +28,7 @@ FLOAT_SLACK = 1e-5
 DENSE = (0.125, 0.25, 0.5, 0.75, 0.9)
 PRINTED = 3e-3  # mm: four decimals of an inch, rounded twice
 LARGEST_RADIUS = 5.0  # mm, of a cutter
+LEFT = 0.2  # mm: farther than any correction leads an axis that is left
 MOST_DENSE = 4000  # motions of a file that are looked at along their whole length, evenly spread
 
 
@@ -38,6 +39,7 @@ class Terms:
     tolerance    mm, of the tip along feeds and arcs
     step         mm, output step of linear words; rotary_step in degrees
     refused      lines that the product says it left as they were, with its reason
+    left         line -> columns of axes that the product says it left where they stood
     passed       line -> True if a motion of that line must not be touched
     rapids       hold rapids to the tolerance along their way too
     rotary       the strategy moves rotary axes: their ends are free by so many degrees
@@ -49,6 +51,7 @@ class Terms:
     step: float = 1e-3
     rotary_step: float = 1e-3
     refused: Mapping[int, str] = field(default_factory=dict)
+    left: Mapping[int, frozenset[int]] = field(default_factory=dict)
     passed: Callable[[int], bool] = lambda line: False
     rapids: bool = False
     rotary: float = 0.0
@@ -111,6 +114,8 @@ class _Judge:
         self.half = terms.step / 2 + FLOAT_SLACK
         self.rough = PRINTED * ~original.exact, PRINTED * ~fixed.exact
         self.length = _lengths(fixed, terms)
+        left = [terms.left.get(int(line), frozenset()) for line in original.line]
+        self.left = np.array([[column in columns for column in range(9)] for columns in left]).reshape(-1, 9)
 
     def run(self) -> Verdict:
         if not (self.original.accepted and self.fixed.accepted):
@@ -118,7 +123,7 @@ class _Judge:
             return self.verdict
         linear = 2 * self.half + sum(float(rough.max(initial=0.0)) for rough in self.rough)
         rotary = max(linear, self.terms.rotary)
-        near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3)
+        near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3) + LEFT * self.left
         by_rule = np.array([self.terms.passed(int(line)) for line in self.original.line], dtype=np.bool_)
         segments, self.seen = match(
             self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance, by_rule
@@ -127,6 +132,7 @@ class _Judge:
             self.verdict.complain(int(self.original.line[k]), text)
         self.started = self.machine.embedded(self.fixed.start, self.length) if len(self.fixed) else self.seen
         self.count(segments)
+        self.stood_still(segments)
         self.ends(segments)
         self.along(segments)
         self.cycles(segments)
@@ -160,6 +166,21 @@ class _Judge:
             if self.terms.passed(line) and not untouched(self.original, self.fixed, k, segments.last[k]):
                 self.verdict.complain(line, "a motion that is passed by rule was corrected")
 
+    def stood_still(self, segments: Segments) -> None:
+        """An axis that is said to be left where it stood makes the way of the original, and no other."""
+        whole = self.fixed.end[segments.last] - self.fixed.start[segments.first]
+        way = np.abs(whole - (self.original.end - self.original.start))
+        for k in np.flatnonzero((way > 1e-6 + 2 * self.rough[0][:, None]) & self.left)[:3]:
+            self.verdict.complain(int(self.original.line[k // 9]), "an axis that was to be left was moved")
+
+    def without(self, off: Floats, command: Floats, left: NDArray[np.bool_], length: float) -> float:
+        """How far a tip is off (3,) but for the ways along which axes (9,) that were left would take it."""
+        columns = [column for column in np.flatnonzero(left) if column in self.machine.linear]
+        near = np.vstack((command, command + np.eye(9)[columns]))
+        tips = self.machine.tip(near, np.full(len(near), length))
+        ways = (tips[1:] - tips[0]).T
+        return float(np.linalg.norm(off - ways @ np.linalg.lstsq(ways, off, rcond=None)[0]))
+
     def rests(self, segments: Segments, k: int) -> bool:
         """A motion word alone makes LinuxCNC call a motion to where it is."""
         j = segments.last[k]
@@ -190,7 +211,8 @@ class _Judge:
         said = np.isin(self.original.line, list(self.terms.refused))
         done = np.flatnonzero((segments.fate == Fate.COMPENSATED) & ~said)
         last = segments.last[done]
-        off = np.abs(_turn_back(self.seen[last] - self.original.end[done], self.original.rotation[done]))
+        off = np.where(self.left[done], 0.0, self.seen[last] - self.original.end[done])
+        off = np.abs(_turn_back(off, self.original.rotation[done]))
         half = self.halves(done, last)
         arc = (self.original.kind[done] == ARC) | (self.fixed.kind[last] == ARC)
         linear = off[:, self.machine.linear].max(axis=1, initial=0.0)
@@ -246,7 +268,10 @@ class _Judge:
         def intended(fraction: Floats) -> Floats:
             return self.machine.tip(paths.at(self.original, of, fraction), self.length[pieces])
 
-        _, distance = paths.nearest(intended, real, guess, low, high)
+        fraction, distance = paths.nearest(intended, real, guess, low, high)
+        for row in np.flatnonzero(self.left[of].any(axis=1)):
+            off = (real - intended(fraction))[row]
+            distance[row] = self.without(off, command[row], self.left[of[row]], self.length[pieces[row]])
         excused = self.entry_error(segments, pieces, of) * (1 - u)
         allowed = self.terms.tolerance + np.sqrt(3) * self.halves(of, pieces) + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
@@ -279,7 +304,7 @@ class _Judge:
             rows = np.setdiff1d(np.flatnonzero(segments.fate == fate), segments.loose)
             if not rows.size:
                 continue
-            miss = self.seen[segments.last[rows]] - self.original.end[rows]
+            miss = np.where(self.left[rows], 0.0, self.seen[segments.last[rows]] - self.original.end[rows])
             off = np.abs(_turn_back(miss, self.original.rotation[rows]))
             linear, lines = off[:, self.machine.linear].max(axis=1), self.original.line[rows]
             refused = np.isin(lines, list(self.terms.refused))

@@ -11,6 +11,7 @@ from typing import Any
 
 from ncfix.cli.main import run
 
+LETTERS = "XYZABCUVW"
 DONE, FINDINGS, USAGE, UNREADABLE, REFUSED, FAULT = range(6)
 
 
@@ -33,6 +34,16 @@ class Outcome:
     def refused(self) -> dict[int, str]:
         """Lines that were left as they were, and why."""
         return {int(each["line"]): str(each["reason"]) for each in self.entry.get("refused", [])}
+
+    @property
+    def left(self) -> dict[int, frozenset[int]]:
+        """Line -> columns of the axes that were left where they stood."""
+        found: dict[int, frozenset[int]] = {}
+        for each in self.entry.get("left_where_it_stands", []):
+            for first, last in each["lines"]:
+                for line in range(first, last + 1):
+                    found[line] = found.get(line, frozenset()) | {LETTERS.index(each["axis"])}
+        return found
 
     @property
     def codes(self) -> list[str]:

@@ -125,7 +125,7 @@ class _Matcher:
         """The tool gets where the original takes it, to a step; probing, tapping and splines never are corrected."""
         if self.original.kind[k] in (PROBE, TAP, SPLINE):
             return False
-        near = self.near + (self.tolerance * LINEAR if self.original.kind[k] == ARC else 0.0)
+        near = self.near[k] + (self.tolerance * LINEAR if self.original.kind[k] == ARC else 0.0)
         return bool(np.all(np.abs(self.seen[j] - self.original.end[k]) <= near))
 
     def went_round(self, k: int, j: int, progress: Floats) -> bool:
@@ -159,7 +159,7 @@ class _Matcher:
         for n in range(k, stop):
             off = float(np.abs(there - self.original.end[n, :3]).max(axis=1).min())
             deepest = self.original.end[n, 2] <= self.original.end[k:stop, 2].min() + 1e-9
-            if off > (self.near[2] if deepest else SMALL):
+            if off > (self.near[n, 2] if deepest else SMALL):
                 self.complaints.append((n, f"no motion of the cycle comes nearer than {off:.4f} mm"))
             self.fate.append(Fate.CYCLE)
             self.first.append(min(self.j + n - k, end - 1))
@@ -236,7 +236,7 @@ def match(
     """The segments, and (m, 9) where the corrected motions end as the machine with errors does them.
 
     length     (m,) tool length of the corrected motions, mm
-    near       (9,) mm, degree: how near an end must be to count as reached; the judge looks closer afterwards
+    near       (n, 9) mm, degree: how near ends must be to count as reached; the judge looks closer afterwards
     tolerance  mm: added for the ends of arcs
     by_rule    (n,) original motions that must not be touched
     """

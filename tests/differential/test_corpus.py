@@ -129,6 +129,7 @@ def _terms(entry: corpus.Entry, outcome: product.Outcome, machine: Machine, vari
         step=machine.linear_step,
         rotary_step=machine.rotary_step,
         refused=outcome.refused,
+        left=outcome.left,
         passed=corpus.passed_by_rule(entry.path.read_bytes()),
         rotary=0.5 if variant.strategy == "full" and machine.rotary else 0.0,
         tool_length={number: length for number, (length, _) in variant.controls.tools.items()},

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.compensate.findings import Array, Mask
 from ncfix.diagnostics import Message, Place
@@ -22,29 +23,38 @@ HINT = "name it in one of the first blocks, and again after a change of tool or 
 class Left:
     """One axis that was left where it stands.
 
-    motions      how many motions would have moved it
-    first, last  their lines
-    most         how far it is from where it should be at most, mm or rad
+    motions    how many motions would have moved it
+    stretches  their lines, from and to
+    most       how far it is from where it should be at their ends, at most, mm or rad
     """
 
     axis: str
     rotary: bool
     motions: int
-    first: int
-    last: int
+    stretches: tuple[tuple[int, int], ...]
     most: float
+
+    @property
+    def first(self) -> int:
+        """The first of these lines."""
+        return self.stretches[0][0]
+
+    @property
+    def last(self) -> int:
+        """The last of them."""
+        return self.stretches[-1][1]
 
     def with_later(self, other: Left) -> Left:
         """This and what comes later in the program."""
         motions, most = self.motions + other.motions, max(self.most, other.most)
-        return Left(self.axis, self.rotary, motions, self.first, other.last, most)
+        return Left(self.axis, self.rotary, motions, merged(self.stretches, other.stretches), most)
 
     def message(self, path: str) -> Message:
         """In words."""
         many = f"{self.motions} motions (lines {self.first} to {self.last})" if self.motions > 1 else "this motion"
         far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
         text = (
-            f"{self.axis} is left where it stands in {many}, up to {far} from where it should be: "
+            f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be at the end: "
             "the program has not said where it is"
         )
         return Message("NCF439", text, Place(path, self.first), HINT)
@@ -52,7 +62,8 @@ class Left:
     def as_dict(self) -> dict[str, object]:
         """Plain data, for `--json`."""
         most = {"max_deg": float(np.degrees(self.most))} if self.rotary else {"max_um": round(self.most * 1e3, 4)}
-        return {"axis": self.axis, "motions": self.motions, "first_line": self.first, "last_line": self.last, **most}
+        lines = [list(stretch) for stretch in self.stretches]
+        return {"axis": self.axis, "motions": self.motions, "lines": lines, **most}
 
 
 def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
@@ -67,11 +78,24 @@ def left_where_they_stand(program: Program, settled: Settled, steps: Array, own:
     found = {}
     for column in np.flatnonzero(lacking.any(axis=0)).tolist():
         rows = np.flatnonzero(lacking[:, column])
-        lines = program.lines(moves.block[rows[[0, -1]]])
-        most = float(off[rows, column].max())
-        axis = moves.axes[column]
-        found[axis] = Left(axis, bool(moves.rotary[column]), len(rows), int(lines[0]), int(lines[1]), most)
+        most, axis = float(off[rows, column].max()), moves.axes[column]
+        found[axis] = Left(axis, bool(moves.rotary[column]), len(rows), stretches_of(program, moves.block[rows]), most)
     return found
+
+
+def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int, int], ...]:
+    """The lines of blocks, as stretches without gaps, from and to."""
+    lines = np.unique(program.lines(blocks))
+    begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
+    ends = np.append(begins[1:], len(lines)) - 1
+    return tuple(zip(lines[begins].tolist(), lines[ends].tolist(), strict=True))
+
+
+def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """Stretches of lines, and those that follow them."""
+    if later[0][0] > before[-1][1] + 1:
+        return (*before, *later)
+    return (*before[:-1], (before[-1][0], later[0][1]), *later[1:])
 
 
 def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, Left]:
