@@ -58,6 +58,19 @@ FANUC = [
     case(
         "canned cycle with repeats, flat", "G91 G81 X5. Z-3. R-45. K3 F100.\nG80\nG90 G0 X1. Y1. Z50.", flat=True, L0=R
     ),
+    case("an increment from nobody knows where", "G31 X9. F10.\nG91 G0 X5.\nG90 X7.", L3=P, L4=N, L5=R),
+    case("an arc of the tip", "G43.4 H1\nG2 X11. Y12. I10. J0 F100.\nG49\nG0 X1. Y1. Z50.", L4=R, L6=R),
+    case("a shift that only the control knows", "G52 X#500\nG1 X5. F100.\nG52 X0\nG0 X1.", L4=N, L6=R),
+    case("an offset that only the control knows", "G10 L2 P1 X#500\nG1 X5. F100.\nG55 G0 X1. Y1. Z1.", L4=N, L5=R),
+    case(
+        "subprogram from two places",
+        "M98 P100\nG0 X9.\nM98 P100\nM2\nO0100\nG0 X5. Z5.\nM99",
+        L4=R,
+        L8=R,
+    ),
+    case("subprogram in steps, flat", "M98 P20100\nG0 X9.\nM2\nO0100\nG91 G0 X5.\nG90\nM99", flat=True, L0=R),
+    case("threading", "G33 Z40. F1.5\nG0 X5. Y5. Z20.", L3=N, L4=R),
+    case("return from the reference point", "G28 Z100.\nG29 X5. Y5. Z20.\nG0 X1. Y1. Z20.", L3=P, L4=N, L5=R),
     case("polar", "G16\nG0 X10. Y90.\nG15\nG0 X5. Y5.", L2=R, L4=N, L6=R),
     case("polar, flat", "G16\nG0 X10. Y90.\nG15\nG0 X5. Y5.", flat=True, L0=R),
     case("G54.1", "G54.1 P2\nG1 X5. F100.", L4=R),

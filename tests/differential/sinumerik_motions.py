@@ -223,7 +223,11 @@ class Standing:
 
     def centre(self, words: dict[str, Any], start: Floats, end: Floats, normal: Floats) -> Floats:
         """The centre of an arc in the plane."""
-        unit, across = self.modes["unit"], PLANES[self.modes["plane"]][2]
+        unit, (first, second, across) = self.modes["unit"], PLANES[self.modes["plane"]]
+        if {"AP", "RP"} & set(words):
+            centre = start.copy()
+            centre[[first, second]] = self.modes["pole"]
+            return centre
         if {"I", "J", "K"} & set(words):
             centre = start.copy()
             for index, name in enumerate("IJK"):

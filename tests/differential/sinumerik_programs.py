@@ -109,10 +109,14 @@ class Author:
         self.lines += [f"X=IC({self.number(2, 8)}) Y=IC({self.number(-8, 8)})"] * self.chance.randint(0, 1)
 
     def polar(self) -> None:
-        """AP and RP about a pole."""
+        """AP and RP about a pole, lines and arcs; now and then only one of them is written."""
         self.lines.append(f"G{self.chance.choice((110, 111, 112))} X{self.number(-5, 5)} Y{self.number(-5, 5)}")
         self.lines.append(f"G1 AP=AC({self.number(0, 359)}) RP=AC({self.number(5, 25)})")
-        self.lines.append(f"AP=IC({self.number(-60, 60)}) RP=AC({self.number(5, 15)})")
+        radius = self.chance.choice((f" RP=AC({self.number(5, 15)})", "", " RP=IC(1.5)"))
+        self.lines.append(f"AP=IC({self.number(-60, 60)}){radius}")
+        height = f" Z=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
+        angles = [self.number(0, 359) for _ in range(self.chance.randint(0, 2))]
+        self.lines += [f"G{self.chance.choice((2, 3))} AP=AC({angle}){height}" for angle in angles]
         self.anew()
 
     def contour(self) -> None:
