@@ -47,6 +47,12 @@ def test_every_message_in_json_has_a_hint(shop: Shop, ncfix: Ncfix) -> None:
     assert all(message["hint"] for message in result.json()["errors"])
 
 
+def test_wrong_use_is_said_in_json_too(ncfix: Ncfix) -> None:
+    result = ncfix("fix", "--json")
+    assert result.code == 2
+    assert [error["code"] for error in result.json()["errors"]] == ["NCF001"]
+
+
 def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
     from ncfix.cli import job
 

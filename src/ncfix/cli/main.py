@@ -105,7 +105,7 @@ def _run(arguments: Sequence[str]) -> int:
         with plugin_warnings_as_messages():
             return int(cli.main(list(arguments), prog_name="ncfix", standalone_mode=False) or 0)
     except click.ClickException as error:
-        return wrong_use(error, arguments)
+        return wrong_use(error, arguments, as_json)
     except click.Abort:
         console.tell(Message("NCF012", "interrupted"))
         return INTERRUPTED
@@ -115,16 +115,15 @@ def _run(arguments: Sequence[str]) -> int:
         return failed(owned(error), as_json)
 
 
-def wrong_use(error: click.ClickException, arguments: Sequence[str]) -> int:
+def wrong_use(error: click.ClickException, arguments: Sequence[str], as_json: bool) -> int:
     """Say what is wrong with the command line."""
     if isinstance(error, click.exceptions.NoArgsIsHelpError):
         console.say(error.format_message())
-    else:
-        context = getattr(error, "ctx", None)
-        verb = next((argument for argument in arguments if argument in VERBS), "")
-        command = context.command_path if context else f"ncfix {verb}".strip()
-        console.tell(Message("NCF001", error.format_message(), hint=f"{command} --help"))
-    return ExitCode.USAGE
+        return ExitCode.USAGE
+    context = getattr(error, "ctx", None)
+    verb = next((argument for argument in arguments if argument in VERBS), "")
+    command = context.command_path if context else f"ncfix {verb}".strip()
+    return failed(UsageError.of("NCF001", error.format_message(), hint=f"{command} --help"), as_json)
 
 
 def failed(error: NcfixError, as_json: bool) -> int:
