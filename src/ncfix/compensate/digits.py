@@ -12,8 +12,6 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.kinematics import commands_from_joints
-from ncfix.compensate.steer import steer
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 from ncfix.program.number_style import decimals_for
@@ -29,13 +27,8 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces) -> Pieces:
     commands = pieces.end[rows].copy()
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame[move]][:, moves.rotary]
     commands[:, moves.rotary] = offset + _rounded(commands[:, moves.rotary] - offset, machine)
-    intent = Intent(machine, moves, State())
-    fraction = pieces.fraction[rows]
-    q, arrived = steer(
-        machine, intent.joints(move, commands), intent.tip(move, fraction), intent.states(move, fraction)
-    )
+    solved, arrived = Intent(machine, moves, State()).aimed(move, pieces.fraction[rows], commands)
     end = pieces.end.copy()
-    solved = commands_from_joints(machine, q, moves.tcp[move], moves.tool_length[move])
     solved = np.where(moves.wordless[move], end[rows], solved)
     end[rows[arrived]] = solved[arrived]
     return replace(pieces, end=end)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,6 +70,22 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
         _finding("NCF403", good[~result.converged], "no command found that brings the tool tip where it should be"),
     )
     return Ends(wanted, failed, oriented, tuple(trouble for trouble in troubles if len(trouble)), before)
+
+
+def with_rotary_as_it_stands(intent: Intent, ends: Ends, kept: Mask) -> Ends:
+    """The ends with X Y Z for rotary axes that get no word, where corrections before have left these."""
+    if intent.wordless is None:
+        return ends
+    stands = standing(intent.machine, intent.moves, ends.wanted, kept, intent.before).end
+    off = intent.wordless & intent.machine.rotary & (stands != ends.wanted) & ~kept[:, None]
+    rows = np.flatnonzero(off.any(axis=1))
+    if not rows.size:
+        return ends
+    commands = np.where(off[rows], stands[rows], ends.wanted[rows])
+    found, arrived = intent.aimed(rows, np.ones(len(rows)), commands)
+    wanted = ends.wanted.copy()
+    wanted[rows[arrived]] = found[arrived]
+    return replace(ends, wanted=wanted)
 
 
 def _solved(intent: Intent, strategy: Strategy, rows: Index, q: Array) -> Correction:

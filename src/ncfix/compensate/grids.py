@@ -148,11 +148,23 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     result = with_rotary_held(intent, strategy, move, fraction, q, found)
     command = as_commands(intent, move, programmed, q, result.q)
     command[first], command[last] = real.start[rows], real.end[rows]
-    if intent.wordless is not None:
-        command = np.where(intent.wordless[move], real.at(move, fraction), command)
+    command = _as_they_stand(intent, real, move, fraction, command)
     use = result.converged | bounds
     counts = sums(use.astype(np.intp), counts).astype(np.intp)
     return Grid(counts, fraction[use], command[use], _follow(intent, move[use], command[use], strategy))
+
+
+def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:
+    """Corrected commands (k, n_axes) with the axes that get no word as `real` has them, X Y Z for such rotary axes."""
+    if intent.wordless is None:
+        return command
+    stand, idle = real.at(move, fraction), intent.wordless[move]
+    result = np.where(idle, stand, command)
+    turned = np.flatnonzero((idle & intent.machine.rotary & (stand != command)).any(axis=1))
+    if turned.size:
+        found, arrived = intent.aimed(move[turned], fraction[turned], result[turned])
+        result[turned[arrived]] = np.where(idle[turned], result[turned], found)[arrived]
+    return result
 
 
 def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tuple[Index, Array]:

@@ -19,6 +19,7 @@ import numpy as np
 from ncfix.compensate.direction import Signs, carried, matters, signs
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import (
+    commands_from_joints,
     common,
     linear_columns,
     programmed_tip,
@@ -29,7 +30,7 @@ from ncfix.compensate.kinematics import (
 )
 from ncfix.compensate.rows import some
 from ncfix.compensate.segments import Segments
-from ncfix.compensate.steer import rows_of
+from ncfix.compensate.steer import rows_of, steer
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 
@@ -183,6 +184,16 @@ class Intent:
         programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands)
         maps = regular(tip_maps(self.machine, programmed))[0]
         return np.broadcast_to(maps, (len(rows), 3, 3))
+
+    def aimed(self, rows: Index, fraction: Array, commands: Array) -> tuple[Array, Mask]:
+        """Commands (k, n_axes) with X Y Z that bring the tip of the real machine where it should be at the fractions.
+
+        The rotary axes stay as `commands` have them. Also which of them have arrived, (k,).
+        """
+        moves = self.moves
+        begin, target = self.joints(rows, commands), self.tip(rows, fraction)
+        q, arrived = steer(self.machine, begin, target, self.states(rows, fraction))
+        return commands_from_joints(self.machine, q, moves.tcp[rows], moves.tool_length[rows]), arrived
 
     def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
         """Nearly the corrected commands at fractions of motions, (k, n_axes).

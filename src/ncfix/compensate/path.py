@@ -18,7 +18,7 @@ from ncfix.compensate.approaches import corrected_approaches
 from ncfix.compensate.arcs import fitted
 from ncfix.compensate.assembly import Plan, assembled, untouched, with_approaches
 from ncfix.compensate.budget import Budget, Closure
-from ncfix.compensate.ends import corrected, with_closed_circles
+from ncfix.compensate.ends import corrected, with_closed_circles, with_rotary_as_it_stands
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Cutter, Split, joined, split, taken
 from ncfix.compensate.intent import Intent
@@ -89,6 +89,8 @@ def plan(
 def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:
     ends = corrected(intent, strategy, np.flatnonzero(~kept))
     kept = kept | ends.failed
+    if strategy.corrects_orientation:
+        ends = with_rotary_as_it_stands(intent, ends, kept)
     approaches = corrected_approaches(intent, ends.wanted, kept) if strategy.follows_path else None
     real, broken = _real(intent, ends.wanted, kept, demands, approaches)
     bound = intent.moves.compensated | crooked(intent) if strategy.follows_path else np.ones(len(kept), dtype=bool)
