@@ -28,7 +28,7 @@ SETUP = Setup(
 ENDS = np.sqrt(3) * HALF + 1e-5
 """mm: half an output step along all three axes."""
 
-SEEDS = range(3)
+SEEDS = (0, 1, 12)
 
 
 def followed(text: str, model: errors.Machine) -> list[Travel]:

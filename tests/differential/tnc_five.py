@@ -1,8 +1,8 @@
 """A five-axis TNC to judge by: straight motions with rotary axes, with M128, and in tilted planes.
 
 It shares nothing with the product; how axes and tip belong together it asks the second model of the machine. Known are
-L with increments and M91, M128, M129, FUNCTION TCPM and RESET TCPM, PLANE SPATIAL STAY and RESET, cycle 19 with spatial
-angles, cycles 7 and 10, TRANS DATUM, and TOOL CALL. `program` makes programs of these at random.
+L with increments and M91, LN with TX TY TZ, M128, M129, FUNCTION TCPM and RESET TCPM, PLANE SPATIAL STAY and RESET,
+cycle 19 with spatial angles, cycles 7 and 10, TRANS DATUM, and TOOL CALL. `program` makes programs of these at random.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from differential.errors import Machine
 from differential.tnc import Floats, blocks_of
@@ -20,6 +21,7 @@ from differential.tnc import Floats, blocks_of
 COLUMN = {"X": 0, "Y": 1, "Z": 2, "B": 4, "C": 5}
 TURNING = "BC"
 WORD = re.compile(r"(?<![A-Z0-9])(I?[XYZBC])\s*([+-]?[\d.]+)(?![\w.])")
+VECTOR = re.compile(r"T[XYZ]([+-][\d.]+)")
 ANGLES = re.compile(r"(?:SP)?([ABC])([+-][\d.]+)")
 SAMPLES, OF_TURNS = 60, 500
 
@@ -98,9 +100,36 @@ class FiveAxisTnc:
                 self.at[COLUMN[letter]] = number
             self.travels.append(Travel("machine", self.at[None].copy(), self.length))
         elif words:
+            if "TX" in block:
+                words |= self.turned_to(np.array([float(part) for part in VECTOR.findall(block)]))
             rapid = "rapid" if {"X", "Y", "Z"} <= words.keys() else "positioning"
             self.go(words, rapid if re.search(r"F ?MAX", block) else "path")
         self.m128 &= "M129" not in block
+
+    def turned_to(self, vector: Floats) -> dict[str, float]:
+        """The rotary words that point the tool along a vector of the program, from where they stand, by trying."""
+        rotation, _ = self.frame()
+        wanted = rotation @ vector / np.linalg.norm(vector)
+        turning = [COLUMN[letter] for letter in TURNING]
+
+        def off(turns: Floats) -> Floats:
+            axes = np.zeros((1, 9))
+            axes[0, turning] = turns
+            return np.asarray(self.machine.pose(axes, False).turn[0] @ self.machine.tool_direction - wanted)
+
+        here = self.at[turning]
+        starts = [
+            here,
+            *(here * [1, 0] + [0, c] for c in (-150, -90, -30, 30, 90, 150)),
+            [20, 0],
+            [20, 120],
+            [20, -120],
+        ]
+        found = [least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15) for start in starts]
+        ways = [each.x for each in found if np.abs(each.fun).max() < 1e-9]
+        ways = [np.array([b, here[1] + (c - here[1] + 180) % 360 - 180]) for b, c in ways if 0 <= b <= 180]
+        best = min(ways, key=lambda way: float(np.abs(way - here).sum()))
+        return dict(zip(TURNING, best.tolist(), strict=True))
 
     # -- geometry -----------------------------------------------------------------------------------------------------
 
@@ -149,41 +178,49 @@ class FiveAxisTnc:
 # -- programs at random -----------------------------------------------------------------------------------------------
 
 
+class Dice(random.Random):
+    """Chance; `least` is the smallest angle that the program writes for its table, degrees."""
+
+    least = -90.0
+
+
 def program(seed: int, machine: Machine, parts: int = 4) -> str:
     """A program of so many parts, each of which begins and ends with upright axes or says where it is."""
-    dice = random.Random(seed)
+    dice = Dice(seed)
+    dice.least = 0.0 if seed % 2 else -90.0
     kinds = [plain, with_tip_control, in_plane, in_plane_with_tip_control, in_plane_of_cycle_19, shifted, turned]
+    kinds += [by_directions]
     lines = ["BEGIN PGM F MM", "TOOL CALL 1 Z", "L Z+250 R0 FMAX", "L X+0 Y+0 FMAX"]
     for _ in range(parts):
         lines += dice.choice(kinds)(dice, machine)
     return "\n".join([*lines, "L Z+250 FMAX", "END PGM F MM", ""])
 
 
-def number(dice: random.Random, least: float, most: float) -> str:
+def number(dice: Dice, least: float, most: float) -> str:
     return f"{dice.uniform(least, most):+.3f}"
 
 
-def place(dice: random.Random) -> str:
+def place(dice: Dice) -> str:
     return f"X{number(dice, -40, 40)} Y{number(dice, -40, 40)} Z{number(dice, 20, 60)}"
 
 
-def plain(dice: random.Random, machine: Machine) -> list[str]:
+def plain(dice: Dice, machine: Machine) -> list[str]:
     return [
-        f"L {place(dice)} B{number(dice, 0, 60)} C{number(dice, -90, 90)} FMAX",
+        f"L {place(dice)} B{number(dice, 0, 60)} C{number(dice, dice.least, 90)} FMAX",
         f"L X{number(dice, -40, 40)} F700",
         "L IB+3.5 IC-12.25 F300",
-        f"L {place(dice)} C{number(dice, -90, 90)} F900",
+        f"L {place(dice)} C{number(dice, dice.least, 90)} F900",
     ]
 
 
-def with_tip_control(dice: random.Random, machine: Machine) -> list[str]:
+def with_tip_control(dice: Dice, machine: Machine) -> list[str]:
     tcpm = ("FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS", "FUNCTION RESET TCPM")
     on, off = dice.choice([("L M128 F1000", "M129"), tcpm])
     rotation = [f"CYCL DEF 10.1 ROT{number(dice, -60, 60)}"] if dice.random() < 0.4 else []
     return [
         on,
         *rotation,
-        f"L {place(dice)} B{number(dice, 0, 50)} C{number(dice, -90, 90)} F900",
+        f"L {place(dice)} B{number(dice, 0, 50)} C{number(dice, dice.least, 90)} F900",
         f"L X{number(dice, -40, 40)} F700",
         f"L B{number(dice, 0, 50)} F400",
         "L IX+4 IB-2.5 IC+7.5",
@@ -193,19 +230,30 @@ def with_tip_control(dice: random.Random, machine: Machine) -> list[str]:
     ]
 
 
-def shifted(dice: random.Random, machine: Machine) -> list[str]:
+def by_directions(dice: Dice, machine: Machine) -> list[str]:
+    """Directions of the tool instead of angles: they may lead the table where no word of the program does."""
+    lines = ["M128", f"L {place(dice)} B{number(dice, 15, 40)} C{number(dice, 0, 20)} F900"]
+    axes = np.zeros((1, 9))
+    for c in (dice.uniform(-40, 0), dice.uniform(-70, -40)):
+        axes[0, COLUMN["B"]], axes[0, COLUMN["C"]] = dice.uniform(15, 40), c
+        x, y, z = machine.pose(axes, False).turn[0] @ machine.tool_direction
+        lines.append(f"LN {place(dice)} NX+0 NY+0 NZ+1 TX{x:+.7f} TY{y:+.7f} TZ{z:+.7f} F600")
+    return [*lines, f"L {place(dice)} B{number(dice, 15, 40)} C{number(dice, 5, 25)} F500", "M129", "L Z+250 FMAX"]
+
+
+def shifted(dice: Dice, machine: Machine) -> list[str]:
     shift = f"TRANS DATUM AXIS X{number(dice, -5, 5)} Z{number(dice, -5, 5)}"
     return ["TOOL CALL 2 Z", shift, f"L {place(dice)} F800", "TRANS DATUM RESET", f"L {place(dice)}", "TOOL CALL 1 Z"]
 
 
-def turned(dice: random.Random, machine: Machine) -> list[str]:
+def turned(dice: Dice, machine: Machine) -> list[str]:
     rotation = f"CYCL DEF 10.1 ROT{number(dice, -60, 60)}"
     return [rotation, f"L {place(dice)} FMAX", f"L X{number(dice, -40, 40)} F500", "L IX+3 IY-2", "CYCL DEF 10.1 ROT+0"]
 
 
-def in_plane(dice: random.Random, machine: Machine, *, tip: bool = False, cycle: bool = False) -> list[str]:
+def in_plane(dice: Dice, machine: Machine, *, tip: bool = False, cycle: bool = False) -> list[str]:
     """The rotary axes are turned, and the plane is the one to which the tool is square then."""
-    b, c = round(dice.uniform(10, 60), 3), round(dice.uniform(-80, 80), 3)
+    b, c = round(dice.uniform(10, 60), 3), round(dice.uniform(max(dice.least, -80), 80), 3)
     axes = np.zeros((1, 9))
     axes[0, COLUMN["B"]], axes[0, COLUMN["C"]] = b, c
     x, y, z = machine.pose(axes, False).turn[0] @ machine.tool_direction
@@ -235,9 +283,9 @@ def in_plane(dice: random.Random, machine: Machine, *, tip: bool = False, cycle:
     ]
 
 
-def in_plane_with_tip_control(dice: random.Random, machine: Machine) -> list[str]:
+def in_plane_with_tip_control(dice: Dice, machine: Machine) -> list[str]:
     return in_plane(dice, machine, tip=True)
 
 
-def in_plane_of_cycle_19(dice: random.Random, machine: Machine) -> list[str]:
+def in_plane_of_cycle_19(dice: Dice, machine: Machine) -> list[str]:
     return in_plane(dice, machine, cycle=True)
