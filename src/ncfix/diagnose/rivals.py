@@ -206,7 +206,7 @@ def _driven(reach: Reach) -> list[tuple[dict[str, Any], Array]]:
         middle = {"center": (first + last) / 2, "scale": (last - first) / 2}
         found.append(({"basis": shapes.spline(), "input": "time_s", **middle}, shapes.smooth(SLOW)))
     for name in (*reach.sensors, *(["load_kg"] if "load_kg" in reach.columns else [])):
-        origin, unit = (20.0, 5.0) if name.startswith("temp_") else (0.0, 100.0)
+        origin, unit = (reach.warmth[name][0], 5.0) if name in reach.warmth else (0.0, 100.0)
         options = {"basis": Polynomial(degree=(1,)), "input": name, "center": origin, "scale": unit}
         found.append((options, np.eye(1)))
     return found

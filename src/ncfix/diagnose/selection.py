@@ -11,7 +11,7 @@ from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.weighing import Members, Scale, margin
 
 MOST = 5
-"""Effects that are named at most."""
+"""Effects that are taken to be there at most."""
 TRIED = 5
 """Of all effects that may be added so many, the likeliest, are weighed; of those without a name, half as many."""
 ALIKE = 3.0
@@ -96,7 +96,7 @@ def _climbed(scale: Scale, offered: Sequence[str], members: Members, fixed: Memb
 def _changes(scale: Scale, offered: Sequence[str], members: Members, fixed: Members) -> list[dict[str, Member]]:
     """One effect more, another in the place of one, or one less."""
     found = [dict(members)]
-    if sum(name in scale.court.names for name in members) < MOST:
+    if len(members) < MOST:
         found += [{**members, name: each} for name, each in likeliest(scale, offered, members).items()]
     for out in members:
         if out not in fixed:

@@ -166,7 +166,9 @@ class View:
         stated = {f"dir_{axis.name}" for axis in self.machine.axes if not self.unstated(axis)}
         moving = {name for name in shared | stated if np.ptp(self.column(name)) > 0}
         time = self.column("time_s")
-        return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())))
+        sensors = {name: self.column(name) for name in moving if name.startswith("temp_")}
+        warmth = {name: (float(values.mean()), float(values.std())) for name, values in sensors.items()}
+        return Reach(self.machine, spans, frozenset(moving), (float(time.min()), float(time.max())), warmth)
 
     def unstated(self, axis: Axis) -> list[str]:
         """The files that moved an axis and do not say from where it came, where others do."""

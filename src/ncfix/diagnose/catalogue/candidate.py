@@ -8,7 +8,7 @@ curve is, how harmonics decay, which rotation comes with a deflection. Several l
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -59,12 +59,14 @@ class Reach:
     spans    axis -> (low, high), mm or degree, of what was measured
     columns  state columns that every file has and that vary
     clock    (first, last) time, s
+    warmth   temperature column -> (mean, standard deviation), K; what a thermal effect is at the mean is a constant
     """
 
     machine: Machine
     spans: Mapping[str, tuple[float, float]]
     columns: frozenset[str]
     clock: tuple[float, float] = (0.0, 0.0)
+    warmth: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def moved(self, axis: Axis) -> bool:
         """Whether an axis was moved enough to say anything of it."""

@@ -16,6 +16,8 @@ from ncfix.measure.measurement import Array
 
 PIVOT = 10.0
 """mm: how far the point about which a slide tilts lies from the reference point stated, in each direction."""
+HALF = 0.5
+"""Of a play: how far its middle may lie from the zero of the axis."""
 PITCHES = (4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 25.0, 30.0, 32.0, 40.0)
 """mm: usual screws, where the machine file does not say."""
 WORN = "re-measure the axis directly; a scale or guide that changes locally is worn"
@@ -37,7 +39,8 @@ def _curves(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     for component in LETTERS + TURNS:
         name = f"E{component}{axis.name}"
         parts = zero([Effect(each, (), shapes.spline(), **span) for each in (name, *swept(component, axis))])
-        shift, tilt = ([shapes.bent(length, powers) for length in shapes.SMOOTH] for powers in (2, 1))
+        shift = [shapes.bent(length) for length in shapes.SMOOTH]
+        tilt = [shapes.turned(length) for length in shapes.SMOOTH]
         own = shift if component in LETTERS else tilt
         loadings = tuple(stacked(a, *[PIVOT * b] * (len(parts) - 1)) for a, b in zip(own, shift, strict=True))
         yield Candidate(
@@ -93,6 +96,8 @@ def _lost(reach: Reach, axis: Axis) -> Iterator[Candidate]:
             name, remedy = f"{sort} play {symbol}", GUIDE
             way = f"about {LETTERS[TURNS.index(component)]}" if tilt else f"in {component}"
             title = f"{sort} play of {axis.name} {way} at reversal"
-        parts = zero([Effect(each, (), play, **span) for each in (symbol, *swept(component, axis))])
+        parts = [Effect(each, (), play, **span) for each in (symbol, *swept(component, axis))]
         loading = stacked(weighed(shapes.LOST), *[PIVOT * weighed(shapes.LOST)] * (len(parts) - 1))
-        yield Candidate(name, title, axis.name, family, parts, (loading,), needs, remedy, lead=1)
+        if tilt:  # half of the play either way, or all of it one way: the zero may have been set on either side
+            parts, loading = [*parts, Effect(symbol, ())], stacked(loading, np.array([[HALF]]))
+        yield Candidate(name, title, axis.name, family, zero(parts), (loading,), needs, remedy, lead=1)

@@ -73,14 +73,15 @@ def _backlash(reach: Reach, axis: Axis, own: int) -> Candidate:
 
 
 def _seat(reach: Reach, axis: Axis) -> Iterator[Candidate]:
-    """The seat of a rotary axis gives way with the place of a linear axis."""
-    others = [each for each in reach.linear if each.workpiece_side == axis.workpiece_side] or list(reach.linear)
+    """The seat of a rotary axis gives way with the place of a linear axis; of which one is found out."""
+    if not reach.linear:
+        return
     wave = Fourier(order=(1,))
-    effects = zero(
-        [Effect(f"E{letter}{axis.name}", (), wave, **reach.factor(other)) for other in others for letter in LETTERS]
-    )
-    if effects:
-        title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"
-        name = f"rotary seat {axis.name}"
-        loading = weighed((1.0,) * (2 * len(effects)))
-        yield Candidate(name, title, axis.name, f"{axis.name} turning", effects, (loading,), (), "check the seat")
+    places = [(other, letter) for other in reach.linear for letter in LETTERS]
+    effects = zero([Effect(f"E{letter}{axis.name}", (), wave, **reach.factor(other)) for other, letter in places])
+    columns = np.eye(2 * len(effects))
+    each = 2 * len(LETTERS)
+    loadings = tuple(columns[:, each * k : each * (k + 1)] for k in range(len(reach.linear)))
+    title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"
+    name = f"rotary seat {axis.name}"
+    yield Candidate(name, title, axis.name, f"{axis.name} turning", effects, loadings, (), "check the seat")

@@ -40,14 +40,24 @@ def smooth(length: float, low: float = -1.0, high: float = 1.0, pieces: int = PI
 
 
 @lru_cache(maxsize=64)
-def bent(length: float, powers: int) -> Array:
-    """The same without its mean (`powers` 1), and without its slope too (2): those are constants of the machine."""
+def bent(length: float) -> Array:
+    """The same without its mean and slope: those are constants of the machine."""
+    return smooth(length) - _straight(length, 2)
+
+
+@lru_cache(maxsize=64)
+def turned(length: float) -> Array:
+    """The same with half of its mean: where a tilt is zero, nobody knows; in part that is a constant of the machine."""
+    return smooth(length) - 0.5 * _straight(length, 1)
+
+
+def _straight(length: float, powers: int) -> Array:
+    """Mean, and slope if `powers` is 2, of what `smooth` loads."""
     knots = np.asarray(spline().knots)
     places = np.array([knots[i + 1 : i + 4].mean() for i in range(PIECES + 3)])
     straight = np.linalg.qr(places[:, None] ** np.arange(powers))[0]
-    loading = smooth(length)
-    rest: Array = loading - straight @ (straight.T @ loading)
-    return rest
+    found: Array = straight @ (straight.T @ smooth(length))
+    return found
 
 
 def harmonics(count: int = 4) -> tuple[float, ...]:

@@ -20,8 +20,8 @@ from ncfix.machine.piecewise import Step
 from ncfix.machine.smooth import Polynomial
 from ncfix.measure.measurement import Array
 
-LAGS = (None, 900.0, 3600.0)
-"""s: at once, a spindle, a frame."""
+LAGS = (None, 600.0, 1800.0, 5400.0)
+"""s: at once, a spindle, a slide, a frame; what lies between is a mixture."""
 COURSE = 8
 """Pieces of a smooth course of time."""
 SLOW = 0.5
@@ -31,9 +31,12 @@ FREE = 0.4
 AMBIENT = ("ambient", "air", "hall", "room")
 SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
-WARM = 20.0
+WARMER = 5.0
+"""K: unit of temperature."""
 WARM_UP = "warm up before measuring and cutting"
 Parts = Sequence[tuple[str, Mapping[str, Any]]]
+Drive = tuple[list[dict[str, Any]], Array]
+"""What drives an effect, as options, and the loading of its coefficients."""
 
 
 def candidates(reach: Reach) -> Iterator[Candidate]:
@@ -41,9 +44,10 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
     clocked = "time_s" in reach.columns and reach.clock[1] > reach.clock[0]
     if not clocked and not reach.sensors:
         return
-    inside = [name for name in reach.sensors if not name.removeprefix("temp_").startswith(AMBIENT)]
-    yield from _growth(reach, inside, clocked)
-    yield from _drifts(reach, inside, clocked)
+    inside = [name for name in reach.sensors if not _of_air(name)]
+    driven = _drive(reach, inside, clocked)
+    yield _growth(reach, driven)
+    yield from _drifts(reach, driven, clocked)
     for axis in reach.linear:
         own = along(axis)
         linear = reach.factor(axis)
@@ -54,39 +58,44 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
                 [(name, linear | {"times_center": place})]
                 for place in (*reach.spans[axis.name], linear["times_center"])
             ]
-            yield _of(reach, f"thermal scale {axis.name}", title, axis.name, fixed, inside, clocked)
+            yield _of(reach, f"thermal scale {axis.name}", title, axis.name, fixed, driven)
         for turn in TURNS:
             title = f"thermal bend: {axis.name} tilts about {LETTERS[TURNS.index(turn)]} with temperature"
             name = f"E{turn}{axis.name}"
-            yield _of(reach, f"thermal bend {name}", title, axis.name, [[(name, {})]], inside, clocked)
+            yield _of(reach, f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
     for axis in reach.rotary:
         lines: Parts = [(f"E{LETTERS[k]}0{axis.name}", {}) for k in across(axis)]
         title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
-        yield _of(reach, f"rotary centre drift {axis.name}", title, axis.name, [lines], inside, clocked)
+        yield _of(reach, f"rotary centre drift {axis.name}", title, axis.name, [lines], driven)
     if reach.sensors or clocked:
         yield _artefact(reach, reach.sensors, clocked)
     if clocked:
         yield from _slip(reach)
 
 
-def _growth(reach: Reach, sensors: Sequence[str], clocked: bool) -> Iterator[Candidate]:
+def _of_air(sensor: str) -> bool:
+    return sensor.removeprefix("temp_").startswith(AMBIENT)
+
+
+def _growth(reach: Reach, driven: Drive) -> Candidate:
     along_tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
     title = "spindle growth: the spindle lengthens as it warms"
     parts: list[Parts] = [[(f"E{LETTERS[along_tool]}{SPINDLE}", {})]]
-    yield _of(reach, "spindle growth", title, "", parts, sensors, clocked, "spindle")
+    return _of(reach, "spindle growth", title, "", parts, driven, "spindle")
 
 
-def _drifts(reach: Reach, sensors: Sequence[str], clocked: bool) -> Iterator[Candidate]:
+def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
     """The frame moves along a base axis: with the machine's own heat, or with the hall's day."""
     held = by_foundation(reach)
-    air = [name for name in reach.sensors if name not in sensors]
+    air = [name for name in reach.sensors if _of_air(name)]
+    outside = _drive(reach, air, clocked, _swing(reach, air))
     for letter in LETTERS:
         parts: list[Parts] = [[(f"E{letter}0{held.name}", {"carried": True})]]
         title = f"drift of the frame along {letter} as the machine warms"
-        yield _of(reach, f"drift {letter}", title, letter, parts, sensors, clocked)
+        yield _of(reach, f"drift {letter}", title, letter, parts, driven)
         if air:
             title = f"ambient swing along {letter}: the frame follows the air"
-            yield _of(reach, f"ambient swing {letter}", title, letter, parts, air, False)
+            yield _of(reach, f"ambient swing {letter}", title, letter, parts, outside)
 
 
 def _of(
@@ -95,12 +104,11 @@ def _of(
     title: str,
     axis: str,
     forms: Sequence[Parts],
-    sensors: Sequence[str],
-    clocked: bool,
+    driven: Drive,
     family: str = "heat",
 ) -> Candidate:
     """Components that follow temperatures, lagged and not, and a course of time; in one of several forms."""
-    drive, size = _drive(reach, sensors, clocked)
+    drive, size = driven
     effects = [
         Effect(component, (), **each, **options) for form in forms for component, options in form for each in drive
     ]
@@ -111,7 +119,7 @@ def _of(
         whole[rows : rows + len(block)] = block
         loadings.append(whole)
         rows += len(block)
-    needs = (*sensors, *(("time_s",) if clocked else ()))
+    needs = tuple(dict.fromkeys(each["input"] for each in drive))
     return Candidate(name, title, axis, family, zero(effects), _cut(loadings, effects), needs, WARM_UP)
 
 
@@ -121,19 +129,24 @@ def _cut(loadings: Sequence[Array], effects: Sequence[Effect]) -> tuple[Array, .
     return tuple(loading[:count] for loading in loadings)
 
 
-def _drive(reach: Reach, sensors: Sequence[str], clocked: bool) -> tuple[list[dict[str, Any]], Array]:
-    """What drives a thermal effect, as options of effects, and its loading."""
+def _swing(reach: Reach, air: Sequence[str]) -> float:
+    """How much the air swings, against what warms a machine."""
+    return max((reach.warmth[sensor][1] for sensor in air), default=0.0) / WARMER
+
+
+def _drive(reach: Reach, sensors: Sequence[str], clocked: bool, course: float = 1.0) -> Drive:
+    """What drives a thermal effect, as options of effects, and its loading; a course of time of such a size besides."""
     drive: list[dict[str, Any]] = []
     lags = LAGS if "time_s" in reach.columns else LAGS[:1]
     for sensor in sensors:
-        each = {"basis": DEGREE, "input": sensor, "center": WARM, "scale": 5.0}
+        each = {"basis": DEGREE, "input": sensor, "center": round(reach.warmth[sensor][0], 1), "scale": WARMER}
         drive += [each | ({"time_constant_s": lag} if lag else {}) for lag in lags]
     size = [weighed((1.0,) * len(drive))]
     if clocked:
         first, last = reach.clock
-        course = {"center": (first + last) / 2, "scale": (last - first) / 2, "input": "time_s"}
-        drive.append({"basis": shapes.spline(pieces=COURSE), **course})
-        size.append(np.sqrt(FREE) * shapes.smooth(SLOW, pieces=COURSE))
+        middle = {"center": (first + last) / 2, "scale": (last - first) / 2, "input": "time_s"}
+        drive.append({"basis": shapes.spline(pieces=COURSE), **middle})
+        size.append(course * np.sqrt(FREE) * shapes.smooth(SLOW, pieces=COURSE))
     return drive, stacked(*size)
 
 
