@@ -175,3 +175,14 @@ def test_the_skeleton_stays_within_the_travels(name, kind):
             assert len(words) > 300
             assert words.min() >= low - 1e-9
             assert words.max() <= high + 1e-9
+
+
+def test_few_poses_are_planned_too():
+    """Two poses leave much open; what is worked out of them must not break down over it."""
+    found = plan(machine("three_axis"), "tcp", 2, Room(inputs={"load_kg": (0.0, 50.0)}), "load-X")
+    assert len(found.plan) == 2
+
+
+def test_a_kind_that_sees_nothing_is_refused():
+    with pytest.raises(UsageError, match="no pose of this kind tells anything"):
+        plan(machine("three_axis"), "probe", 5, effects="EXX")

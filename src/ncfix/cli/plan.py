@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import click
 
 from ncfix.cli import console
-from ncfix.cli.options import force_option, json_option, load_machine, machine_option, table_option
+from ncfix.cli.options import Length, force_option, json_option, load_machine, machine_option, table_option
 from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ KINDS = ("tcp", "tcp6", "probe", "length")
 @click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
 @click.option("--existing", metavar="FILE", help="A measurement that the new poses complete.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
-@click.option("--tool-length", "lengths", multiple=True, type=float, metavar="MM", help="Tools there are (repeatable).")
+@click.option("--tool-length", "lengths", multiple=True, type=Length(), metavar="MM", help="A tool (repeatable).")
 @click.option("--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands (kind probe).")
 @click.option("--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z.")
 @click.option("--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg.")
@@ -129,6 +130,6 @@ def _named(text: str, count: int, option: str) -> tuple[str, list[float]]:
         values = [float(part) for part in rest.split(",")]
     except ValueError:
         values = []
-    if not equals or len(values) != count:
+    if not equals or len(values) != count or not all(map(math.isfinite, values)):
         raise click.BadParameter(f"{text!r} is not NAME= and {count} numbers", param_hint=option)
     return name.strip(), values

@@ -101,13 +101,23 @@ def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
     projected = inverse @ pool.targets.T
     present = np.einsum("tp,pt->t", pool.targets, projected)
     small = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p) @ np.swapaxes(pool.blocks, 1, 2)
-    white = np.linalg.solve(np.linalg.cholesky(small + np.eye(r)), pool.blocks)
+    white = _whitened(small, pool.blocks)
     cross = white.reshape(n * r, p) @ projected
     gain = np.square(cross, out=cross).reshape(n, r, -1).sum(axis=1)
     worst = (present - gain).max(axis=1)
     worst[others] = np.inf
     best = int(worst.argmin())
     return best, float(worst[best])
+
+
+def _whitened(small: Array, blocks: Array) -> Array:
+    """L^-1 B, where L L' = 1 + `small`; where poses leave much open, rounding spoils that `small` is not negative."""
+    try:
+        found: Array = np.linalg.solve(np.linalg.cholesky(small + np.eye(small.shape[1])), blocks)
+    except np.linalg.LinAlgError:
+        values, ways = np.linalg.eigh(small)
+        found = np.swapaxes(ways, 1, 2) @ blocks / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
+    return found
 
 
 def information(pool: Pool, rows: Sequence[int]) -> Array:

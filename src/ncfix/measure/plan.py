@@ -156,6 +156,9 @@ def pool_of(
     design[:, np.abs(design).max(axis=0, initial=0.0) < 1e-6] = 0.0
     nuisance = seen.unknown_design(seen.unknowns.start)[:rows] / noise
     kept = solve(design, nuisance, np.zeros(rows)).kept
+    if not len(kept):
+        text = "no pose of this kind tells anything of what is sought from what else is unknown"
+        raise UsageError.of("NCF636", text, hint="another --kind, other --effects, or wider ranges")
     whole = np.concatenate([design[:, kept], _full_rank(nuisance)], axis=1)
     scale = np.linalg.norm(whole, axis=0) / np.sqrt(len(seen.measurement))
     targets = _targets(machine, selection, kept, room, separate, seed)
