@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.machine import loads
+from ncfix.program.klartext.arc_text import PieceOfArc, arc_text
+from ncfix.program.klartext.number_text import Style
 from ncfix.program.klartext.poles import pole_in_force
 from ncfix.program.reader import read
 from ncfix.program.writer import apply
@@ -245,3 +248,20 @@ def test_block_numbers_as_asked_for(choice: str, numbers: list[str]) -> None:
         assert found[-2].startswith("/")
     else:
         assert moves[:4] == numbers
+
+
+@pytest.mark.parametrize(
+    ("radius", "degrees"), [(3.0, 90.0), (12.0, -270.0), (250.0, 359.0), (8000.0, 0.7), (40.0, 1080)]
+)
+def test_an_angle_of_as_many_digits_as_a_control_takes_leads_to_the_end(radius: float, degrees: float) -> None:
+    """0.0001 degrees are 14 um on a radius of 8 m: the pole is chosen so that they lead there all the same."""
+    turn = np.radians(degrees)
+    begin, middle = np.array([7.1234, -3.4321, 5.0]), np.array([7.1234 - radius, -3.4321, 5.0])
+    end = middle + radius * np.array([np.cos(turn), np.sin(turn), 0.0]) + [0, 0, 2.0]
+    arc = PieceOfArc(begin, end, middle, (0, 1, 2), (0, 1, 2), degrees < 0, turn, np.full(3, 4))
+    text = arc_text(arc, Style())
+    assert text.function == "CP"
+    assert len(text.words[0].partition(".")[2]) <= 4
+    off = radius * 1e-4 * np.pi / 360 if abs(degrees) > 180 else 0.0
+    assert np.hypot(*(text.end - end)[:2]) < 2e-4 + off
+    assert np.hypot(*(text.centre - middle)[:2]) * (1 - np.cos(turn / 2)) < 3e-4

@@ -129,28 +129,43 @@ def written_pole(arc: PieceOfArc, middle: FloatArray, style: Style, digits: int)
 
 
 def helix(arc: PieceOfArc, style: Style, sense: str) -> ArcText:
-    """CP with IPA about a pole that is equally far from both ends; the control works the end out."""
+    """CP with IPA about a pole that is equally far from both ends; the control works the end out.
+
+    The angle is put on its digits before the pole is: about a far one that leads nearer to the end. About a near one
+    it is better found again from the pole as it is written.
+    """
     begin, end = arc.begin[arc.columns], arc.end[arc.columns]
     wanted = equally_far(begin, end, arc.middle)
-    angle = swept(arc, wanted, begin, end)
-    if arc.turn is not None:
-        angle += 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
-    text = style.number(math.degrees(angle), ANGLE_DIGITS)
-    angle = math.radians(value_of(text))
-    fitting = seen_under(begin, end, angle)
-    if float(np.hypot(*(fitting - wanted))) * (1 - math.cos(angle / 2)) < ASIDE:
+    first = on_digits(turned_by(arc, wanted, begin, end), style)
+    fitting = seen_under(begin, end, math.radians(value_of(first)))
+    if float(np.hypot(*(fitting - wanted))) * (1 - math.cos(math.radians(value_of(first)) / 2)) < ASIDE:
         wanted = fitting
     pole, words = written_pole(arc, wanted, style, max(POLE_DIGITS, arc.digits))
-    spoke = begin - pole
-    turned = np.array(
-        [
-            math.cos(angle) * spoke[0] - math.sin(angle) * spoke[1],
-            math.sin(angle) * spoke[0] + math.cos(angle) * spoke[1],
-        ]
-    )
-    reached = arc.end.copy()
-    reached[arc.columns] = pole + turned
-    return ArcText("CP", words, ("IPA" + text,), sense, reached, spatial(arc, pole))
+    texts = first, on_digits(turned_by(arc, pole, begin, end), style)
+    reached = [swung(begin, pole, math.radians(value_of(text))) for text in texts]
+    best = int(np.argmin([float(np.hypot(*(place - end))) for place in reached]))
+    ending = arc.end.copy()
+    ending[arc.columns] = reached[best]
+    return ArcText("CP", words, ("IPA" + texts[best],), sense, ending, spatial(arc, pole))
+
+
+def turned_by(arc: PieceOfArc, middle: FloatArray, begin: FloatArray, end: FloatArray) -> float:
+    """The signed angle from begin to end about a centre, with the whole turns that the arc was meant to have."""
+    angle = swept(arc, middle, begin, end)
+    return angle if arc.turn is None else angle + 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
+
+
+def on_digits(angle: float, style: Style) -> str:
+    """An angle as the control takes it."""
+    return style.number(math.degrees(angle), ANGLE_DIGITS)
+
+
+def swung(begin: FloatArray, pole: FloatArray, angle: float) -> FloatArray:
+    """A point turned about another one."""
+    x, y = begin - pole
+    c, s = math.cos(angle), math.sin(angle)
+    found: FloatArray = pole + np.array([c * x - s * y, s * x + c * y])
+    return found
 
 
 def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> FloatArray:

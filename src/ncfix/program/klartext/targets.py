@@ -129,7 +129,8 @@ def led(control: Control, words: Words) -> Where:
 def derived(control: Control, words: Words, axes: int) -> str:
     """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
 
-    Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place that the program may not have said.
+    Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
+    that the program may not have said.
     """
     own = words.axes
     if {"PR", "PA"} <= words.values.keys():
