@@ -141,6 +141,20 @@ def test_ten_micrometres_of_exx_show_as_ten_with_the_sign_of_the_side() -> None:
         assert np.einsum("ni,ni->n", turn[:, :, 0], shown) == pytest.approx(sign * 0.010 * size, abs=1e-12)
 
 
+@pytest.mark.parametrize("topology", TOPOLOGIES)
+def test_a_sagging_slide_stays_tangent_to_its_way(topology: str) -> None:
+    """Turned as its way is: by the way's direction x the slope of the deflection, whichever way the axis counts."""
+    s = situation(topology)
+    entry = next(e for e in catalogue(s.machine) if e.kind == "bed sag")
+    joint = s.machine.joint(entry.axis)
+    _, order = np.unique(s.column(entry.axis), return_index=True)
+    twists = entry.draw(np.random.default_rng(2))(s)[order, s.machine.frames.index(entry.axis)]
+    down = np.asarray(s.machine.gravity)
+    slope = np.gradient(twists[:, :3] @ down, s.column(entry.axis)[order])
+    turned = twists[:, 3:] @ np.cross(joint.direction, down)
+    assert np.corrcoef(slope, turned)[0, 1] > 0.9
+
+
 def test_growth_pushes_the_tip_along_the_tool() -> None:
     s = situation("wXFYZCBSt")
     grown = np.zeros((len(s), len(s.machine.frames), 6))

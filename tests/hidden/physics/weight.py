@@ -81,7 +81,7 @@ def _curved(rng: Generator, joint: Joint, power: float) -> tuple[curves.Curve, c
 def _coupled(machine: Machine, joint: Joint, rng: Generator, power: float) -> Field:
     """Vertical deflection and the pitch that belongs to it: rotation vector = direction x slope of the deflection."""
     shape, slope = _curved(rng, joint, power)
-    move, down = np.abs(np.asarray(joint.direction)), np.asarray(machine.gravity)
+    move, down = np.asarray(joint.direction), np.asarray(machine.gravity)
     tilt = np.cross(move, down) * rng.uniform(0.7, 1.3)
     parts: dict[tuple[str, str], Signal] = {}
     for i in range(3):
