@@ -134,6 +134,12 @@ class UsageError(NcfixError):
     exit_code = ExitCode.USAGE
 
 
+class DifferenceError(NcfixError):
+    """What was compared differs so much that there is nothing to measure (exit 1)."""
+
+    exit_code = ExitCode.FINDINGS
+
+
 class SourceError(NcfixError):
     """An NC program that cannot be read or followed (exit 3)."""
 

@@ -127,7 +127,7 @@ def test_verify_refuses_programs_that_are_not_the_same_cut(shop: Any, ncfix: Any
     other = shop.folder / "other.ngc"
     other.write_bytes(shop.program.read_bytes().replace(b"X210 Y60\r\n", b""))
     result = ncfix("verify", shop.program, other, "-m", shop.perfect)
-    assert result.code == ExitCode.USAGE
+    assert result.code == ExitCode.FINDINGS
     assert "NCF420" in result.err
 
 

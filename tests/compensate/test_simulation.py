@@ -8,7 +8,7 @@ import pytest
 from ncfix.compensate.comparison import compare
 from ncfix.compensate.following import follow
 from ncfix.compensate.simulation import TipError, tip_error
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import DifferenceError
 from ncfix.machine import Machine, loads
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
@@ -118,9 +118,9 @@ def test_a_loop_that_is_missing_is_seen_on_the_way_back() -> None:
 
 
 def test_another_cut_is_refused() -> None:
-    with pytest.raises(UsageError, match="NCF420"):
+    with pytest.raises(DifferenceError, match="NCF420"):
         both(AXES, WAVE, WAVE + "G1 X0 Y0\n")
-    with pytest.raises(UsageError, match="NCF420"):
+    with pytest.raises(DifferenceError, match="NCF420"):
         both(AXES, WAVE, "G0 X0 Y0 Z0\n")
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
-from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.cli.options import FiniteRange, force_option, json_option, load_machine, machine_option
+from ncfix.cli.targets import STREAM, Outputs, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ LOSSES = ("auto", "none", "huber", "tukey")
 )
 @click.option(
     "--prune",
-    type=click.FloatRange(0.5, 1.0, min_open=True, max_open=True),
+    type=FiniteRange(0.5, 1.0, min_open=True, max_open=True),
     metavar="LEVEL",
     help="Leave out coefficients that are not significant at this level, e.g. 0.999.",
 )
@@ -69,6 +69,7 @@ def calibrate(
     from ncfix.measure.prediction import guesses, over_the_travels
     from ncfix.measure.reader import reads
 
+    each_once(measured)
     target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]

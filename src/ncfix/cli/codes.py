@@ -94,4 +94,9 @@ CODES = {
         "A report is made of machine files (TOML) and of what verbs print with `--json`: one object with a `schema`.",
         "Keep what the verb prints: `ncfix fix ... --json > result.json`.",
     ),
+    "NCF020": Code(
+        "an input given twice",
+        "The same file is named twice, perhaps under two names. Measurements that count twice look better.",
+        "Leave it out once; a measurement that was repeated is another file, or has a column `repeat`.",
+    ),
 }

@@ -10,7 +10,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def diagnose(
     from ncfix.report.diagnosis import document
     from ncfix.report.forms import form_of
 
+    each_once(measured)
     inputs = (*measured, machine_path)
     machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
     form = form_of(report) if report is not None else None

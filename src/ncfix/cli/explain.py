@@ -32,7 +32,8 @@ def explain(code: str | None, as_json: bool) -> None:
     """Explain the message code CODE, e.g. NCF002; without CODE list them all."""
     codes = all_codes()
     if code is not None:
-        codes = {code.upper(): _known(code.upper(), codes)}
+        code = f"NCF{code}" if code.isdecimal() else code.upper()
+        codes = {code: _known(code, codes)}
     if as_json:
         console.put_json(codes=[{"code": key, **_as_dict(it)} for key, it in codes.items()])
     elif code is None:

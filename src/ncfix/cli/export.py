@@ -13,6 +13,7 @@ from ncfix.cli import console
 from ncfix.cli.following import Following
 from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.targets import STREAM
 from ncfix.diagnostics import ExitCode, Place, UsageError
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def export(
     from ncfix.tables.poses import ranges_of
 
     chosen = get_control(control)
+    check_folder(output)
     following = Following.of(machine_path, dialect, given)
     machine = following.machine
     assert machine is not None
@@ -121,10 +123,17 @@ def _tell_of_probe(found: Written, control: str, as_json: bool) -> None:
     console.put("".join(f"{name}\n" for name in sorted(found.files)))
 
 
+def check_folder(folder: str) -> None:
+    """Refuse what cannot be a folder of tables: NCF003 or NCF007."""
+    if folder in ("", STREAM):
+        raise UsageError.of("NCF003", "tables are several files, which go to a folder", hint="-o FOLDER")
+    if os.path.lexists(folder) and not os.path.isdir(folder):
+        raise UsageError.of("NCF007", "is not a folder", Place(folder), "-o FOLDER")
+
+
 def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
     """Write all files, or none if one is there already; raises `UsageError` NCF004 or NCF007."""
-    if os.path.lexists(folder) and not os.path.isdir(folder):
-        raise UsageError.of("NCF007", "is not a folder", Place(folder))
+    check_folder(folder)
     paths = {os.path.join(folder, name): content for name, content in made.files.items()}
     for path in paths:
         if os.path.lexists(path) and (not force or os.path.islink(path) or not os.path.isfile(path)):

@@ -53,6 +53,17 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
         return found
 
 
+class FiniteRange(click.FloatRange):
+    """A number within limits; "nan", which is neither below nor above them, is none."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number."""
+        found = float(super().convert(value, param, ctx))
+        if not math.isfinite(found):
+            self.fail(f"{value!r} is not a number", param, ctx)
+        return found
+
+
 class Length(click.ParamType):  # type: ignore[type-arg]
     """A length in mm that a tool can have, or none at all."""
 

@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.following import Following, figures, lines_of
-from ncfix.cli.options import dialect_option, force_option, json_option, load_machine, machine_option
+from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.table import as_csv, known
 from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ncfix.compensate.simulation import TipError
     from ncfix.measure.synthetic import Faults
 
-NOT_NEGATIVE = click.FloatRange(min=0.0)
+NOT_NEGATIVE = FiniteRange(min=0.0, max=1e6)
 
 
 @click.command()

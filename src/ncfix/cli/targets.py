@@ -129,6 +129,17 @@ def targets(
     return found
 
 
+def each_once(given: Sequence[str]) -> None:
+    """Refuse a file that is named twice, under whatever names: what it says would count twice. NCF020."""
+    seen: dict[object, str] = {}
+    for path in given:
+        key = _file(path) or path
+        if key in seen:
+            text = "is given twice, and what it says would count twice"
+            raise UsageError.of("NCF020", text, Place(shown(path)), "leave it out once")
+        seen[key] = path
+
+
 def _check_choices(outputs: Outputs, folder: str | None) -> None:
     if outputs.output == "":
         raise UsageError.of("NCF003", "the name of the output is empty", hint="-o FILE, -o DIR or -o -")

@@ -17,7 +17,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.flanks import other_side, uncertain
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import TipError, actual_tip, batches, samples
-from ncfix.diagnostics import UsageError
+from ncfix.diagnostics import DifferenceError
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 
@@ -74,8 +74,8 @@ class Curve:
 def compare(machine: Machine, original: Moves, other: Moves, state: State = State()) -> tuple[TipError, TipError]:  # noqa: B008
     """How far `other` on this machine is from what `original` means: along `other`, and along `original`.
 
-    The first has motions of `other` in `rows`, the second those of `original`. Raises `UsageError` NCF420 if the two
-    are not the same cut at all.
+    The first has motions of `other` in `rows`, the second those of `original`. Raises `DifferenceError` NCF420 if the
+    two are not the same cut at all.
     """
     meant, done = Intent(machine, original, state), Intent(machine, other, state)
     intended, actual = Curve.of(meant, meant.tip), _as_made(done)
@@ -137,7 +137,7 @@ def _check_alike(intended: Curve, actual: Curve) -> None:
     longer = max(intended.total, actual.total)
     if (len(intended.rows) == 0) != (len(actual.rows) == 0) or abs(intended.total - actual.total) > UNLIKE * longer:
         text = f"the two programs do not cut the same: {intended.total:.3f} mm and {actual.total:.3f} mm of path"
-        raise UsageError.of("NCF420", text, hint="give the original program first, then the corrected one")
+        raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")
 
 
 def nearest(curve: Curve, other: Curve) -> Array:
