@@ -18,7 +18,7 @@ from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array
 from ncfix.tables.minimax import Remainder, least_worst
 from ncfix.tables.neutral import Compensation
-from ncfix.tables.scheme_curves import Sample, followed
+from ncfix.tables.scheme_curves import Evaluate, Sample, followed
 from ncfix.tables.scheme_layout import Layout, absorbed
 from ncfix.tables.scheme_nodes import Line
 from ncfix.tables.scheme_parts import Face, Selection, needed
@@ -28,12 +28,18 @@ from ncfix.tables.separable import Parts, taken_apart, taken_apart_along
 
 NODES = 8
 """Positions of each axis at which the correction is taken apart; fewer if there are more than five axes."""
-GRID = 8**5
+PROVEN = 10
+"""Positions of each axis for the bound that is said: more of them prove more."""
+FULL = 5
+"""With more axes than these there are fewer positions of each."""
 LEVER = 200.0
 """mm: an angle of a rotary axis is judged by what it does to the tip at that distance."""
 ROTARY_SHARE = 8
-"""Rotary axes get one table in so many, if tables are few: they do little for the tip, and their parts that follow the
-linear axes leave it with more that takes three axes at once."""
+"""Rotary axes get one table in so many at most, if tables are few: they do little for the tip."""
+FEWER = (1, 3, 5, 8, 12, 16)
+"""Tables that rotary axes are tried with: what follows other axes in them may leave more that takes three at once."""
+ALIKE = 1.02
+"""Bounds that differ by less are the same: then more tables for the rotary axes are better."""
 SMALL = 0.1
 """Parts that are below this share of the target (rms) together are left out."""
 AGAINST_REST = 0.15
@@ -87,11 +93,42 @@ def automatic(job: Job, rotary: bool = True) -> Scheme:
     most = job.limits.tables
     done = Scheme(Compensation(()), 0.0, 0.0, 0.0)
     if columns:
-        done, used = _staged(job, columns, turning(job), LEVER, max(1, most // ROTARY_SHARE))
+        done, used = _rotary(job, columns)
         most -= used
     moved, _ = _staged(job, linear_axes(job.machine), moving(job, done.tables), 1.0, most)
     tables = Compensation((*done.tables.terms, *moved.tables.terms))
-    return Scheme(tables, moved.missed, moved.rest, moved.dropped, moved.bound)
+    bound = moved.bound
+    if bound > SMALL * job.target:
+        bound = max(bound, _bound(job, done, PROVEN))
+    return Scheme(tables, moved.missed, moved.rest, moved.dropped, bound)
+
+
+def _rotary(job: Job, columns: Sequence[int]) -> tuple[Scheme, int]:
+    """The tables of the rotary axes, as many as leave the linear axes with least that no pair can say."""
+    allowed = max(1, job.limits.tables // ROTARY_SHARE)
+    tried: list[tuple[float, Scheme, int]] = []
+    for most in sorted({min(each, allowed) for each in (*FEWER, allowed)}):
+        done, used = _staged(job, columns, turning(job), LEVER, most)
+        tried.append((max(_bound(job, done), SMALL * job.target), done, used))
+        if used < most and [each[-1] for each in tried[-2:]] == [used, used]:
+            break
+    least = min(bound for bound, _, _ in tried)
+    _, done, used = [each for each in tried if each[0] <= ALIKE * least][-1]
+    return done, used
+
+
+def _bound(job: Job, done: Scheme, count: int = NODES) -> float:
+    """How little the linear axes can leave at the worst where the rotary axes are corrected so, mm."""
+    turns = [line.modulo for line in lines_of(job)]
+    nodes = coarse_nodes(job.space, turns, count)
+    values = _values(nodes, by_way(moving(job, done.tables)), None)
+    return least_worst(nodes, turns, values, SMALL * job.target).bound
+
+
+def _values(nodes: Sequence[Array], evaluate: Evaluate, way: int | None) -> Array:
+    """Corrections on a full grid, (*counts, n_outputs)."""
+    q = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, len(nodes))
+    return evaluate(q, way).reshape(*map(len, nodes), -1)
 
 
 def turning(job: Job) -> Corrections:
@@ -145,12 +182,10 @@ def _parts(
 ) -> tuple[Selection, Remainder]:
     """The corrections of some axes, taken apart, and what no pair can say of them, left where it hurts least."""
     enough = np.inf if job.machine.rotary[list(outputs)].any() else SMALL * job.target
-    counts = [len(line) for line in nodes]
-    q = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, len(nodes))
     evaluate = by_way(correct)
     found: dict[Face, Parts] = {}
     for way in (None, *ways_that_matter(job.machine)):
-        values = scale * evaluate(q, way).reshape(*counts, len(outputs))
+        values = scale * _values(nodes, evaluate, way)
         if way is None:
             left = least_worst(nodes, [line.modulo for line in lines_of(job)], values, enough)
             values = values - left.values
@@ -173,12 +208,12 @@ def ways_that_matter(machine: Machine) -> list[int]:
     return sorted(found)
 
 
-def coarse_nodes(space: Array, turns: Sequence[bool]) -> list[Array]:
+def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list[Array]:
     """Where corrections are taken apart: evenly over each axis, but not so evenly that a screw's period could hide.
 
     The ends are among them, since most is left there; of axes that repeat (`turns`) there are none.
     """
-    count = min(NODES, int(GRID ** (1 / len(space)) + 1e-9))
+    count = min(most, int(most ** (FULL / len(space)) + 1e-9))
     shaken = np.arange(count) + 0.5 + 0.3 * (np.mod(np.arange(1, count + 1) * 0.618034, 1.0) - 0.5)
     stretched = (shaken - shaken[0]) / (shaken[-1] - shaken[0])
     return [
