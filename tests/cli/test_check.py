@@ -52,6 +52,16 @@ def test_nothing_is_written(shop: Any, ncfix: Any) -> None:
     assert sorted(os.listdir(shop.folder)) == before
 
 
+def test_a_stamp_is_one_finding(shop: Any, ncfix: Any) -> None:
+    out = shop.folder / "fixed.ngc"
+    given = ("-m", shop.machine, "--offset", "G54=0,0,0", "--tool", "0=0")
+    ncfix("fix", shop.program, *given, "-o", out)
+    found = ncfix("check", out, *given, "--json").json()["files"][0]["findings"]
+    codes = [each["code"] for each in found]
+    assert codes.count("NCF430") == 1
+    assert "NCF438" not in codes
+
+
 def test_over_many_files_the_worst_counts(shop: Any, ncfix: Any) -> None:
     missing = shop.folder / "missing.ngc"
     result = ncfix("check", shop.program, missing, "--json")

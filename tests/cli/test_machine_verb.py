@@ -14,7 +14,7 @@ from ncfix.machine import load
 def test_check_says_that_it_is_in_order(shop: Any, ncfix: Any) -> None:
     result = ncfix("machine", "check", shop.machine)
     assert (result.code, result.out) == (ExitCode.DONE, b"")
-    assert "in order, 3 axes, 1 effects" in result.err
+    assert "in order, 3 axes, 1 effect\n" in result.err
     assert ncfix("machine", "check", shop.machine, "--json").json()["hash"] == load(shop.machine).hash
 
 
@@ -77,3 +77,11 @@ def test_dialects_and_plugins_are_listed(ncfix: Any) -> None:
     assert {"iso", "linuxcnc"} <= {entry["name"] for entry in ncfix("dialects", "--json").json()["dialects"]}
     assert "linuxcnc" in ncfix("dialects").out.decode()
     assert "linuxcnc" in ncfix("plugins").out.decode()
+
+
+def test_a_control_that_nobody_knows_is_remarked_on(shop: Any, ncfix: Any) -> None:
+    shop.machine.write_text('control = "simens"\n' + shop.machine.read_text())
+    result = ncfix("machine", "check", shop.machine, "--json")
+    assert result.code == 0
+    (remark,) = result.json()["remarks"]
+    assert (remark["code"], "siemens" in remark["hint"]) == ("NCF318", True)

@@ -56,8 +56,9 @@ def _outcome(following: Following, path: str) -> Outcome:
         return Outcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
     console.tell_some(checked.findings)
     count = len(checked.findings)
-    said = f"{count} finding{'s' if count != 1 else ''}" if count else "nothing found"
-    console.say(f"{shown(path)}: {len(program)} blocks, {checked.moves} motions, {program.dialect.name}: {said}")
+    said = console.counted(count, "finding") if count else "nothing found"
+    size = f"{console.counted(len(program), 'block')}, {console.counted(checked.moves, 'motion')}"
+    console.say(f"{shown(path)}: {size}, {program.dialect.name}: {said}")
     entry |= {"dialect": program.dialect.name, "blocks": len(program), "moves": checked.moves}
     return Outcome(ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)})
 

@@ -109,6 +109,11 @@ def _plain(value: Any) -> Any:
     return value
 
 
+def counted(count: int, thing: str) -> str:
+    """How many of a thing: "1 block", "2 blocks"."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
 def error_figures(error: Mapping[str, Any]) -> str:
     """The figures of an error along a path, for people."""
     where = f", worst at line {error['where']}" if error.get("where") else ""

@@ -8,6 +8,9 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import json_option, load_machine
+from ncfix.cli.targets import shown
+from ncfix.diagnostics import Message, Place
+from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
     from ncfix.machine import Axis, Effect, Machine
@@ -24,10 +27,24 @@ def machine() -> None:
 def check(file: str, as_json: bool) -> None:
     """Check that FILE describes a machine; every fault of the file is named."""
     found = load_machine(file)
+    remarks = _remarks(found, shown(file))
+    console.tell(*remarks)
     if as_json:
-        console.put_json(path=file, ok=True, name=found.name, hash=found.hash)
+        said = [message.as_dict() for message in remarks]
+        console.put_json(path=shown(file), ok=True, name=found.name, hash=found.hash, remarks=said)
     else:
-        console.say(f"{file}: {found.name}: in order, {len(found.axes)} axes, {len(found.effects)} effects")
+        axes = "1 axis" if len(found.axes) == 1 else f"{len(found.axes)} axes"
+        effects = console.counted(len(found.effects), "effect")
+        console.say(f"{shown(file)}: {found.name}: in order, {axes}, {effects}")
+
+
+def _remarks(machine: Machine, path: str) -> list[Message]:
+    """What is possible and odd: a control that nobody here knows. Its plugin may be installed elsewhere."""
+    known = {*registry("dialects"), *registry("controls")}
+    if not machine.control or machine.control in known:
+        return []
+    text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
+    return [Message("NCF318", text, Place(path), nearest(machine.control, known))]
 
 
 @machine.command()
@@ -37,7 +54,7 @@ def show(file: str, as_json: bool) -> None:
     """Print the chain from workpiece to tool, and the errors with their size over the travel."""
     found = load_machine(file)
     if as_json:
-        console.put_json(path=file, **_as_dict(found))
+        console.put_json(path=shown(file), **_as_dict(found))
     else:
         console.put("\n".join(_page(found)) + "\n")
 

@@ -20,6 +20,9 @@ from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
 
+SUSPECTED = "NCF438"
+"""A program that seems to have been corrected: what nobody needs to guess of one that says so."""
+
 
 @dataclass(frozen=True, slots=True)
 class Checked:
@@ -52,11 +55,13 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
         report = fix_program(program, machine, setup, FixOptions(force=True, verify=False), resolve).report
         refusals = (Message(each.code, each.reason, Place(program.path, each.line)) for each in report.refused)
         remarks = (*report.warnings, *refusals)
+    stamped = _stamped(program)
+    remarks = tuple(message for message in remarks if not (stamped and message.code == SUSPECTED))
     told = {(message.code, message.place.line if message.place else 0) for message in remarks}
     travel = (
         each for each in _travel(program, followed) if (each.code, each.place.line if each.place else 0) not in told
     )
-    return Checked(len(followed.trace.moves), (*_stamped(program), *remarks, *travel))
+    return Checked(len(followed.trace.moves), (*stamped, *remarks, *travel))
 
 
 def _said(found: Trace) -> tuple[Message, ...]:

@@ -1,4 +1,4 @@
-"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF317) and states (NCF340)."""
+"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF318) and states (NCF340)."""
 
 from __future__ import annotations
 
@@ -88,6 +88,11 @@ CODES = {
         "`ncfix effects --bases` describes them.",
     ),
     "NCF317": Code("another schema of machine files", "The file says that it is of another version.", FORMATS),
+    "NCF318": Code(
+        "a control that is not known",
+        "`control` is the default of `--dialect` and of `ncfix export`; nothing that is installed has this name.",
+        "`ncfix dialects` lists the dialects, `ncfix plugins` what else there is.",
+    ),
     "NCF340": Code(
         "an input of the error model is not given",
         "An effect depends on a temperature, a time or the like. Without its value the error is not known, and zero "
