@@ -14,9 +14,11 @@ from hypothesis import strategies as st
 
 from ncfix import fast
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.stream import Stream, Task
+from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
 from ncfix.program.dialects import get
 from ncfix.program.parts import NotInPartsError
@@ -269,3 +271,22 @@ def test_part_by_part_and_compiled_make_the_same_bytes(lines: list[str]) -> None
 
 def without_stamp(text: bytes) -> bytes:
     return b"".join(line for line in text.splitlines(keepends=True) if b"ncfix" not in line)
+
+
+def flat(text: str) -> bytes:
+    """A program written out flat, and corrected."""
+    options = FixOptions(flatten=True, allow_refused=True)
+    written = fix_flat(read(text.encode(), "part.nc", "linuxcnc"), smooth_machine(), ASSUMED, options).text
+    assert isinstance(written, bytes)
+    return written
+
+
+def test_holes_that_are_written_out_name_no_other_axis() -> None:
+    found = flat("G21 G90 G94 F100\nG0 X5 Z9\nG81 X10 Z-5 R2 L2\nG80\nM2\n").decode()
+    assert not any("Y" in letters(line) for line in found.splitlines() if "ncfix" not in line)
+
+
+@pytest.mark.parametrize("line", ["G91 G81 X10 Z-5 R2 L3", "G91 G0 X5\nG1 @10 ^5"])
+def test_increments_from_nowhere_are_not_written_out(line: str) -> None:
+    with pytest.raises(NcfixError, match="stands, so it cannot be written out flat"):
+        flat(f"G21 G90 G94 F100\nG0 Z9\n{line}\nM2\n")

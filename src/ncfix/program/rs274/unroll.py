@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector
+from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import RUNTIME_BRANCH
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
@@ -99,7 +100,7 @@ class Recorder:
         made += self.absent(unit, index, plan, block)
         motion = self.control.modal.motion if codes.motion is None else codes.motion
         if block.values.keys() & POLAR:
-            self.polar(unit, index, made)
+            self.polar(unit, index, block, made)
             return
         drills = holes and motion in self.control.rules.cycles and not codes.takes
         if drills and (len(holes) > 1 or self.control.modal.incremental):
@@ -107,7 +108,7 @@ class Recorder:
         else:
             self.put(unit, index, made)
 
-    def polar(self, unit: Unit, index: int, changes: list[Change]) -> None:
+    def polar(self, unit: Unit, index: int, block: Block, changes: list[Change]) -> None:
         """A block with polar words: X and Y of where it leads, absolute."""
         incremental = self.control.modal.incremental
         written = unit.program.templates[unit.template[index]].words
@@ -115,12 +116,22 @@ class Recorder:
         spans = {unit.program.span(index, word.span) for word in words}
         kept = [change for change in changes if not inside(change, spans)]
         stop = end_of_words(unit, index)
-        others = "".join(x for x in LETTERS if x in self.steps)
+        if incremental or not {"@", "^"} <= block.values.keys():
+            self.must_stand(mask_of((X, Y)))
+        others = "".join(x for x in LETTERS if x in self.steps and (x in "XY" or block.axes >> INDEX[x] & 1))
         text = (" G90" if incremental else "") + self.place(self.control.position, others)
         kept += [self.removal(unit, index, word) for word in words]
         self.put(unit, index, [*kept, Change(stop, stop, text)])
         if incremental:
             self.write("G91")
+
+    def must_stand(self, axes: int) -> None:
+        """Raise `Fault` where absolute words would have to say where an axis stands, and the program has not."""
+        adrift = self.control.places.adrift & axes
+        index = next((index for index in self.control.machine if adrift >> index & 1), None)
+        if index is not None:
+            what = f"the program has not said where the axis {LETTERS[index]} stands"
+            raise Fault(RUNTIME, f"{what}, so it cannot be written out flat")
 
     def check(self, plan: Plan, block: Block) -> None:
         """Raise `Fault` where the values of a block depend on the machine at run time."""
@@ -228,7 +239,10 @@ class Recorder:
         stop = end_of_words(unit, index)
         incremental = self.control.modal.incremental
         plane, level = self.control.modal.plane, self.control.modal.cycle.level / self.control.modal.unit
-        known = [i for i in (plane.first, plane.second) if block.axes >> i & 1 or i not in self.control.unknown]
+        if incremental:
+            self.must_stand(block.axes | 1 << plane.across)
+        adrift = self.control.places.adrift & ~block.axes
+        known = [i for i in (plane.first, plane.second) if not adrift >> i & 1]
         over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
         named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
         letters = over + named.replace(LETTERS[plane.across], "") + LETTERS[plane.across]
