@@ -89,7 +89,9 @@ def _correction_excess(written: Written) -> Array:
     """As `excess`, of the corrected program, (n, n_axes); negative, too, where the program itself goes beyond."""
     pieces = written.pieces
     each = np.arange(len(pieces))
-    curved = written.segments.arc | written.intent.moves.tcp[pieces.move]
+    curved = written.intent.moves.tcp[pieces.move]
+    if pieces.arc.any():
+        curved |= written.segments.arc
     found = excess(written.intent.machine, written.joints, each, curved, written.done)
     beyond = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
     if (found > FUZZ).any():

@@ -141,8 +141,7 @@ def scan(
     (kinds, fixed, unsigned_after, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
     (blanks, digits_most), (group, comment, first), (spans, values) = most, columns, numbers
     shapes, starts, table = found
-    n, starts[0] = len(blocks), 0
-    count, known, end = 0, 0, 0
+    n, count, known, end, starts[0] = len(blocks), 0, 0, 0, 0
     for block in range(n):
         first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
         end, code, code_at_sign, end_at_sign = begin, OFFSET, OFFSET, begin

@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Changes = tuple[Ints, Ints, Ints]
 """Start, stop and length of edits, as in `Splices`."""
+Axes = tuple[Floats, Floats, Mask]
+"""By axis, (axes,): numbers at the end of a piece and where it stands now, and whether it was told to move."""
 
 LIBRARY = Library(__file__)
 
@@ -128,24 +130,13 @@ def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> t
 
 @LIBRARY.helper
 def put_line(
-    data: Bytes,
-    at: int,
-    end_of_line: Bytes,
-    by_letter: Ints,
-    heads: Bytes,
-    wanted: Floats,
-    now: Floats,
-    told: Mask,
-    digits: tuple[Ints, Floats],
+    data: Bytes, at: int, end_of_line: Bytes, by_letter: Ints, heads: Bytes, axes: Axes, digits: tuple[Ints, Floats]
 ) -> int:
     """Write a further piece of a motion on a line of its own, and take the axes there; -1 where that is not clear.
 
-    A piece that moves nothing is not: it is for the renderer to say.
-
-    heads        (axes, 2) of the shape
-    wanted, now  (axes,) numbers at the end of the piece, and at its start; `told` which axes were told to move
+    A piece that moves nothing is not: it is for the renderer to say. `heads` (axes, 2) are those of the shape.
     """
-    decimals, half = digits
+    (wanted, now, told), (decimals, half) = axes, digits
     at = copied(data, at, end_of_line, 0, len(end_of_line))
     begun = 1
     for axis in by_letter:
@@ -167,26 +158,27 @@ def note(changes: Changes, edits: int, start: int, stop: int, length: int) -> in
 
 @LIBRARY.helper
 def rewrite_words(
-    data: Bytes,
-    size: int,
-    changes: Changes,
+    pen: tuple[Bytes, Changes],
     edits: int,
+    size: int,
     text: Bytes,
     number: int,
     numbers: tuple[Floats, Ints],
-    slots: Ints,
-    by_place: Ints,
-    wanted: Floats,
-    now: Floats,
-    told: Mask,
+    places: tuple[Ints, Ints],
+    axes: Axes,
     several: bool,
     digits: tuple[Ints, Floats],
 ) -> tuple[int, int]:
     """Write the words of a block anew whose values change, all of them if `several` pieces follow.
 
-    `number` is the first number of the block. Returns how many edits there are, and their bytes; -1 if not clear.
+    edits, size  how many edits there are so far, and their bytes
+    number       the first number of the block
+    places       `slots` and `by_place` of its shape
+
+    Returns how many edits there are, and their bytes; -1 if it is not clear.
     """
-    (values, spans), (decimals, half) = numbers, digits
+    (data, changes), (values, spans), (slots, by_place), (decimals, half) = pen, numbers, places, digits
+    wanted, now, told = axes
     for axis in by_place:
         if axis < 0:
             break
@@ -203,20 +195,17 @@ def rewrite_words(
 
 @LIBRARY.helper
 def add_words(
-    data: Bytes,
-    size: int,
-    changes: Changes,
+    pen: tuple[Bytes, Changes],
     edits: int,
+    size: int,
     place: int,
     by_letter: Ints,
     heads: Bytes,
-    wanted: Floats,
-    now: Floats,
-    told: Mask,
+    axes: Axes,
     digits: tuple[Ints, Floats],
 ) -> tuple[int, int]:
     """Add words at `place` for axes that must move and have none; as `rewrite_words`."""
-    decimals, half = digits
+    (data, changes), (wanted, now, told), (decimals, half) = pen, axes, digits
     for axis in by_letter:
         if told[axis] or abs(wanted[axis] - now[axis]) < half[axis]:
             continue
@@ -288,55 +277,37 @@ def write(
     (edges, rows, first, shapes), (_, spans) = blocks, numbers
     slots, by_place, by_letter, anchors, heads = layouts
     (commands, start, stop, length, data), (now, wanted, told, counts) = found, room
-    axes, changes = len(here), (start, stop, length)
+    pen, by_axis = (data, (start, stop, length)), (wanted, now, told)
     edits, size, done, lines = 0, 0, 0, 0
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
-        shape, number = shapes[block], first[block]
+        shape, number, several = shapes[block], first[block], first_piece < last_piece
         to_numbers(here, frame, now)
         to_numbers(ends[first_piece], frame, wanted)
-        for axis in range(axes):
-            told[axis] = False
-        several = first_piece < last_piece
-        edits, size = rewrite_words(
-            data,
-            size,
-            changes,
-            edits,
-            text,
-            number,
-            numbers,
-            slots[shape],
-            by_place[shape],
-            wanted,
-            now,
-            told,
-            several,
-            digits,
-        )
+        told[:] = False
+        places = slots[shape], by_place[shape]
+        edits, size = rewrite_words(pen, edits, size, text, number, numbers, places, by_axis, several, digits)
         if size >= 0:
             slot = anchors[shape, 0]
             place = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
             place += anchors[shape, 1]
-            edits, size = add_words(
-                data, size, changes, edits, place, by_letter, heads[shape], wanted, now, told, digits
-            )
+            edits, size = add_words(pen, edits, size, place, by_letter, heads[shape], by_axis, digits)
         to_commands(now, told, here, frame, commands[first_piece])
         lines_from = size
         for piece in range(first_piece + 1, last_piece + 1):
             if size < 0:
                 break
             to_numbers(ends[piece], frame, wanted)
-            size = put_line(data, size, end_of_line, by_letter, heads[shape], wanted, now, told, digits)
+            size = put_line(data, size, end_of_line, by_letter, heads[shape], by_axis, digits)
             to_commands(now, told, here, frame, commands[piece])
         if size < 0:
             edits, size = before, was
             break
         if several:
-            edits = note(changes, edits, edges[block, 1], edges[block, 1], size - lines_from)
+            edits = note(pen[1], edits, edges[block, 1], edges[block, 1], size - lines_from)
             lines += last_piece - first_piece
         done = last_piece + 1
-        for axis in range(axes):
+        for axis in range(len(here)):
             here[axis] = commands[last_piece, axis]
     counts[0], counts[1], counts[2] = edits, size, lines
     return done
