@@ -29,15 +29,21 @@ def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 
 
 def idle(pieces: Pieces, emission: Emission, first: int = 0) -> Mask:
     """(m,) straight pieces that another one of their motion can stand for: it goes on from where they begin."""
-    inner = pieces.move[1:] == pieces.move[:-1]
-    plain = ~(pieces.arc | pieces.kept) & (pieces.move >= first)
-    stays = np.zeros(len(pieces), dtype=bool)
-    stays[1:] = inner & (emission.end[1:] == emission.end[:-1]).all(axis=1)
+    found = np.zeros(len(pieces), dtype=bool)
+    goes_on = pieces.move[1:] == pieces.move[:-1]
+    rows = np.flatnonzero(np.append(goes_on, False) | np.append(False, goes_on))
+    if not rows.size:
+        return found
+    move, end = pieces.move[rows], emission.end[rows]
+    inner = move[1:] == move[:-1]
+    plain = ~(pieces.arc | pieces.kept)[rows] & (move >= first)
+    stays = np.zeros(len(rows), dtype=bool)
+    stays[1:] = inner & (end[1:] == end[:-1]).all(axis=1)
     begins = np.flatnonzero(np.append(True, ~inner))
-    stays[begins] = (emission.end[begins] == emission.start[pieces.move[begins]]).all(axis=1)
+    stays[begins] = (end[begins] == emission.start[move[begins]]).all(axis=1)
     last = np.append(~inner, True)
     before_last = np.append(last[1:] & stays[1:] & inner, False)
-    found: Mask = plain & ((stays & ~last) | before_last)
+    found[rows] = plain & ((stays & ~last) | before_last)
     return found
 
 
