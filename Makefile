@@ -40,7 +40,7 @@ metamorphic:     ## 500 pairs of programs for each relation, into docs/dialects.
 		tests/metamorphic $(if $(DIALECTS),-k "$(DIALECTS)")
 
 refusals:        ## what becomes of the motion blocks of the corpus, all folders, also flat (half an hour)
-	NCFIX_CORPUS=1 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/classes/test_accounting.py
+	NCFIX_CORPUS=1 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/classes/test_accounting.py tests/classes/test_siemens_account.py
 
 ci:              ## what the server runs
 	.ci/run

@@ -50,9 +50,12 @@ class Author:
         return f"{self.chance.uniform(low, high):.{self.chance.randint(0, 3)}f}"
 
     def anew(self) -> None:
-        """A rapid to a known place, in whatever coordinates are in force."""
+        """A rapid to a known place, in whatever coordinates are in force.
+
+        Rotary axes that it did not name would get no word in what follows, and be left as they are.
+        """
         words = [f"{letter}=AC({self.number(5, 45) if letter == 'Z' else self.number()})" for letter in "XYZ"]
-        self.lines.append("G0 " + " ".join(words) + (" A=AC(5) C=AC(10)" if self.transformed else ""))
+        self.lines.append("G0 " + " ".join(words) + ("" if self.swivelled else " A=AC(5) C=AC(10)"))
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
