@@ -64,6 +64,7 @@ def block_letters(text: bytes, before: str) -> list[set[str]]:
 
 
 RS274 = [
+    "G10 L2 P1 Z0",
     "G53 G0 Z0",
     "G28 G91 Z0\nG90",
     "G30 G91 Z0\nG90",

@@ -9,6 +9,7 @@ from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import (
     SYSTEM_NAMES,
     activate,
@@ -85,6 +86,7 @@ def set_offset(control: Control, block: Block) -> None:
         store(control, first, index, value, LETTERS[index] in block.runtime)
     if system == control.modal.system:
         activate(control, system)
+        control.places.shift(mask_of(words_of(block)))
 
 
 def set_extended(control: Control, block: Block) -> None:
@@ -102,6 +104,7 @@ def set_extended(control: Control, block: Block) -> None:
     control.extended[name] = given
     if control.modal.system == 0 and control.extended_name == name:
         extended_system(control, block)
+        control.places.shift(mask_of(words_of(block)))
 
 
 def set_length(control: Control, block: Block) -> None:

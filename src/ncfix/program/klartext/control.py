@@ -18,6 +18,7 @@ from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import AT_START, Unknown, first_reason
 from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.program.rs274.knowledge import WORK_OFFSET
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Setup, Tool
 
 START = "PRESET"
@@ -119,6 +120,7 @@ class Control(base.Control):
         """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
         given = self.setup.work_offsets.get(name)
         self.preset, self.preset_checked = name, given is not None
+        self.places.shift(mask_of(self.machine))
         self.transformations.preset = zeros()
         for letter, value in (given or {}).items():
             index = INDEX[letter]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import LETTERS, Vector, Z, zeros
+from ncfix.program.rs274.coordinates import LETTERS, Vector, X, Y, Z, zeros
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
@@ -55,6 +55,7 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     on = control.setup.tcp or control.tip_control or control.tilted
     if on or control.tcp:
         tcp.switch(control, tool, on)
+    control.places.shift(mask_of((X, Y, Z) if on else (Z,)))
     control.offsets.tool, control.tools.offset = tool, number
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()

@@ -52,6 +52,14 @@ class Places:
         """Something else than a word of the program has moved these axes, or may have."""
         self.adrift |= axes
 
+    def shift(self, axes: int) -> None:
+        """What the numbers of these axes count from is put anew, perhaps to other values than it really had.
+
+        Before the first motion nothing has been brought anywhere.
+        """
+        if self.begun:
+            self.adrift |= axes
+
     def settle(self, axes: int) -> None:
         """The program says where these axes stand."""
         self.adrift &= ~axes

@@ -38,6 +38,8 @@ def shift_system(control: Control, block: Block, code: int) -> None:
     control.refresh()
     if code == 920:
         control.places.settle(mask_of(words_of(block)))
+    else:
+        control.places.shift(mask_of(words_of(block) if code == 520 else control.machine))
 
 
 def set_local(control: Control, block: Block, *, cancelled: bool) -> None:

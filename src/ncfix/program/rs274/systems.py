@@ -24,6 +24,7 @@ from ncfix.program.rs274.coordinates import (
     transposed,
 )
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.places import mask_of
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SHIFT = 5211
@@ -197,6 +198,7 @@ def set_system(control: Control, block: Block, *, at_position: bool) -> None:
             store(control, first, index, value, index in doubtful or LETTERS[index] in block.runtime)
     if system == control.modal.system:
         activate(control, system)
+        control.places.shift(mask_of(words_of(block)) | (mask_of((X, Y)) if "R" in block.values else 0))
 
 
 def origin_for_position(control: Control, block: Block, system: int, origin: Vector) -> tuple[Vector, Unknown]:

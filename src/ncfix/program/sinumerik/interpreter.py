@@ -53,7 +53,7 @@ class Interpreter:
         self.recorder: Recorder | None = None
         control.locate = self.place
         plans = self.units[0].text.plans
-        self.at_once = not any(60 in plan.m for plan in plans)
+        self.at_once = not any(60 in plan.m or "M" in {each.address for each in plan.settings} for plan in plans)
         self.tangents = any("ct" in plan.names for plan in plans)
         control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
         for parameter in self.units[0].parameters:
@@ -194,7 +194,7 @@ class Interpreter:
                 self.follow(step, plan)
             if step.keyword in ("if", "case"):
                 break
-        if turn.ends or not PROGRAM_ENDS.isdisjoint(plan.m):
+        if turn.ends or not PROGRAM_ENDS.isdisjoint(turn.m):
             if not course.calls:
                 return True
             course.finish()

@@ -146,7 +146,10 @@ class Sinumerik(Control):
         stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
         self.frames.settable = shifted(stored)
         for index, letter in enumerate(LETTERS):
-            value = self.variables.shared.get((f"$p_uifr_{name.lower()}", (float(index),)), 0.0)
+            key = f"$p_uifr_{name.lower()}", (float(index),)
+            value = self.variables.shared.get(key, 0.0)
+            if key in self.variables.shared:
+                self.places.shift(1 << index)
             if value is None and index in self.machine:
                 self.shaky[index] = RUNTIME_OFFSET
             elif letter in given:

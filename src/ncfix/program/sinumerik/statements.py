@@ -98,6 +98,12 @@ class Turn:
     ends: bool = False
     used: bool = False
 
+    @property
+    def m(self) -> set[int]:
+        """The M codes of the block in tenths, `M=6` among them."""
+        value = self.words.values.get("M")
+        return {*self.plan.m} if value is None else {*self.plan.m, round(10 * value)}
+
 
 # -- names ------------------------------------------------------------------------------------------------------------
 
@@ -275,7 +281,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
     if turn.frame:
         framing.programmable(control, turn.frame, words)
         return
-    framing.tool(control, words, 60 in plan.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
+    framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
     feed(control, turn)
     if motion.REFERENCE.keys().isdisjoint(plan.g):
         strangers(control, words)
