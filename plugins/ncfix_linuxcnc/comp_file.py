@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ncfix.tables.axes import ORDER, TURNING, unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid
-from ncfix.tables.lines import Remarks
+from ncfix.tables.lines import ALONE, Remarks
 from ncfix.tables.neutral import Term
 
 MOST = 256
@@ -136,6 +136,8 @@ def _joint(
         return None
     found = Remarks.of(name, files[name])
     remarks.append(found)
+    if ALONE.search(files[name].decode("latin-1")):
+        found.refuse(0, "a line ends in CR alone: LinuxCNC takes what follows for the same line", "LF or CR LF")
     axis = letters[int(number)]
     return _table(found, int(number), axis, kind == "0", 1.0 if axis in TURNING else scale)
 

@@ -74,6 +74,7 @@ BROKEN = {
     "one point": (GOOD.splitlines(keepends=True)[0], "1 points"),
     "too many points": (b"".join(b"%d 0 0\n" % n for n in range(257)), "holds 256"),
     "not ASCII": (GOOD + "30.0 0 0 µm\n".encode(), "not ASCII"),
+    "lines that end in CR": (GOOD.replace(b"\n", b"\r"), "CR alone"),
     "a word": (GOOD.replace(b"0.001", b"nan"), "not three numbers"),
 }
 BROKEN_INI = {

@@ -60,6 +60,27 @@ def test_controls_take_it_off(control: str, topology: str, size: float) -> None:
     assert not made.messages
 
 
+def test_golden_axis_list() -> None:
+    """The form of the documentation's example, with errors in tenths of a micrometre: too far towards plus."""
+    entries = {
+        "kopf.achs_nr": 1,
+        "kopf.log_achs_name": "X",
+        "kw.ssfk.interval": 0,
+        "kw.ssfk.kw_startpos": -2_000_000,
+        "kw.ssfk.kw_nr_max": 2,
+        "kw.ssfk.unit": 1,
+        "kw.ssfk.bilateral": 1,
+        "kw.ssfk.table[0].setpoint": -2_000_000,
+        "kw.ssfk.table[0].pos": 20,
+        "kw.ssfk.table[0].neg": -20,
+        "kw.ssfk.table[1].setpoint": 3_000_000,
+        "kw.ssfk.table[1].pos": 20,
+        "kw.ssfk.table[1].neg": -20,
+    }
+    expected = "".join(f"{name:<32}{value}\n" for name, value in entries.items())
+    assert exported("isg", with_play(0.004)).native["leadscrew_X.lis"].decode() == expected
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_it_can_be_left(control: str) -> None:
     made = exported(control, with_play(0.004), play="no")

@@ -21,6 +21,8 @@ from ncfix.tables.residual import POSES, Residual, residual
 from ncfix.tables.sheet import as_html, as_markdown
 
 SHEET = "hand-over"
+CLOSE = 1e-9
+"""mm, rad: ends nearer to each other than that are the same."""
 WORTH = 0.95
 """Share of the error (rms) from which on what is left is as good as all of it."""
 
@@ -114,14 +116,19 @@ def _remarks(control: Control, request: Request, left: Residual, written: Writte
     before, after = (float(np.sqrt(np.mean(each**2))) for each in (left.before, left.after))
     if after > WORTH * before and before > request.target:
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."
-    for axis, (low, high) in zip(request.machine.axes, request.space.tolist(), strict=True):
-        travel = request.machine.ranges[request.machine.axis_names.index(axis.name)].tolist()
-        if np.isfinite(travel).all() and (low > travel[0] + 1e-9 or high < travel[1] - 1e-9):
-            sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
-            covered = f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
-            yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
+    for covered in _covered(request):
+        yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
     if not control.any_tool and not request.tool_length and request.machine.depends_on_tool_length:
         yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
+
+
+def _covered(request: Request) -> Iterator[str]:
+    """Of axes whose travel is not covered as a whole, which part is."""
+    machine = request.machine
+    for axis, (low, high), travel in zip(machine.axes, request.space.tolist(), machine.ranges.tolist(), strict=True):
+        if np.isfinite(travel).all() and (low > travel[0] + CLOSE or high < travel[1] - CLOSE):
+            sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
+            yield f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
 
 
 def _internal(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

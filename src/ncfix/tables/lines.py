@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from ncfix.diagnostics import ConfigError, Message, Place
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+ALONE = re.compile(r"\r(?!\n)")
 BYTE_ORDER = "\u00ef\u00bb\u00bf"
 """The mark at the beginning of some UTF-8 files, taken as Latin-1."""
 
@@ -37,6 +38,8 @@ class Remarks:
         remarks = cls(path, _rows(text.removeprefix(BYTE_ORDER)))
         if text.startswith(BYTE_ORDER):
             remarks.doubt(1, "begins with a byte order mark", "controls read plain ASCII")
+        if ALONE.search(text):
+            remarks.doubt(0, "a line ends in CR alone", "LF or CR LF")
         for number, row in enumerate(remarks.rows, 1):
             if not row.isascii():
                 inside = comment and row.split(comment, 1)[0].isascii()
