@@ -29,6 +29,7 @@ SKIPPED_BLOCKS = "NCF235"
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 PROGRAM_ENDS = frozenset({20, 300, 170})
+TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 SAFE_ACTION = re.compile(
     r"(?:DO|WHEN|WHENEVER|EVERY|FROM)\b(?!.*\b(?:DELDTG|STOPREOF|POS|POSA|MOV|PRESETON|TRAILON|LEADON|COUPON|OVR|MEASA|"
     r"MEAWA|SYNFCT|FTOC)\b)",
@@ -53,7 +54,7 @@ class Interpreter:
         self.recorder: Recorder | None = None
         control.locate = self.place
         plans = self.units[0].text.plans
-        self.at_once = not any(60 in plan.m or "M" in {each.address for each in plan.settings} for plan in plans)
+        self.at_once = not any(60 in plan.m for plan in plans) and not TOOL_CHANGE.search(program.source)
         self.tangents = any("ct" in plan.names for plan in plans)
         control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
         for parameter in self.units[0].parameters:
