@@ -194,6 +194,19 @@ def test_one_side_only_is_said(known: Machine) -> None:
     assert not any("backlash" in each.name for each in catalogue(seen.reach))
 
 
+def test_play_is_not_looked_for_where_a_file_does_not_say_from_where_the_axis_came(known: Machine) -> None:
+    first, second = plan(known, "tcp", 60), plan(known, "tcp", 60, 1)
+    silent = replace(second, columns={name: values for name, values in second.columns.items() if name != "dir_X"})
+    silent = replace(silent, path="silent.csv")
+    seen = view([simulate(each, known, Faults(NOISE_UM), 1) for each in (first, silent)], known)
+    [message] = remarks(seen, ())
+    assert message.code == "NCF658"
+    assert "silent.csv does not say from where X came" in message.text
+    names = {each.name for each in catalogue(seen.reach)}
+    assert "backlash X" not in names
+    assert "backlash Y" in names
+
+
 def test_a_file_worse_than_none_is_refused(known: Machine) -> None:
     random = np.random.default_rng(5)
     wild = [replace(e, coefficients=(random.uniform(-5e-4, 5e-4),)) for e in known.effects if e.rotational]

@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from measure.poses import machine, plan
 from ncfix.diagnose.contest import COUNT, Contest, climbed, exchanged
+from ncfix.diagnose.next_poses import _beyond, _marked, _travels
+from ncfix.measure.reader import reads
+from ncfix.measure.writer import dumps
 
 OFFERED, HEIGHT, WIDTH = 60, 3, 9
 ROUNDING = 1e-8
@@ -45,3 +49,18 @@ def test_the_worst_of_two_contests_counts(contest: Contest) -> None:
     other = Contest(contest.matrix, contest.vector, contest.square, contest.columns, contest.signal[::-1])
     rows, told = climbed([contest, other], list(range(COUNT)))
     assert told == pytest.approx(min(contest.told(rows), other.told(rows)), rel=ROUNDING)
+
+
+def test_poses_beyond_the_travels_measured_are_marked_in_the_file() -> None:
+    known = machine("three_axis")
+    poses = plan(known, "tcp", 20)
+    measured = {"X": (100.0, 120.0), "Y": (-500.0, 500.0), "Z": (-500.0, 500.0)}
+    travels = _travels(known, measured)
+    low, high = known.axes[known.axis_names.index("X")].range
+    assert travels["X"] == (low, high)
+    beyond = _beyond(poses, measured)
+    assert beyond == ("X",)
+    text = dumps(_marked(poses, beyond), ("dx",))
+    assert "# note: X beyond the travels measured so far" in text
+    assert reads(text.replace(",\n", ",0\n").encode(), known).headers[-1][0] == "note"
+    assert _marked(poses, ()) is poses

@@ -1,0 +1,123 @@
+"""One account of evidence: noise rarely weighs more than nothing, what is in no catalogue is said to be so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.worlds import World
+from ncfix.diagnose.background import background, everything_of
+from ncfix.diagnose.diagnosis import FOUND, UNKNOWN, diagnose
+from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.rivals import rivals
+from ncfix.diagnose.selection import judged, likeliest, select
+from ncfix.diagnose.view import view
+from ncfix.diagnose.weighing import FALSE_ALARM, FURTHER, SURE, UNNAMED, Scale, margin
+from ncfix.measure.measurement import Array
+
+DRAWS = 150
+SIZE_UM = 10.0
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World.of("three_axis", 1, 80)
+
+
+@pytest.fixture(scope="module")
+def five() -> World:
+    return World.of("wCBXFZYSt", 1, 80)
+
+
+def heard(world: World, shown: Array, seed: int = 0) -> Court:
+    """The named groups before data with this in them."""
+    seen = view([world.measured(shown, np.random.default_rng(seed), stated=True)], world.machine)
+    ground = background(seen, everything_of(seen, world.gathered.groups), seen.relative)
+    return Court(ground, world.gathered.groups, len(world.gathered.groups))
+
+
+@pytest.fixture(scope="module")
+def court(world: World) -> Court:
+    return heard(world, np.zeros(len(world.view.y)))
+
+
+def test_noise_alone_rarely_weighs_more_than_nothing(court: Court) -> None:
+    """Markov: at most one of a hundred; five of 150 would have a probability of 2 % at that rate."""
+    random, alarms = np.random.default_rng(1), 0
+    for _ in range(DRAWS):
+        court.y, court.inner = random.normal(size=len(court.y)), {}
+        scale = Scale(court)
+        best = max(scale.weight({name: each}) for name, each in likeliest(scale, court.names, {}).items())
+        alarms += best > scale.weight({})
+    assert alarms <= 4
+    assert pytest.approx(np.exp(-SURE)) == FALSE_ALARM
+
+
+def test_every_further_name_pays_less_than_the_first() -> None:
+    assert [margin(count) for count in range(4)] == [0.0, SURE, SURE + FURTHER, SURE + 2 * FURTHER]
+    assert 0 < FURTHER < SURE
+
+
+def test_a_name_pays_for_what_it_was_chosen_from(world: World, court: Court) -> None:
+    every = (*court.groups, *rivals(world.view, court.groups))
+    scale = Scale(Court(court.background, every, court.named))
+    names, shapes = len(scale.names), len(scale.court.forms["EXX"]) * 5
+    assert scale.price("EXX") == pytest.approx(np.log(names * shapes))
+    first = scale.court.rivals[0]
+    assert scale.price(first) > UNNAMED
+    assert scale.free == ()
+
+
+def test_members_that_are_free_are_no_names(court: Court) -> None:
+    freed = Scale(court, (Member(court.forms["EXX"][0], 300.0),))
+    assert "EXX" not in freed.names
+    assert len(freed.all({})) == 1
+
+
+def test_an_effect_is_selected_with_its_runners_up(world: World) -> None:
+    scale = Scale(heard(world, world.effect("lateral play EZX", SIZE_UM, np.random.default_rng(3))))
+    found = judged(scale, select(scale, scale.names))
+    assert found.named == ["lateral play EZX"]
+    assert max(found.runners["lateral play EZX"].values()) < found.odds["lateral play EZX"]
+    assert found.p_value("lateral play EZX") < 1e-6
+
+
+def test_an_error_that_a_name_holds_is_no_rival_to_it(five: World) -> None:
+    groups = five.gathered.groups
+    titles = {group.owner.title for group in rivals(five.view, groups)}
+    less = rivals(five.view, [group for group in groups if group.owner.name != "ECX"])
+    (new,) = {group.owner.title for group in less} - titles
+    assert new.startswith("ECX by its position")
+
+
+@pytest.mark.parametrize("name", ["ECX", "angular play EAY"])
+def test_what_is_taken_out_of_the_catalogue_is_unknown(five: World, name: str) -> None:
+    """And it is said of which error it is."""
+    random = np.random.default_rng(5)
+    data = five.measured(five.effect(name, SIZE_UM, random), random)
+    known = diagnose([data], five.machine)
+    assert (known.verdict, [each.candidate.name for each in known.findings]) == (FOUND, [name])
+    found = diagnose([data], five.machine, (name,))
+    assert found.verdict == UNKNOWN
+    assert name.split()[-1] in found.rest.kind
+
+
+def test_warmth_far_from_twenty_degrees_hides_nothing(world: World) -> None:
+    """What a thermal effect is at the mean temperature is a constant, and does not count."""
+    warm = world.plain.with_columns(
+        {name: values + 15 for name, values in world.plain.columns.items() if name.startswith("temp_")}
+    )
+    hidden = {candidate.name for candidate, _ in World(world.machine, warm).gathered.invisible}
+    assert not hidden & {"spindle growth", "drift X", "thermal scale X", "artefact growth"}
+
+
+def test_an_artefact_that_grows_is_named(world: World) -> None:
+    """About a point away from the middle of what was measured: 25 um/m K, with the bed's temperature."""
+    seen = world.view
+    warm = world.plain.columns["temp_bed"] - world.plain.columns["temp_bed"].mean()
+    tip = world.machine.nominal(seen.q, world.plain.columns["tool_length"])[:, :3, 3]
+    grown = -25e-3 * warm[:, None] * (tip - tip.mean(axis=0) - [60.0, -40.0, -90.0])
+    random = np.random.default_rng(7)
+    found = diagnose([world.measured(grown.ravel(), random)], world.machine)
+    assert [each.candidate.name for each in found.findings] == ["artefact growth"]
+    assert found.machine is None
