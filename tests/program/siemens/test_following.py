@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -274,3 +275,38 @@ def test_ct_does_not_go_on_from_an_older_motion() -> None:
     assert "direction" in found.reasons[found.reason[-1]]
     known = follow(f"G0 X-5 Y0\nG1 F100\n{plain}CT X500 Y50\n").moves
     assert known.sweep[-1] == pytest.approx(2 * math.atan2(1 * 50 + 2 * 101, 1 * 101 - 2 * 50))
+
+
+@pytest.mark.parametrize("change", ["T2\nM6", "T2 M=6", "T1=2\nM06", "T=2 M=06 ;M6"])
+def test_ways_to_change_the_tool(change: str) -> None:
+    setup = replace(KNOWN, tools={1: Tool(10.0, 1.0), 2: Tool(25.0, 1.0)})
+    heights = follow(f"G54 T1 M=6\nG0 Z0\n{change}\nG0 Z0 T1\nZ1", setup=setup).moves.end[:, 2]
+    assert heights.tolist() == [10.0, 25.0, 26.0]
+
+
+def test_a_program_named_by_a_text_is_executed_as_often_as_it_says() -> None:
+    followed = follow(
+        'CALL "/_N_WKS_DIR/_N_SUB_SPF" P2\nEXTCALL("SUB.SPF")\nX1', files={"SUB": "G91 G0 X2\nG90\nM17\n"}
+    )
+    assert followed.moves.end[:, 0].tolist() == [2.0, 4.0, 6.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "meant"),
+    [
+        ('STRLEN("ABC")', 3.0),
+        ('INDEX("MILL_10","_")', 4.0),
+        ('RINDEX("A.B.C",".")', 3.0),
+        ('MATCH("MILL_10","10")', 5.0),
+        ('NUMBER(SUBSTR("MILL_10",5,2))', 10.0),
+        ('ISNUMBER("X")', 0.0),
+        ('STRLEN(TOUPPER("ab")<<TOLOWER("CD"))', 4.0),
+        ("ROW[1,0]", 3.0),
+        ("ROW[0,1]", 9.0),
+        ("ALL[2]", 7.0),
+        ("FEW[2]", 0.0),
+    ],
+)
+def test_texts_and_arrays(value: str, meant: float) -> None:
+    arrays = "DEF REAL ROW[2,2]=(1,2,3,4)\nROW[0,1]=9\nDEF INT ALL[3]=REP(7)\nDEF REAL FEW[4]\nFEW[0]=REP(5,2)\n"
+    assert follow(f"{arrays}G0 X={value}").moves.end[0, 0] == meant
