@@ -22,6 +22,7 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import Mesh
 from ncfix.tables.neutral import NOTHING, Compensation
+from ncfix.tables.poses import corners
 from ncfix.tables.residual import residual
 from ncfix.tables.reversal import reversal_note
 from ncfix.tables.settings import choice, whole
@@ -209,6 +210,19 @@ def _read(files: Files) -> tuple[list[Lattice], Backlash, list[Remarks]]:
     return lattices, backlash, [*(remarks for _, remarks in found), *more]
 
 
+def _rounding(request: Request, lattice: Lattice) -> float:
+    """How far rounding can put the tip off where it is farthest from where angles turn about, mm."""
+    length, angle = lattice.scale.rounding
+    tool = np.array([0.0, 0.0, -request.tool_length])
+    levers = tool[None]
+    if lattice.centre:
+        space = request.space[[request.machine.axis_names.index(axis) for axis in LINEAR]]
+        levers = corners(space) + tool - np.array(lattice.centre)
+    signs = corners(np.array([[-1.0, 1.0]] * 3))
+    turned = [np.abs(np.cross(sign, levers)) for sign in signs]
+    return float(np.linalg.norm(length + angle * np.max(turned, axis=0), axis=1).max())
+
+
 def _notes(
     request: Request, lattices: Sequence[tuple[Lattice, Mesh]], play: Compensation, said: Iterator[str]
 ) -> Iterator[str]:
@@ -219,7 +233,7 @@ def _notes(
         length, angle = lattice.scale.rounding
         yield (
             f"Lattice {counts}: {mesh.grid.points} points; lengths are rounded by up to {1e3 * length:.2f} um, angles "
-            f"by {1e6 * angle:.2f} urad."
+            f"by {1e6 * angle:.2f} urad: together up to {1e3 * _rounding(request, lattice):.2f} um at the tip."
         )
         tables = (
             Turning(*lattice.grids(), play=play)
