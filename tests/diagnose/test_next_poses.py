@@ -8,6 +8,7 @@ import pytest
 from measure.poses import machine, plan
 from ncfix.diagnose.contest import COUNT, Contest, climbed, exchanged
 from ncfix.diagnose.next_poses import _beyond, _marked, _travels
+from ncfix.measure.program import skeleton
 from ncfix.measure.reader import reads
 from ncfix.measure.writer import dumps
 
@@ -63,4 +64,5 @@ def test_poses_beyond_the_travels_measured_are_marked_in_the_file() -> None:
     text = dumps(_marked(poses, beyond), ("dx",))
     assert "# note: X beyond the travels measured so far" in text
     assert reads(text.replace(",\n", ",0\n").encode(), known).headers[-1][0] == "note"
+    assert "(X BEYOND THE TRAVELS MEASURED SO FAR" in skeleton(_marked(poses, beyond), known)
     assert _marked(poses, ()) is poses

@@ -109,6 +109,13 @@ def test_a_duplicated_pose_is_named_and_kept(good: Measurement) -> None:
     assert len(found.problem.values) == 3 * (ROWS + 1)
 
 
+def test_repeats_without_a_column_are_remarked_upon_once(good: Measurement) -> None:
+    last = dumps(good).splitlines()[-1].rsplit(",", 1)[0]
+    found = calibrated(dumps(good) + "".join(f"{last},0.00{k}\n" for k in range(1, 4)))
+    (said,) = [m for m in found.remarks if m.code == "NCF613"]
+    assert "taken as a repeat (2 more rows likewise)" in str(said)
+
+
 def test_an_outlier_is_named_with_its_line_and_stays_in_the_file(good: Measurement) -> None:
     text = cell(dumps(good), 42, "dz", lambda value: f"{float(value) + 0.5:.6f}")
     found = calibrated(text)

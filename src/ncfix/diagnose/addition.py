@@ -14,6 +14,7 @@ from ncfix.diagnose.groups import Group
 from ncfix.machine import Effect, Machine
 from ncfix.machine.basis import Basis
 from ncfix.machine.smooth import Fourier, Polynomial
+from ncfix.machine.units import Unit, units
 from ncfix.measure.measurement import Array
 
 Mask = NDArray[np.bool_]
@@ -89,22 +90,27 @@ def moved(court: Court, joint: Joint) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation."""
+    """A constant of the machine file that the data put elsewhere, surely: mm or rad, with its standard deviation.
+
+    unit  what these are multiplied with to be in the unit that people use, and its name
+    """
 
     name: str
     file: float
     data: float
     sigma: float
+    unit: Unit
 
 
 def surely_moved(court: Court, joint: Joint) -> tuple[Moved, ...]:
     """The constants that the data move by more than three standard deviations."""
-    selection = court.background.view.problem.selection
-    change = moved(court, joint)
-    rows = np.flatnonzero(np.abs(change) > FIRM * joint.sigmas)
+    view = court.background.view
+    selection, change = view.problem.selection, moved(court, joint)
+    said = [unit for effect in selection.estimated for unit in units(view.machine, effect)]
+    start = selection.start
     return tuple(
-        Moved(selection.labels[k], float(selection.start[k]), float(selection.start[k] + change[k]), float(sigma))
-        for k, sigma in zip(rows.tolist(), joint.sigmas[rows], strict=True)
+        Moved(selection.labels[k], float(start[k]), float(start[k] + change[k]), float(joint.sigmas[k]), said[k])
+        for k in np.flatnonzero(np.abs(change) > FIRM * joint.sigmas).tolist()
     )
 
 

@@ -44,11 +44,9 @@ def text(found: Diagnosis) -> str:
 
 def constant(moved: Moved) -> str:
     """A constant of the file, and what the data say."""
-    slope = "u^1" in moved.name
-    factor, unit = (1e6, "urad") if moved.name[1] in "ABC" else (1e3, "um")
+    factor, unit = moved.unit
     file, data, sigma = (factor * value for value in (moved.file, moved.data, moved.sigma))
-    per = " per u" if slope else ""
-    return f"{moved.name}: {file:.4g} in the file, {data:.4g} +- {sigma:.2g} {unit}{per} by the data"
+    return f"{moved.name}: {file:.4g} in the file, {data:.4g} +- {sigma:.2g} {unit} by the data"
 
 
 def constants(finding: Finding) -> str:

@@ -18,6 +18,7 @@ def skeleton(plan: Measurement, machine: Machine) -> str:
         "%",
         f"(MEASUREMENT PLAN, KIND {plan.kind.upper()}, {len(plan)} POSES)",
         "(A SKELETON: CHECK FOR COLLISIONS, ADD SAFE HEIGHTS AND THE PROBING CYCLE)",
+        *(f"({text.upper()})" for key, text in plan.headers if key == "note"),
         "G21 G90 G94",
     ]
     for row in range(len(plan)):
