@@ -10,17 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
-from ncfix.program.number_style import NumberStyle
-from ncfix.program.target import LINE, TANGENTIAL, Rendered, Target
-from ncfix.program.tree import Constant, Literal, Program, Word
-from ncfix.program.turns import is_dragged, number, way
+from ncfix.program.layout import CENTRE_LETTERS
+from ncfix.program.target import LINE, Rendered
+from ncfix.program.tree import Word
+from ncfix.program.turn_words import TurnWriter
 
 FloatArray = NDArray[np.float64]
 #: F words of shares of a block in G93 keep the time of the block to this many decimals at least.
 FEED_DECIMALS = 3
-INVERSE_TIME, PER_MINUTE = "93", "94"
-LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 GRAIN = 1e-6
 """A number that is so much of an output step above a whole number of them is that number."""
 
@@ -33,20 +30,8 @@ NEAR = 3.0
 """Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
 
 
-class BlockRenderer:
+class BlockRenderer(TurnWriter):
     """Renders one motion of one block. A short-lived worker: `render()` is called once."""
-
-    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
-        self.program = program
-        self.block = block
-        self.layout = layout
-        self.target = target
-        self.out = Rendered()
-        self.added: list[str] = []
-        self.code = TANGENTIAL.get(target.code, target.code)
-        self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
-        self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
-        self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
 
     def render(self) -> Rendered:
         """Write the motion."""
@@ -308,45 +293,6 @@ class BlockRenderer:
         assert self.layout.feed is not None
         return self._value(self.layout.feed, np.nan) / float(self.target.shares[piece])
 
-    # -- turns of rotary axes alone -----------------------------------------------------------------------------------
-
-    def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
-        """State the time of a turn in its own block."""
-        if not self.target.turn_by_feed:
-            self._inverse_time()
-        feed, text = self.layout.feed, self._turn_feed(0, begin, end)
-        if feed is None:
-            self._add("F", text)
-        else:
-            self.out.edits.append((*self.program.span(self.block, feed.value_span), text))
-
-    def _inverse_time(self) -> None:
-        code = self.layout.feed_mode
-        if code is not None:
-            self.out.edits.append((*self.program.span(self.block, code.value_span), INVERSE_TIME))
-            return
-        at = self.program.position(self.block, self.layout.code_at)
-        self.out.edits.append((at, at, self._cased("G") + INVERSE_TIME + self.layout.blank))
-
-    def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
-        """The number after F with which a piece of a turn takes its share of the time."""
-        minutes = self.target.turn_minutes * float(self.target.shares[piece])
-        reach = way(self.target.letters, begin, end, self.target.diameter) if self.target.turn_by_feed else 1.0
-        return number(reach / minutes) if reach > 0 else self._feed_in_force()
-
-    def _feed_in_force(self) -> str:
-        feed = self.layout.feed
-        if feed is not None and isinstance(feed.value, Literal):
-            return self.program.slice(self.block, feed.value_span)
-        return f"{self.target.feed:.6f}".rstrip("0")
-
-    def _feed_as_before(self) -> None:
-        """Back to the feed per minute that was in force, for the blocks that follow."""
-        words = [] if self.target.turn_by_feed else [self._cased("G") + PER_MINUTE]
-        words.append(self._cased("F") + self._feed_in_force())
-        prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
-        self.out.lines.append(prefix + self.layout.blank.join(words))
-
     # -- what belongs after the motion --------------------------------------------------------------------------------
 
     def _move_late_words(self) -> None:
@@ -357,44 +303,3 @@ class BlockRenderer:
             text = self.program.slice(self.block, word.span)
             self._remove(word)
             self.out.lines[-1] += self.layout.blank + text
-
-    # -- words --------------------------------------------------------------------------------------------------------
-
-    def _value(self, word: Word, otherwise: float) -> float:
-        if isinstance(word.value, Constant):
-            return word.value.value
-        if isinstance(word.value, Literal):
-            return float(self.program.values_of(self.block)[word.value.slot]) * self._increment(word)
-        return otherwise
-
-    def _increment(self, word: Word) -> float:
-        """What the word's number counts: other than 1 only for a length or angle without a decimal point."""
-        if not (isinstance(word.value, Literal) and word.value.pointless):
-            return 1.0
-        if word.address in self.target.letters:
-            return self.target.increments[1 if self.target.rotary[self.target.letters.index(word.address)] else 0]
-        return self.target.increments[0] if word.address in LENGTHS else 1.0
-
-    def _rewrite(self, word: Word, value: float, decimals: int) -> float:
-        """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
-        start, stop = self.program.span(self.block, word.value_span)
-        literal = isinstance(word.value, (Literal, Constant))
-        style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
-        increment = self._increment(word)
-        text = style.write(value / increment, decimals if increment == 1.0 else 0)
-        self.out.edits.append((start, stop, text))
-        return float(text) * increment
-
-    def _remove(self, word: Word) -> None:
-        start, stop = self.program.span(self.block, word.span)
-        if self.program.source[start - 1 : start] in (b" ", b"\t") and start > self.program.blocks[self.block, 0]:
-            start -= 1
-        self.out.edits.append((start, stop, ""))
-
-    def _add(self, letter: str, text: str) -> None:
-        self.added.append(self.layout.blank + self._cased(letter) + text)
-
-    def _cased(self, letter: str) -> str:
-        """The letter in the case in which the block writes its addresses."""
-        at = self.program.position(self.block, self.layout.code_at)
-        return letter.lower() if self.program.source[at : at + 1].islower() else letter

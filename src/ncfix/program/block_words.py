@@ -1,0 +1,68 @@
+"""The words of one block: read, put right in their own style, added, taken out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
+from ncfix.program.number_style import NumberStyle
+from ncfix.program.target import TANGENTIAL, Rendered, Target
+from ncfix.program.tree import Constant, Literal, Program, Word
+from ncfix.program.turns import is_dragged
+
+LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
+
+
+class WordWriter:
+    """Puts the words of one block right; what is written is gathered in `out` and `added`."""
+
+    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
+        self.program = program
+        self.block = block
+        self.layout = layout
+        self.target = target
+        self.out = Rendered()
+        self.added: list[str] = []
+        self.code = TANGENTIAL.get(target.code, target.code)
+        self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
+        self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
+        self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
+
+    def _value(self, word: Word, otherwise: float) -> float:
+        if isinstance(word.value, Constant):
+            return word.value.value
+        if isinstance(word.value, Literal):
+            return float(self.program.values_of(self.block)[word.value.slot]) * self._increment(word)
+        return otherwise
+
+    def _increment(self, word: Word) -> float:
+        """What the word's number counts: other than 1 only for a length or angle without a decimal point."""
+        if not (isinstance(word.value, Literal) and word.value.pointless):
+            return 1.0
+        if word.address in self.target.letters:
+            return self.target.increments[1 if self.target.rotary[self.target.letters.index(word.address)] else 0]
+        return self.target.increments[0] if word.address in LENGTHS else 1.0
+
+    def _rewrite(self, word: Word, value: float, decimals: int) -> float:
+        """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
+        start, stop = self.program.span(self.block, word.value_span)
+        literal = isinstance(word.value, (Literal, Constant))
+        style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
+        increment = self._increment(word)
+        text = style.write(value / increment, decimals if increment == 1.0 else 0)
+        self.out.edits.append((start, stop, text))
+        return float(text) * increment
+
+    def _remove(self, word: Word) -> None:
+        start, stop = self.program.span(self.block, word.span)
+        if self.program.source[start - 1 : start] in (b" ", b"\t") and start > self.program.blocks[self.block, 0]:
+            start -= 1
+        self.out.edits.append((start, stop, ""))
+
+    def _add(self, letter: str, text: str) -> None:
+        self.added.append(self.layout.blank + self._cased(letter) + text)
+
+    def _cased(self, letter: str) -> str:
+        """The letter in the case in which the block writes its addresses."""
+        at = self.program.position(self.block, self.layout.code_at)
+        return letter.lower() if self.program.source[at : at + 1].islower() else letter
