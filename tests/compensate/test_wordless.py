@@ -13,6 +13,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
+from ncfix.compensate.checking import check_on
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
@@ -165,9 +166,9 @@ def test_what_the_user_gives_counts_as_long_as_nothing_is_assumed() -> None:
 def test_what_is_left_is_counted_and_told() -> None:
     report = fixed("G21 G90 G94\nG0 X100 Y50\nX200\nG1 Z-5 F100\nX100\nM2\n").report
     (left,) = report.left
-    assert (left.axis, left.motions, left.first, left.last) == ("Z", 2, 2, 3)
+    assert (left.axis, left.motions, left.cuts, left.first, left.last) == ("Z", 2, 0, 2, 3)
     (warning,) = (each for each in report.warnings if each.code == "NCF439")
-    assert "Z is left where it stands in 2 motions (lines 2 to 3), up to" in warning.text
+    assert "Z is left where it stands in 2 motions (lines 2 to 3), none of which cut, up to" in warning.text
     (entry,) = report.as_dict()["left_where_it_stands"]  # type: ignore[misc]
     assert entry["max_um"] == pytest.approx(left.most * 1e3, abs=1e-4)
     assert report.error_after_um["max"] < 1.0  # type: ignore[operator]
@@ -291,3 +292,12 @@ def test_holes_that_are_written_out_name_no_other_axis() -> None:
 def test_increments_from_nowhere_are_not_written_out(line: str) -> None:
     with pytest.raises(NcfixError, match="stands, so it cannot be written out flat"):
         flat(f"G21 G90 G94 F100\nG0 Z9\n{line}\nM2\n")
+
+
+def test_check_tells_only_of_cuts() -> None:
+    def found(text: str) -> bool:
+        checked = check_on(read(text.encode(), "part.nc", "linuxcnc"), smooth_machine(), GIVEN)
+        return any(each.code == "NCF439" for each in checked.findings)
+
+    assert not found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nZ5\nG1 X7 F100\nM2\n")
+    assert found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nG1 X7 F100\nM2\n")

@@ -54,7 +54,8 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
     else:
         report = fix_program(program, machine, setup, FixOptions(force=True, verify=False), resolve).report
         refusals = (Message(each.code, each.reason, Place(program.path, each.line)) for each in report.refused)
-        remarks = (*report.warnings, *refusals)
+        harmless = {left.message(program.path) for left in report.left if not left.cuts}
+        remarks = (*(each for each in report.warnings if each not in harmless), *refusals)
     stamped = _stamped(program)
     remarks = tuple(message for message in remarks if not (stamped and message.code == SUSPECTED))
     told = {(message.code, message.place.line if message.place else 0) for message in remarks}

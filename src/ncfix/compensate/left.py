@@ -24,6 +24,7 @@ class Left:
     """One axis that was left where it stands.
 
     motions    how many motions would have moved it
+    cuts       how many of these cut
     stretches  their lines, from and to
     most       how far it is from where it should be at their ends, at most, mm or rad
     """
@@ -31,6 +32,7 @@ class Left:
     axis: str
     rotary: bool
     motions: int
+    cuts: int
     stretches: tuple[tuple[int, int], ...]
     most: float
 
@@ -46,12 +48,17 @@ class Left:
 
     def with_later(self, other: Left) -> Left:
         """This and what comes later in the program."""
-        motions, most = self.motions + other.motions, max(self.most, other.most)
-        return Left(self.axis, self.rotary, motions, merged(self.stretches, other.stretches), most)
+        motions, cuts = self.motions + other.motions, self.cuts + other.cuts
+        stretches, most = merged(self.stretches, other.stretches), max(self.most, other.most)
+        return Left(self.axis, self.rotary, motions, cuts, stretches, most)
 
     def message(self, path: str) -> Message:
         """In words."""
-        many = f"{self.motions} motions (lines {self.first} to {self.last})" if self.motions > 1 else "this motion"
+        if self.motions == 1:
+            many = f"this motion, which {'cuts' if self.cuts else 'cuts nothing'}"
+        else:
+            lines = f"lines {self.first} to {self.last}"
+            many = f"{self.motions} motions ({lines}), {self.cuts or 'none'} of which cut"
         far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
         text = (
             f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be at the end: "
@@ -63,7 +70,7 @@ class Left:
         """Plain data, for `--json`."""
         most = {"max_deg": float(np.degrees(self.most))} if self.rotary else {"max_um": round(self.most * 1e3, 4)}
         lines = [list(stretch) for stretch in self.stretches]
-        return {"axis": self.axis, "motions": self.motions, "lines": lines, **most}
+        return {"axis": self.axis, "motions": self.motions, "cuts": self.cuts, "lines": lines, **most}
 
 
 def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
@@ -78,8 +85,9 @@ def left_where_they_stand(program: Program, settled: Settled, steps: Array, own:
     found = {}
     for column in np.flatnonzero(lacking.any(axis=0)).tolist():
         rows = np.flatnonzero(lacking[:, column])
-        most, axis = float(off[rows, column].max()), moves.axes[column]
-        found[axis] = Left(axis, bool(moves.rotary[column]), len(rows), stretches_of(program, moves.block[rows]), most)
+        axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())
+        cuts, stretches = int(moves.cuts[rows].sum()), stretches_of(program, moves.block[rows])
+        found[axis] = Left(axis, turns, len(rows), cuts, stretches, most)
     return found
 
 
