@@ -42,6 +42,9 @@ def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:
         what = re.sub(r"\s*\(at [^)]*\)$", "", str(error))
         place = Place(path, line, column, _row(text, line))
         raise ConfigError.of(code, f"not TOML: {what}", place, hint) from error
+    except ValueError as error:  # Python reads whole numbers of up to 4300 digits
+        text = "not TOML that can be read: a number has thousands of digits"
+        raise ConfigError.of(code, text, Place(path), hint) from error
     except RecursionError as error:
         raise ConfigError.of(code, "not TOML that can be read: nested too deeply", Place(path), hint) from error
 

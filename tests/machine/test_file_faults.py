@@ -157,6 +157,9 @@ def test_a_misspelled_table_is_shown_where_it_stands() -> None:
 
 def test_numbers_that_no_machine_has() -> None:
     assert "more than anything" in faults(changed("[0, 0, 154.996]", "[0, 0, 1e300]"))[0].text
+    assert "more than anything" in faults(changed("[0, 0, 154.996]", f"[0, 0, 1{'0' * 400}]"))[0].text
+    assert "thousands of digits" in faults(changed("[0, 0, 154.996]", f"[0, 0, 1{'0' * 5000}]"))[0].text
+    assert "goes beyond 1000" in faults(changed("degree = [1, 2, 3]", "degree = [1, 2, 999999999]"))[0].text
     assert "is no scale" in faults(changed("scale = 250.0", "scale = 1e-320"))[0].text
     text = changed("degree = [1, 2, 3]\ncenter = 250.0\nscale = 250.0", "degree = [1, 2, 900]")
     (fault,) = faults(text)

@@ -75,7 +75,7 @@ tcp = 1
         (8, "NCF382", "initial.Q: no axis letter", "they are X Y Z A B C U V W"),
         (9, "NCF383", "workpiece_offset: expected three numbers [x, y, z], mm", ""),
         (10, "NCF382", "references.G29: no reference point", "they are G28 and G30"),
-        (10, "NCF383", "references.G29.X: expected a number, found inf", ""),
+        (10, "NCF383", "references.G29.X: expected a number of 1e+12 at most, found inf", ""),
         (11, "NCF382", "variables.depth: no parameter", 'they are written "#100" or "#<name>"'),
         (12, "NCF383", "tcp: expected true or false, found 1", ""),
     ]

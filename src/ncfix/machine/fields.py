@@ -170,11 +170,11 @@ class Section:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self._wrong(key, wanted, value)
             return False
-        if not math.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             self.note("NCF305", key, f"{value} is not a finite number")
             return False
         if abs(value) > LARGEST:
-            self.note("NCF305", key, f"{value:g} is more than anything that a machine has")
+            self.note("NCF305", key, f"more than anything that a machine has, which is {LARGEST:g} at most")
             return False
         return True
 

@@ -176,12 +176,18 @@ def powers(u: Array, degree: tuple[int, ...]) -> Array:
     return ladder if degree == tuple(range(len(ladder))) else ladder[list(degree)]
 
 
+HIGHEST = 1000
+"""No error of a machine bends so often."""
+
+
 def distinct(name: str, values: tuple[int, ...], lowest: int) -> list[tuple[str, str]]:
-    """A complaint unless the values are given, distinct, and none below `lowest`."""
+    """A complaint unless the values are given, distinct, none below `lowest` and none beyond `HIGHEST`."""
     if not values:
         return [(name, "is empty")]
     if min(values) < lowest:
         return [(name, f"{min(values)} is below {lowest}")]
+    if max(values) > HIGHEST:
+        return [(name, f"goes beyond {HIGHEST}")]
     if len(set(values)) < len(values):
         return [(name, "names a value twice")]
     return []

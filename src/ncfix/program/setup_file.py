@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -27,6 +26,9 @@ WRONG_VALUE = "NCF383"
 SYSTEM = re.compile(r"G5[4-9]|G59\.[1-3]|G54\.1P\d+|G500|G5(?:0[5-9]|[1-9]\d)|PRESET\d*")
 """Names of work offsets: G54 to G59.3, G54.1 P1 and so on; those of SINUMERIK, G500, G505 to G599; and of the TNC:
 PRESET, the one that is active when the program starts, PRESET1 and so on."""
+
+LARGEST = 1e12
+"""No length, angle, time or parameter is larger."""
 
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
 """Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""
@@ -112,8 +114,12 @@ class Reading:
 
     def number(self, key: str, value: Any) -> float:
         """A finite number."""
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
             self.fault(WRONG_VALUE, key, f"expected a number, found {value!r}")
+            return 0.0
+        if abs(value) > LARGEST:
+            said = value if isinstance(value, float) else "a larger one"
+            self.fault(WRONG_VALUE, key, f"expected a number of {LARGEST:g} at most, found {said}")
             return 0.0
         return float(value)
 

@@ -20,6 +20,8 @@ from ncfix.program.tool_t import is_tool_t, tool_t_rows
 BAD_TABLE = "NCF385"
 ENTRY = re.compile(r"([A-Za-z])\s*([+-]?(?:\d+\.?\d*|\.\d+))")
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\Z")
+LONGEST = 1e6
+"""mm; a number beyond it is a slip."""
 COLUMNS = ("tool", "length", "radius", "diameter")
 
 
@@ -36,7 +38,11 @@ def load_tool_table(path: str) -> dict[int, Tool]:
     tools: dict[int, Tool] = {}
     for line, content in reader(text):
         if isinstance(content, str):
-            faults.append(Message(BAD_TABLE, content, Place(path, line, 0, text.splitlines()[line - 1])))
+            rows = text.splitlines()
+            row = rows[line - 1] if 0 < line <= len(rows) else ""
+            faults.append(Message(BAD_TABLE, content, Place(path, line, 0, row)))
+        elif max(abs(content[1].length or 0.0), abs(content[1].radius or 0.0)) > LONGEST:
+            faults.append(Message(BAD_TABLE, f"no tool is longer than {LONGEST:g} mm", Place(path, line)))
         elif content[0] in tools:
             faults.append(Message(BAD_TABLE, f"tool {content[0]} stands twice", Place(path, line)))
         else:

@@ -214,6 +214,10 @@ class Opaque:
 Item = Word | Assignment | Command | Comment | Skip | Flow | Tape | Opaque
 
 
+BEYOND = 1e9
+"""A G or M code with a larger number is none, and all such are the same."""
+
+
 @dataclass(frozen=True, slots=True)
 class Template:
     """What every block of one shape has in common.
@@ -239,7 +243,7 @@ class Template:
 
     def _codes(self, address: str) -> tuple[int, ...]:
         values = (word.value for word in self.words if word.address == address)
-        return tuple(round(10 * value.value) for value in values if isinstance(value, Constant))
+        return tuple(round(10 * min(value.value, BEYOND)) for value in values if isinstance(value, Constant))
 
     @property
     def words(self) -> tuple[Word, ...]:

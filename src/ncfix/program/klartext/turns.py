@@ -13,12 +13,16 @@ from functools import lru_cache
 FULL = 360.0
 
 
+def _plain(number: bytes) -> bytes:
+    return b"".join(number.split()).replace(b",", b".")
+
+
 @lru_cache(maxsize=16)
 def extremes(source: bytes, letter: str) -> tuple[float, float]:
     """The smallest and largest angle that a program writes for a rotary axis, degrees; 0 at least is among them."""
     code = re.sub(rb";[^\r\n]*", b"", source)
     found = re.findall(rb"(?i)(?<![A-Z0-9])" + letter.encode() + rb"[ \t]*([+-]?[ \t]*[\d.,]*\d)", code)
-    angles = [float(b"".join(number.split()).replace(b",", b".")) for number in found if number.count(b".") < 2]
+    angles = [float(number) for number in map(_plain, found) if number.count(b".") < 2]
     return min(angles, default=0.0), max(angles, default=0.0)
 
 

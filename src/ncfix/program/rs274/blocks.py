@@ -10,7 +10,7 @@ from ncfix.program.build import Parsed, TooDeepError, build
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError, explain
 from ncfix.program.grammar import parse, squeeze
-from ncfix.program.tree import Word
+from ncfix.program.tree import Constant, Word
 
 MAY_REPEAT = frozenset("GM")
 """The addresses that may stand several times in a block."""
@@ -41,6 +41,9 @@ def check_numbers(parsed: Parsed) -> None:
     for (start, _), value in zip(parsed.spans, parsed.values, strict=True):
         if not isfinite(value):
             raise BlockError("NCF115", "the number is too large", start)
+    for word in parsed.template.words:
+        if isinstance(word.value, Constant) and not isfinite(word.value.value):
+            raise BlockError("NCF115", "the number is too large", start_of(word, parsed))
 
 
 def check_exponents(parsed: Parsed, text: str) -> None:
