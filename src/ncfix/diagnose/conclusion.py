@@ -9,8 +9,8 @@ import numpy as np
 from ncfix.diagnose import addition, checks, gapmap, gates, holdout, next_poses, noise, plausible, verdict
 from ncfix.diagnose.addition import Joint
 from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.fields import scaled
 from ncfix.diagnose.findings import Case, Diagnosis, Finding, Gap
-from ncfix.diagnose.rivals import scaled
 from ncfix.diagnose.selection import Selected, aliases
 from ncfix.diagnose.weighing import Scale
 from ncfix.machine import Effect

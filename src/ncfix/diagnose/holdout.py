@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ncfix.diagnose.addition import WIDE
 from ncfix.diagnose.background import Background
 from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.fields import scaled
 from ncfix.diagnose.outliers import ASIDE
-from ncfix.diagnose.rivals import scaled
 from ncfix.measure.measurement import Array, Index
 
 CELLS = 16

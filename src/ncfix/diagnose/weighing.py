@@ -25,7 +25,7 @@ import numpy as np
 
 from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import SIZES, Court, Heard, Member
-from ncfix.diagnose.rivals import functions, scaled
+from ncfix.diagnose.fields import functions, scaled
 from ncfix.measure.measurement import Array
 
 Members = Mapping[str, Member]
