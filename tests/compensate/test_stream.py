@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import random
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +13,10 @@ from typing import Any
 import pytest
 
 from ncfix import fast
+from ncfix.compensate import stream
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.stream import Stream, Task
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Machine, load
@@ -21,6 +24,7 @@ from ncfix.program import dialects
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup
+from ncfix.program.writer import Splices, spliced
 
 OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
 SETUP = Setup(assume_zero=True)
@@ -135,6 +139,41 @@ def test_compiled_kernels_give_the_same_bytes(machine: Machine, monkeypatch: pyt
     assert fast.engage()
     try:
         assert streamed(source, machine, 4000)[0] == plain
+    finally:
+        fast.disengage()
+
+
+def with_a_digit_wrong(text: bytes, rng: random.Random) -> bytes:
+    """In one of the axis words of the text's second half, the first digit or the last."""
+    word = rng.choice(list(re.finditer(rb"[XYZBC]-?(\d+\.\d+)", text[len(text) // 2 :])))
+    place = len(text) // 2 + rng.choice((word.start(1), word.end(1) - 1))
+    return text[:place] + b"%d" % ((int(text[place : place + 1]) + 1) % 10) + text[place + 1 :]
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_writer_that_gets_one_digit_wrong_is_caught(
+    compiled: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In whatever part: the proof reads what is really written."""
+    if compiled:
+        pytest.importorskip("numba", reason="the `fast` extra is not installed")
+        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+        assert fast.engage()
+    source, rng, parts = program(5, 60, 0.0), random.Random(2), 0
+
+    def wrong(source: bytes, splices: Splices) -> bytes:
+        nonlocal parts
+        parts += 1
+        text = spliced(source, splices)
+        return with_a_digit_wrong(text, rng) if parts == broken else text
+
+    monkeypatch.setattr(stream, "spliced", wrong)
+    try:
+        for broken in (1, 2, 3, 1, 2, 3, 1, 2, 3):
+            parts = 0
+            with pytest.raises((NotInPartsError, SelfCheckError)):
+                streamed(source, machine, 500)
+            assert parts == broken
     finally:
         fast.disengage()
 
