@@ -49,7 +49,7 @@ FOLDERS = {
 }
 """Of the corpus, and the dialect of its programs."""
 SHIPPED = {
-    "blade": ("linuxcnc", "dmu50.toml"),
+    "blade": ("iso", "dmu50.toml"),
     "fanuc": ("fanuc", "wCAYFXZSt.toml"),
     "siemens": ("siemens", "wCAYFXZSt.toml"),
     "klartext": ("heidenhain", "dmu50.toml"),
