@@ -16,6 +16,8 @@ from ncfix.program.tree import Program
 if TYPE_CHECKING:
     from ncfix.compensate.settle import Settled
 
+FEW = 4
+"""So many stretches of lines are named one by one."""
 HINT = "name it in one of the first blocks, and again after a change of tool or offsets, or after machine coordinates"
 
 
@@ -57,14 +59,18 @@ class Left:
         if self.motions == 1:
             many = f"this motion, which {'cuts' if self.cuts else 'cuts nothing'}"
         else:
-            lines = f"lines {self.first} to {self.last}"
-            many = f"{self.motions} motions ({lines}), {self.cuts or 'none'} of which cut"
+            many = f"{self.motions} motions ({self._where()}), {self.cuts or 'none'} of which cut"
         far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
         text = (
             f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be at the end: "
             "the program has not said where it is"
         )
-        return Message("NCF439", text, Place(path, self.first), HINT)
+        return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
+
+    def _where(self) -> str:
+        if len(self.stretches) > FEW:
+            return f"between lines {self.first} and {self.last}"
+        return "lines " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in self.stretches)
 
     def as_dict(self) -> dict[str, object]:
         """Plain data, for `--json`."""
