@@ -111,6 +111,16 @@ def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None
     assert "backlash X" in {name for each in found.findings for name in (each.candidate.name, *each.aliases)}
 
 
+@pytest.mark.parametrize("kind", ["tcp6", "gauge", "bar", "tool", "table", "axis"])
+def test_every_kind_of_measurement_can_be_diagnosed(kind: str) -> None:
+    """A play of 20 um: named where the instrument sees it, and never taken for something else."""
+    known = machine("three_axis")
+    worn = known.replace(effects=(*known.effects, Effect("EXX", (0.02,), Backlash())))
+    found = diagnose([simulate(plan(known, kind, 60, 1), worn, Faults(1.5), 1)], known)
+    assert all("backlash X" in (each.candidate.name, *each.aliases) for each in found.findings)
+    assert result.as_dict(found)["verdict"] in markdown.rendered(document(found)).decode()
+
+
 def test_the_report_and_the_text_name_it(backlash: Diagnosis) -> None:
     assert "backlash X" in words.text(backlash)
     page, text = (form.rendered(document(backlash)).decode() for form in (html, markdown))

@@ -92,9 +92,9 @@ def scaled(view: View) -> Array:
     columns = []
     for index, axis in enumerate(view.machine.axes):
         values = view.q[:, index]
-        if not view.reach.moved(axis):
-            continue
         low, high = float(values.min()), float(values.max())
+        if not view.reach.moved(axis) or high == low:  # of a length both ends count for the reach, one is the row's
+            continue
         if axis.rotary and high - low > 1.5 * np.pi:
             columns += [np.cos(values), np.sin(values)]
         else:
