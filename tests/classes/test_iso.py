@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from classes.judging import Case, judged
+from classes.judging import Case, followed, judged, machine
 
 HEAD = "G21 G90 G94 G17 G40 G54\nG0 X1. Y2. Z50.\n"
 """Two lines; the second is the motion to the start."""
@@ -69,6 +69,7 @@ FANUC = [
         L8=R,
     ),
     case("subprogram in steps, flat", "M98 P20100\nG0 X9.\nM2\nO0100\nG91 G0 X5.\nG90\nM99", flat=True, L0=R),
+    case("a variable that its block sets", "#1=5\n#1=7 G0 X#1\nX9. Y9. Z9.", L4=N, L5=R),
     case("threading", "G33 Z40. F1.5\nG0 X5. Y5. Z20.", L3=N, L4=R),
     case("return from the reference point", "G28 Z100.\nG29 X5. Y5. Z20.\nG0 X1. Y1. Z20.", L3=P, L4=N, L5=R),
     case("polar", "G16\nG0 X10. Y90.\nG15\nG0 X5. Y5.", L2=R, L4=N, L6=R),
@@ -94,6 +95,22 @@ FANUC = [
     case("position in a variable", "#1=#5041\nG1 X[#1+1.] F100.\nG0 X5. Y5. Z20.", L2=R, L4=N, L5=R),
     case("unknown code", "G107.1\nG1 X5. F100.", L2=R, L4=N),
 ]
+
+
+BESIDE = {
+    name: Case(name, f"O12 G21 G91 G54\n{body}\nM30\n", found)
+    for name, body, found in (
+        ("modes beside the number of a program", "G0 X1. Y2. Z50.\nX1.", {2: R, 3: R}),
+        ("a motion behind them", "G90 G0 X1. Y2. Z50.\nG91 X1.", {2: R, 3: R}),
+    )
+}
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc"])
+@pytest.mark.parametrize("name", BESIDE)
+def test_words_beside_the_number_of_a_program(name: str, dialect: str) -> None:
+    assert followed(BESIDE[name].text.encode(), machine(), dialect).end[-1, 0] == 2.0
+    assert judged(BESIDE[name], dialect) == BESIDE[name].expected
 
 
 def check(each: Case, dialect: str) -> None:

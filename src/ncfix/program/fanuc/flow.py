@@ -15,7 +15,7 @@ from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import NO_SUBPROGRAM, RUNTIME_BRANCH, TOO_DEEP
 from ncfix.program.rs274.parameters import Store
-from ncfix.program.rs274.plans import FlowLine
+from ncfix.program.rs274.plans import FlowLine, has_words
 from ncfix.program.rs274.unit import Unit
 
 MAX_CALLS = 15
@@ -188,6 +188,8 @@ class MacroFlow:
         """The text and block at which a program begins, after its O-word."""
         for unit in (self.unit, self.main):
             at = self.outline_of(unit).programs.get(label)
+            if at is not None and has_words(unit.plan(at)):
+                raise Fault(BAD_JUMP, f"words beside the number O{label} of a program that is called are not followed")
             if at is not None:
                 return unit, at + 1
         file = self.find(label)

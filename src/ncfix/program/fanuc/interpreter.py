@@ -119,7 +119,9 @@ class MacroInterpreter(Interpreter):
         """Execute the block before `flow.block`; True if the program ends there."""
         block, self.flow.passed = self.flow.block, False
         ended = super().execute(plan)
-        if plan.flow is not None and plan.flow.keyword == "if then" and self.flow.passed and self.flow.block == block:
+        if plan.flow is None or self.flow.block != block:
+            return ended
+        if plan.flow.keyword == "if then" and self.flow.passed:
             return self.execute_words(plan, block - 1)
         return ended
 
@@ -177,6 +179,8 @@ class MacroInterpreter(Interpreter):
     def evaluate(self, plan: Plan, index: int) -> Block:
         """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
         block = super().evaluate(plan, index)
+        if plan.assignments:
+            block.runtime |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         if codes & {G20, G21}:
             self.unit_said = True

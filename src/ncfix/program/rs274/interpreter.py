@@ -18,7 +18,7 @@ from ncfix.program.rs274.flow import Course, FlowControl
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
-from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes
+from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.rs274.unroll import Recorder
@@ -166,8 +166,19 @@ class Interpreter:
             self.flow.follow(plan.flow)
             if self.flow.unit is not self.main and unit is self.main:
                 control.row_block = index
-            return False
+            return self.beside_number(plan, index)
         return self.execute_words(plan, index)
+
+    def beside_number(self, plan: Plan, index: int) -> bool:
+        """Execute the words that stand beside the number of a program, if it begins there (not in LinuxCNC)."""
+        flow, line = self.flow, plan.flow
+        begins = flow.skipping is None and flow.block == index + 1 and line is not None and line.keyword == "program"
+        if self.control.rules.strict or not begins or not has_words(plan):
+            return False
+        written, self.recorder = self.recorder, None  # the line has been written as it stands
+        ended = self.execute_words(plan, index)
+        self.recorder = written
+        return ended
 
     def is_skipped(self) -> bool:
         """Whether blocks with `/` are passed over."""

@@ -168,6 +168,11 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     return plan
 
 
+def has_words(plan: Plan) -> bool:
+    """Whether words stand beside the statement of a block."""
+    return bool(plan.letters or plan.assignments or plan.template.g_codes or plan.template.m_codes)
+
+
 def flow_line(item: Flow, rules: Rules) -> FlowLine:
     """A flow-control line with its expressions as functions."""
     label = item.label if isinstance(item.label, str) else rules.compiled(item.label, "")
