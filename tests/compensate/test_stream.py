@@ -202,8 +202,9 @@ def test_what_looks_at_the_whole_path_is_not_done_in_parts(machine: Machine) -> 
 def test_a_refusal_that_reaches_back_is_seen(machine: Machine) -> None:
     lines = b"".join(b"X%d.\n" % (k % 9) for k in range(200))
     source = b"G21 G90 G94 F800 G17\nG1 X0 Y0 Z5 B0 C0\n" + lines + b"G2 X0 Y9000. R5000.\nM2\n"
-    with pytest.raises(NotInPartsError, match="reaches back"):
-        streamed(source, machine, 100)
+    for jobs, size in ((1, 100), (2, 100), (2, 130), (3, 100)):
+        with pytest.raises(NotInPartsError, match="reaches back"):
+            streamed(source, machine, size, jobs=jobs)
 
 
 def test_errors_are_those_of_the_whole(machine: Machine) -> None:

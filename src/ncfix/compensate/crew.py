@@ -38,6 +38,7 @@ class Share:
     inbox    what the part before has left, if another process has corrected it
     outbox   where the process hears of it that has the next part
     others   whether the others are still there
+    last     what the last part has left, where there are no others
     """
 
     jobs: int = 1
@@ -52,17 +53,23 @@ class Share:
         return number % self.jobs == self.mine
 
     def before(self, number: int) -> Before | None:
-        """What the part before that one has left, as soon as it is known; None for the first part."""
+        """What the part before that one has left, as soon as it is known; None for the first part.
+
+        Raises what kept another process from finding it out.
+        """
         if number == 0 or self.jobs == 1:
             return self.last
-        found: Before = waited_for(self.inbox, self.others)
+        found: Before | Exception = waited_for(self.inbox, self.others)
+        if isinstance(found, Exception):
+            raise found
         return found
 
-    def leave(self, before: Before) -> None:
-        """Hand on what an own part leaves."""
-        self.last = before
+    def leave(self, before: Before | Exception) -> None:
+        """Hand on what an own part leaves, or why that will not be known."""
         if self.jobs > 1:
             self.outbox.put(before)
+        elif isinstance(before, Before):
+            self.last = before
 
 
 class Worker(Protocol[Done]):
@@ -186,6 +193,7 @@ def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, resul
         return
     except Exception as error:
         results.put((number, _portable(error)))
+        share.leave(_portable(error))
     wait([parent.sentinel])
 
 
