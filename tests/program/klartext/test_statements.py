@@ -109,6 +109,35 @@ def test_a_row_of_the_preset_table_by_its_function() -> None:
     assert "PRESET SELECT" in fates("PRESET SELECT #1 KEEP TRANS\nL X+1 Y+1 Z+1 FMAX")[-1][1]
 
 
+SUB = "BEGIN PGM S MM\nL X+5 FMAX\nEND PGM S MM\n"
+
+
+def test_a_program_that_was_selected_is_called() -> None:
+    found = ends('L X+1 Y+1 Z+1 FMAX\nSEL PGM "TNC:\\S.H"\nCALL SELECTED PGM\nL Y+9 FMAX', files={"S.H": SUB})
+    assert found == [[1, 1, 1], [5, 1, 1], [5, 9, 1]]
+    for choice in ("SEL PGM QS1\n", ""):
+        assert "chosen at run time" in fates(f"L X+1 Y+1 Z+1 FMAX\n{choice}CALL SELECTED PGM\nL Y+9 FMAX")[-1][1]
+
+
+def test_the_choice_of_a_table_changes_nothing_yet() -> None:
+    found = fates('L X+1 Y+1 Z+1 FMAX\nSEL TABLE "TNC:\\A.D"\nL Y+9 FMAX\nCYCL DEF 7.0 D\nCYCL DEF 7.1 #3\nL X+5')
+    assert [rule for rule, _ in found] == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+
+
+@pytest.mark.parametrize(
+    ("probing", "parameter"),
+    [
+        ("TCH PROBE 0.0 REF. PLANE Q5 X-", "Q5"),
+        ("TCH PROBE 1.0 POLAR DATUM Q5", "Q5"),
+        ("TCH PROBE 3.0 MEASURING\nTCH PROBE 3.1 Q3", "Q5"),
+        ("TCH PROBE 421 HOLE ~\n Q321=+5", "Q151"),
+    ],
+)
+def test_what_a_probing_cycle_leaves_in_parameters_is_known_at_run_time(probing: str, parameter: str) -> None:
+    body = f"{parameter} = 7\nL X+1 Y+1 Z+1 FMAX\n{probing}\nL X+{parameter} Y+1 Z+1 FMAX"
+    assert "Q parameter that is known only at run time" in fates(body)[-1][1]
+
+
 def test_a_called_program_does_not_end_by_m30() -> None:
     sub = "BEGIN PGM S MM\nL X+5 FMAX M30\nL X+7 FMAX\nEND PGM S MM\n"
     moves = follow("L X+1 Y+1 Z+1 FMAX\nCALL PGM S\nL X+9 FMAX", files={"S.h": sub}).moves

@@ -37,6 +37,7 @@ class FlowControl:
     parameters   the Q parameters
     calls        the calls that are open
     repeats      how often a repeat has still to be made
+    selected     the program that CALL SELECTED PGM calls; empty where it is chosen at run time
     """
 
     unit: Unit
@@ -45,6 +46,7 @@ class FlowControl:
     block: int = 0
     calls: list[Call] = field(default_factory=list)
     repeats: dict[tuple[int, int], int] = field(default_factory=dict)
+    selected: str = ""
 
     def jump(self, label: str) -> None:
         """Go on at a label."""

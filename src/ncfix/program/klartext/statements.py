@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from ncfix.program.klartext.codes import tip_control
 from ncfix.program.klartext.control import AFTER_PROBING, FREELY, PRESET, Control
@@ -20,70 +21,65 @@ SETTING = frozenset({*range(400, 406), *range(408, 420), 451, 452, 453, *range(1
 """Probing cycles that do not only measure."""
 
 FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
+SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
+OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
+SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
 ERROR = "NCF278"
 PROBED = range(100, 200)
 """The Q parameters in which probing cycles and the control itself leave results."""
 
-TARGET = re.compile(r"(Q[LRS]?)(\d+)")
+IN_A_ROW = 4
+"""So many parameters, from the one that is named, an old probing cycle (0 to 4) may write."""
+
+TARGET = re.compile(r"(Q[LRS]?)(\d+)", re.IGNORECASE)
 CIRCLE = re.compile(r"FN\s*2[34]\b", re.IGNORECASE)
-READING = re.compile(r"FN\s*(18|2[0348])\b", re.IGNORECASE)
-PROGRAM_NAME = re.compile(r"CALL\s+PGM\s*(?P<name>.*)", re.IGNORECASE | re.DOTALL)
-FREE = re.compile(r"F(LT|L|CT|C)\b", re.IGNORECASE)
-TCPM = re.compile(r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
-STOPPING = re.compile(r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", re.IGNORECASE)
-HARMLESS_FUNCTIONS = re.compile(
-    r"FUNCTION\s+(RESET\s+)?(FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL|MODE\s+SET|DRESS\s+END|FLUTES|FILE|TCPM)",
-    re.IGNORECASE,
-)
-"""FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections) may not."""
-
-WRITING = re.compile(r"FN\s*(17|25)\b", re.IGNORECASE)
-"""They write into the control's own data: datums, presets, tools."""
-
-CHOSEN_PRESET = re.compile(r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
-SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
-CHOSEN = re.compile(r"(SEL\s+(PGM|CYCLE|TABLE)|CALL\s+SELECTED|POLARKIN)", re.IGNORECASE)
 
 
 def statement(control: Control, flow: FlowControl, text: str) -> None:
-    """Do what a statement says."""
-    if found := PROGRAM_NAME.match(text):
-        flow.call_program(found["name"].strip())
-    elif found := TCPM.match(text):
-        tcpm(control, found)
-    elif found := STOPPING.match(text):
-        raise Fault(ERROR, f"the program stops with error {found['number']}", "its own checks refuse its parameters")
-    elif FREE.match(text):
-        free_contour(control)
-    elif re.match(r"TCH\s*PROBE", text, re.IGNORECASE):
-        probe(control, text)
-    elif found := CHOSEN_PRESET.match(text):
-        select_preset(control, found)
-    elif re.match("TRANS", text, re.IGNORECASE):
-        transform(control, text)
-    elif CHOSEN.match(text):
-        name = " ".join(text.split()[:2]).upper()
-        control.refusal = control.refusal or f"{name} is not followed"
-    elif WRITING.match(text) or (re.match("FUNCTION", text, re.IGNORECASE) and not HARMLESS_FUNCTIONS.match(text)):
-        name = " ".join(text.partition(":")[0].split()[:3]).upper()
-        control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
-    elif re.match(r"PATTERN\s+DEF|SEL\s+PATTERN", text, re.IGNORECASE):
-        control.cycle.places = pattern_of(text, control.scope.parameters)
-    elif READING.match(text):
-        read_values(control, text)
+    """Do what a statement says; one that is not listed moves nothing."""
+    for form, do in STATEMENTS:
+        if found := form.match(text):
+            do(control, flow, found)
+            return
 
 
-def select_preset(control: Control, found: re.Match[str]) -> None:
-    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
-    trans = control.transformations
-    control.suspended.pop(PRESET, None)
-    if found["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
-        control.suspended[PRESET] = SELECTED
-        return
-    control.load_preset(f"PRESET{int(found['row'])}")
+# -- other programs ---------------------------------------------------------------------------------------------------
 
 
-def free_contour(control: Control) -> None:
+def call_program(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """CALL PGM."""
+    flow.call_program(found["name"].strip())
+
+
+def select_program(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """SEL PGM: the program that CALL SELECTED PGM calls; one whose name is in a parameter is known only at run time."""
+    name = found["name"].strip()
+    flow.selected = "" if TARGET.fullmatch(name) else name
+
+
+def call_selected(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """CALL SELECTED PGM."""
+    if flow.selected:
+        flow.call_program(flow.selected)
+    else:
+        control.refusal = control.refusal or "the program that is called is chosen at run time"
+
+
+def error(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """FN 14: the program stops with an error of its own."""
+    raise Fault(ERROR, f"the program stops with error {found['number']}", "its own checks refuse its parameters")
+
+
+# -- what is not followed ---------------------------------------------------------------------------------------------
+
+
+def not_followed(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """What may change coordinates, or what later blocks do."""
+    name = " ".join(found[0].partition(":")[0].split()[:3]).upper()
+    control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
+
+
+def free_contour(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
     """An element of a free contour: as for an arc about a centre of its own, it matters where the one before ends.
 
     It lies in the working plane: only X and Y of the frame are not known after it.
@@ -93,37 +89,88 @@ def free_contour(control: Control) -> None:
     somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
 
 
-def read_values(control: Control, text: str) -> None:
+# -- what is measured and read ----------------------------------------------------------------------------------------
+
+
+def probe(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
+    number = int(found["number"])
+    if number in SETTING:
+        control.suspended[PRESET] = MEASURED.format(number)
+    control.pass_here(PROBING, AFTER_PROBING, "XYZ")
+    for each in PROBED:
+        control.scope.parameters.assign(f"Q{each}", 0.0, runtime=True)
+    lose_parameters(control, found[0], IN_A_ROW if number < PROBED[0] else 1)
+
+
+def read_values(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
     """FN 18, 28 and their like put what they read into a Q parameter; FN 23 and 24 into three in a row."""
-    for letters, number in TARGET.findall(text.partition("=")[0].upper()):
-        for offset in range(3):
-            control.scope.parameters.assign(f"{letters}{int(number) + offset}", 0.0, runtime=True)
-            if not CIRCLE.match(text):
-                break
+    lose_parameters(control, found[0].partition("=")[0], 3 if CIRCLE.match(found[0]) else 1)
 
 
-def tcpm(control: Control, found: re.Match[str]) -> None:
+def lose_parameters(control: Control, text: str, in_a_row: int) -> None:
+    """The Q parameters that a text names, and those behind them, are known only at run time."""
+    for letters, number in TARGET.findall(text):
+        for offset in range(in_a_row):
+            control.scope.parameters.assign(f"{letters.upper()}{int(number) + offset}", 0.0, runtime=True)
+
+
+# -- coordinates ------------------------------------------------------------------------------------------------------
+
+
+def holes(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """PATTERN DEF; the holes of SEL PATTERN are in a table that is not read."""
+    control.cycle.places = pattern_of(found[0], control.scope.parameters)
+
+
+def change_coordinates(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """TRANS."""
+    transform(control, found[0])
+
+
+def select_preset(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+    """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
+    trans = control.transformations
+    control.suspended.pop(PRESET, None)
+    if found["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
+        control.suspended[PRESET] = SELECTED
+        return
+    control.load_preset(f"PRESET{int(found['row'])}")
+
+
+def tcpm(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.suspended.pop("tcpm", None)
-    control.path.by_vector = control.path.spatial = False
-    if found["reset"]:
-        tip_control(control, on=False)
-        return
-    words = found["rest"].upper()
-    control.path.spatial = "AXIS SPAT" in " ".join(words.split())
+    words = "" if found["reset"] else " ".join(found["rest"].upper().split())
+    control.path.by_vector, control.path.spatial = "PATHCTRL VECTOR" in words, "AXIS SPAT" in words
     if control.path.spatial:
-        control.suspended["tcpm"] = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
+        control.suspended["tcpm"] = SPATIAL_ANGLES
     if "REFPNT" in words and "TIP-TIP" not in words:
-        control.suspended["tcpm"] = "FUNCTION TCPM with a reference point other than the tip"
-    control.path.by_vector = "PATHCTRL VECTOR" in " ".join(words.split())
-    tip_control(control, on=True)
+        control.suspended["tcpm"] = OTHER_POINT
+    tip_control(control, on=not found["reset"])
 
 
-def probe(control: Control, text: str) -> None:
-    """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
-    found = re.match(r"TCH\s*PROBE\s*(\d+)", text, re.IGNORECASE)
-    if found and int(found[1]) in SETTING:
-        control.suspended[PRESET] = MEASURED.format(found[1])
-    control.pass_here(PROBING, AFTER_PROBING, "XYZ")
-    for number in PROBED:
-        control.scope.parameters.assign(f"Q{number}", 0.0, runtime=True)
+Do = Callable[[Control, FlowControl, re.Match[str]], None]
+
+FORMS: tuple[tuple[str, Do], ...] = (
+    (r"CALL\s+PGM\s*(?P<name>.*)", call_program),
+    (r"SEL\s+PGM\s*(?P<name>.*)", select_program),
+    (r"CALL\s+SELECTED\b", call_selected),
+    (r"FN\s*14\s*:\s*ERROR\s*=?\s*(?P<number>\w*)", error),
+    (r"F(LT|L|CT|C)\b", free_contour),
+    (r"TCH\s*PROBE\s*(?P<number>\d+).*", probe),
+    (r"FN\s*(18|2[0348])\b.*", read_values),
+    (r"(PATTERN\s+DEF|SEL\s+PATTERN).*", holes),
+    (r"TRANS\b.*", change_coordinates),
+    (r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", select_preset),
+    (r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", tcpm),
+    # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections) may not.
+    (
+        r"FUNCTION\s+(RESET\s+)?(FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL|MODE\s+SET|DRESS\s+END|FLUTES|FILE)",
+        lambda control, flow, found: None,
+    ),
+    # FN 17 and 25 write into the control's own data: datums, presets, tools.
+    (r"(FUNCTION|FN\s*(17|25)\b|SEL\s+CYCLE|POLARKIN|TCH\s*PROBE).*", not_followed),
+)
+STATEMENTS = tuple((re.compile(form, re.IGNORECASE | re.DOTALL), do) for form, do in FORMS)
+"""Statements by their first words, and what they do."""

@@ -35,7 +35,7 @@ PATTERN_CYCLES = (f"cycl def {ON_CIRCLE}", f"cycl def {ON_LINES}")
 SHARED = ("Q200", "Q203", "Q204")
 """What a pattern says anew of the cycle whose holes it makes: clearance, surface, second clearance."""
 
-NOT_WRITTEN = ("CALL PGM", "FN 14")
+NOT_WRITTEN = ("CALL PGM", "SEL PGM", "CALL SELECTED", "FN 14")
 
 
 @dataclass(slots=True)
