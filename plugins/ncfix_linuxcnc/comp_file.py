@@ -174,7 +174,11 @@ def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
             remarks.refuse(number, "a decimal comma: LinuxCNC takes what is before it for the whole number")
         elif match[4].strip():
             remarks.doubt(number, "more than three numbers: the rest is ignored")
-        yield float(match[1]), float(match[2]), float(match[3])
+        place, there, back = float(match[1]), float(match[2]), float(match[3])
+        if not np.isfinite([place, there, back]).all():
+            remarks.refuse(number, "a number beyond all bounds")
+            return
+        yield place, there, back
 
 
 def _look_for_jumps(remarks: Remarks, steps: Array, trims: Array) -> None:

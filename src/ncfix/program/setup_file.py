@@ -33,7 +33,7 @@ LARGEST = 1e12
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
 """Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""
 
-TOOL = re.compile(r"\d+|(?!T\d+$).{2,}")
+TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 """A tool is called by its number or by a name."""
 
 
@@ -187,7 +187,7 @@ class Reading:
     def is_tool(self, key: str, name: str) -> bool:
         """Whether a key can be what a tool is called."""
         if not TOOL.match(name):
-            self.fault(UNKNOWN_KEY, f"{key}.{name}", "no tool number")
+            self.fault(UNKNOWN_KEY, f"{key}.{name[:20]}", "no tool number")
         return TOOL.match(name) is not None
 
     def tool(self, key: str, value: Any) -> Tool:

@@ -21,7 +21,7 @@ from ncfix.program.sinumerik.unit import Unit
 from ncfix.program.sinumerik.values import Evaluate, number
 from ncfix.program.sinumerik.vocabulary import (
     DRILLING,
-    ENDS,
+    ENDED_BY,
     HARMLESS,
     MADE_BY_THE_CONTROL,
     MOTIONS,
@@ -122,7 +122,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
         return
     elif name in UNFOLLOWED:
-        control.suspended["coordinates"] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
+        control.suspended[name] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
     elif name in ("orimks", "oriwks"):
         control.modes.orientation_in_machine = name == "orimks"
     elif name in ANGLE_KINDS:
@@ -150,7 +150,7 @@ def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
     warn_of_frame(control, step)
     if len(step.written) > 1:
-        control.suspended["coordinates"] = "TRAORI with a direction of the tool of its own is in force"
+        control.suspended["traori"] = "TRAORI with a direction of the tool of its own is in force"
     control.modes.transformed = True
     control.switch_tcp()
 
@@ -167,14 +167,16 @@ def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     if control.modes.transformed:
         warn_of_frame(control, step)
     control.modes.transformed = False
-    if control.suspended.pop("coordinates", None):
-        control.lose_all(framing.AFTER_UNFOLLOWED)
+    end_unfollowed(control, turn, step)
     control.switch_tcp()
 
 
 def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
-    """TOROTOF, PAROTOF: coordinates are followed again."""
-    if control.suspended.pop("coordinates", None):
+    """TRAFOOF, TOROTOF, PAROTOF, CP: what they end is not in force any more."""
+    over = ENDED_BY[step.name] & control.suspended.keys()
+    for name in over:
+        del control.suspended[name]
+    if over:
         control.lose_all(framing.AFTER_UNFOLLOWED)
 
 
@@ -188,6 +190,8 @@ def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """DEF."""
+    if not step.arguments:
+        raise Fault("NCF110", "DEF has no type and no name", "DEF REAL NAME, at the beginning of a block")
     kind = str(step.arguments[0](control))
     for place in range(1, len(step.written), 2):
         variable, value = step.written[place], step.written[place + 1]
@@ -230,7 +234,7 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
     "ret": come_back,
     "meas": measure,
     "meaw": measure,
-    **dict.fromkeys(ENDS - {"trafoof"}, end_unfollowed),
+    **dict.fromkeys(ENDED_BY.keys() - {"trafoof"}, end_unfollowed),
 }
 
 
