@@ -182,19 +182,24 @@ def shipped_row(name: str, more: dict[str, str]) -> str:
 
 def shipped() -> str:
     """All of them."""
-    rows = [shipped_row(name, more) for name in SHIPPED for more in SETTINGS]
+    rows = []
+    for name in SHIPPED:
+        for more in SETTINGS:
+            rows.append(shipped_row(name, more))
+            print(rows[-1], file=sys.stderr, flush=True)
     return "\n".join([HEAD, "|" + "---|" * 8, *rows])
 
 
+BLOCKS = {"shipped": shipped, "schemes": page}
+
+
 def main() -> None:
-    """Put the figures into the page."""
-    text = PAGE.read_text()
-    for name, made in {"schemes": page(), "shipped": shipped()}.items():
+    """Put the figures into the page: all, or the blocks that are named."""
+    for name in sys.argv[1:] or BLOCKS:
         start, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-        block = f"{start}\n{made}\n{end}"
-        print(block)
-        text = re.sub(f"{start}.*{end}", lambda _, block=block: block, text, flags=re.DOTALL)
-    PAGE.write_text(text)
+        block = f"{start}\n{BLOCKS[name]()}\n{end}"
+        print(block, flush=True)
+        PAGE.write_text(re.sub(f"{start}.*{end}", lambda _, block=block: block, PAGE.read_text(), flags=re.DOTALL))
 
 
 if __name__ == "__main__":

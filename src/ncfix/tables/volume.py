@@ -22,7 +22,7 @@ MATTERS = 1e-6
 """mm: a smaller change of the correction is none."""
 DIGITS = 6
 """Decimals of a node's position, mm or degree."""
-OTHERS = 24
+OTHERS = 12
 """Poses of other axes, besides the corners of their ranges, over which a middle is taken."""
 CLOSE = 48
 """Up to here every count of even nodes is looked at, since they may come to lie on the kinks of a table; then some."""
