@@ -95,6 +95,8 @@ FRAMES = [
     case("a tool carrier", "TCARR=1\nG1 X5 F100", L4=N),
     case("a program from elsewhere", 'EXTCALL("PART")\nG1 X5 F100', L4=N),
     case("point to point", "PTP\nG1 X5 F100\nCP\nG0 X1 Y1 Z50", L4=N, L6=R),
+    case("a preset position", "PRESETON(X,5)\nTRAFOOF\nG1 X5 F100\nG0 X1 Y1 Z50", L5=N, L6=N),
+    case("a frame along the tool", "TOROT\nTRAFOOF\nG1 X5 F100\nTOROTOF\nG0 X1 Y1 Z50", L5=N, L7=R),
     case("TRAORI with a direction", "TRAORI(1,0,0,1)\nG1 X5 F100", L4=N),
     case("TRANSMIT", "TRANSMIT\nG1 X5 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=N, L6=R),
     case("CYCLE800 over a programmed frame", "TRANS X5\nCYCLE800()\nG1 X5 F100\nTRANS\nX7", L5=N, L7=R),

@@ -113,8 +113,13 @@ UNFOLLOWED = {
 }
 """Names after which coordinates are no longer those that are followed."""
 
-ENDS = frozenset({"trafoof", "torotof", "parotof", "cp"})
-"""Names that end some of them."""
+ENDED_BY = {
+    "trafoof": frozenset({"traori", "transmit", "tracyl", "traang", "tracon", "trafoon"}),
+    "torotof": frozenset({"torot", "torotx", "toroty", "torotz", "toframe", "toframex", "toframey", "toframez"}),
+    "parotof": frozenset({"parot"}),
+    "cp": frozenset({"ptp", "ptpg0", "ptpwoc"}),
+}
+"""Names that end some of them; the others stay to the end of the program."""
 
 ASYNCHRONOUS = {
     "posa": "a positioning axis that the program does not wait for (POSA)",
