@@ -19,6 +19,8 @@ from ncfix.measure.solve import orthonormal, without
 
 SHOWN = 6
 UNLIKELY = 1e-3
+NEARLY = 0.99
+"""Share of the largest gain at which a simpler pattern is preferred."""
 NEAR = 6
 """Neighbours of a pose."""
 
@@ -42,7 +44,9 @@ def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
     found: list[Pattern] = []
     while len(found) < SHOWN and offered:
         gains = [(_gain(basis, y, column * weight), text, column * weight) for text, column in offered]
-        (best, size), text, column = max(gains, key=lambda each: each[0][0])
+        most = max(gain for (gain, _), _, _ in gains)
+        # simple ones come first: a product of which one factor stands still is no pattern of its own
+        (best, size), text, column = next(each for each in gains if each[0][0] >= NEARLY * most)
         p = min(1.0, len(offered) * float(stats.chi2.sf(best / sigma_um**2, 1)))
         if p > UNLIKELY:
             break

@@ -55,6 +55,7 @@ class Side:
 class Proposal:
     """Poses to be measured.
 
+    name     the name that is to be told from its rivals
     plan     rows of kind tcp without values; None if no pose helps
     before   how well the worst rival can be told from the effect, squared noise units; after with the new poses
     reason   why the data so far do not tell them apart
@@ -62,6 +63,7 @@ class Proposal:
     beyond   axes that have to go beyond the travels measured so far
     """
 
+    name: str
     plan: Measurement | None
     before: float
     after: float
@@ -71,8 +73,9 @@ class Proposal:
 
 
 def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
-    """Poses that tell the first name from those that come near it; None where none does."""
-    name, court = selected.named[0], scale.court
+    """Poses that tell the first ambiguous name, or else the first, from those that come near; None where none does."""
+    name = next((each for each in selected.named if aliases(selected, each)), selected.named[0])
+    court = scale.court
     runners = selected.runners[name]
     reach = ALIKE if aliases(selected, name) else NEAR
     near = [n for n in sorted(runners, key=lambda n: -runners[n]) if runners[n] > selected.odds[name] - reach]
@@ -122,9 +125,10 @@ def _within(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ra
     plan = offered.rows(index) if useful and after > BETTER * before else None
     reason = _reason(court, chosen.group, [rival.group for rival in rivals])
     if plan is None:
-        return Proposal(None, before, after, reason, names)
+        return Proposal(chosen.group.owner.name, None, before, after, reason, names)
     beyond = _beyond(plan, court.background.view.reach.spans)
-    return Proposal(_marked(plan, beyond), before, after, reason, names, beyond)
+    marked = _marked(plan, beyond)
+    return Proposal(chosen.group.owner.name, marked, before, after, reason, names, beyond)
 
 
 def _travels(machine: Machine, spans: Mapping[str, Span]) -> dict[str, Span]:

@@ -76,8 +76,13 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
     if found.proposal is None:
         return None
     p = found.proposal
-    told = {"now": p.before, "after": p.after}
-    return {"rivals": p.rivals, "reason": p.reason, "told_apart": told, "beyond_travels_measured": list(p.beyond)}
+    return {
+        "name": p.name,
+        "rivals": p.rivals,
+        "reason": p.reason,
+        "told_apart": {"now": p.before, "after": p.after},
+        "beyond_travels_measured": list(p.beyond),
+    }
 
 
 def _outliers(found: Diagnosis) -> list[dict[str, Any]]:

@@ -92,11 +92,15 @@ def _next(found: Diagnosis) -> list[str]:
     if p is None:
         return []
     if p.plan is None:
-        return ["", f"{', '.join(p.rivals)}: {p.reason}; no measurement of this kind would tell them apart"]
+        alike = ", ".join((p.name, *p.rivals))
+        return ["", f"{alike}: {p.reason}; no measurement of this kind would tell them apart"]
     poses = (
         f"{len(p.plan)} more poses raise what tells them apart from {p.before:.1f} to {p.after:.1f} squared noise units"
     )
-    return ["", f"to tell it from {', '.join(p.rivals)} ({p.reason}): {poses}{beyond(p)}; --next FILE writes them"]
+    return [
+        "",
+        f"to tell {p.name} from {', '.join(p.rivals)} ({p.reason}): {poses}{beyond(p)}; --next FILE writes them",
+    ]
 
 
 def beyond(proposal: Proposal) -> str:

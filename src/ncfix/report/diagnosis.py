@@ -108,7 +108,7 @@ def _next(found: Diagnosis) -> Section:
     proposal = found.proposal
     if proposal is None:
         return Section("To tell names apart", [])
-    head = Text(f"{', '.join(proposal.rivals)}: {proposal.reason}.")
+    head = Text(f"{', '.join((proposal.name, *proposal.rivals))}: {proposal.reason}.")
     if proposal.plan is None:
         words = "No measurement of this kind within the travels of the machine would tell them apart."
         return Section("To tell names apart", [head, Text(words)])
