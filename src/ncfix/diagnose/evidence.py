@@ -84,7 +84,9 @@ class Court:
 
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
-        self.columns = self.background.seen(np.concatenate([group.columns for group in self.groups], axis=1))
+        none = np.zeros((len(self.background.view.y), 0))
+        columns = np.concatenate([none, *(group.columns for group in self.groups)], axis=1)
+        self.columns = self.background.seen(columns)
         self.bounds = np.concatenate([[0], np.cumsum([group.columns.shape[1] for group in self.groups])])
         self.y = self.background.seen(self.background.view.y)
         self.forms = {}
