@@ -18,8 +18,8 @@ from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotatio
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix.program.sinumerik.destination import End, Words
 from ncfix.program.sinumerik.orientation import WAY
-from ncfix.program.sinumerik.plans import Calling
-from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.plans import Calling, plain_text
+from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.values import number
 from ncfix.program.tree import Text
 
@@ -30,6 +30,8 @@ AXIS_BY_AXIS, SOLID, PROJECTED = 0, 1, 2
 """The kinds of angles in its bits 6 and 7."""
 
 FLAT = 1e-9
+DESELECTED = "0"
+"""The name of a swivel data set with which swivelling is deselected; the rotary axes stand where they stand."""
 
 PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "dir": 13}
 """Where the arguments stand: retraction, state, mode, reference point, angles, zero point, direction."""
@@ -50,6 +52,10 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         control.suspended["frame"] = OVER_FRAME
     if all(part is None or isinstance(part, Text) for part in step.written):
         untilted(control)
+        return
+    if len(step.written) > 1 and plain_text(step.written[1]) == DESELECTED:
+        untilted(control)
+        control.lose_axes(GEOMETRY, AFTER_SWIVEL)
         return
     values = [number(value(control)) for value in step.arguments]
     written = zip(values, step.written, strict=True)
@@ -89,6 +95,8 @@ class Plane:
         before, angles, after = (values[PLACES[name] : PLACES[name] + 3] for name in ("before", "angles", "after"))
         turn = turn_of(mode, angles)
         fault = f", mode {mode}" if turn is None else ""
+        if table // 100 % 10:
+            fault = fault or ", which aligns the tool"
         if direction not in (-1, 1):
             fault = fault or ", without turning the rotary axes"
         frame = shifted(dict(enumerate(before))).then(turn or WORLD).then(shifted(dict(enumerate(after))))
