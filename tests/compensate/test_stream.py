@@ -115,6 +115,13 @@ def test_plain_programs_are_done_in_parts(machine: Machine) -> None:
     assert all(assert_same(program(seed, 60, 0.0), machine, 300) for seed in (1, 5))
 
 
+def test_a_program_without_motions(machine: Machine) -> None:
+    for jobs in (1, 2):
+        text, report = streamed(b"G21 G90\n" + b"(nothing)\n" * 50 + b"M2\n", machine, 150, jobs=jobs)
+        assert text.count(b"nothing") == 50
+        assert not report["changed"]
+
+
 @pytest.mark.parametrize("jobs", [2, 3])
 def test_several_processes_give_the_same_bytes(jobs: int, machine: Machine) -> None:
     for seed in (5, 7):

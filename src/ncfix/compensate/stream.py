@@ -162,12 +162,13 @@ class Corrector:
         settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
         if before is not None and settled.kept[0] != before.kept:
             raise NotInPartsError("a refusal reaches back into an earlier part")
-        share.leave(_left(settled))
+        if not part.last:
+            share.leave(_left(settled))
         text = self._text(part.program, settled, before is None)
         if before is not None and foreign:
             self.proof.stand(before.position)
         own = np.ones(len(moves), dtype=bool)
-        own[0] &= unit.head is None
+        own[:1] = unit.head is None
         self._prove(text, settled, own, part.last)
         tally = Tally()
         tally.add(part.program, settled, own, increments(self.machine))
