@@ -42,6 +42,9 @@ VERBS = {
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 + SIGINT."""
 
+MOST_DIGITS = 1 << 17
+"""Digits of a whole number: as many as the longest line that a control reads has characters, and more."""
+
 BROKEN_PIPE = 141
 """Exit code when the reader of standard output has gone: 128 + SIGPIPE."""
 
@@ -87,7 +90,14 @@ def cli(debug: bool) -> None:
 
 
 def main() -> None:
-    """The console script."""
+    """The console script.
+
+    What numpy warns of while it works on odd input is for those who look for faults, as is Python's limit on the digits
+    of whole numbers, which is below what a line of a program may have.
+    """
+    sys.set_int_max_str_digits(MOST_DIGITS)
+    if not sys.warnoptions and "--debug" not in sys.argv:
+        warnings.simplefilter("ignore", RuntimeWarning)
     sys.exit(run(sys.argv[1:]))
 
 
