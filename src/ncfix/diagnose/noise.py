@@ -88,11 +88,7 @@ def states(view: View) -> list[int]:
     seen: list[int] = []
     number, before = -1, None
     for each in view.measurements:
-        names = [
-            n
-            for n in each.columns
-            if n not in each.measured and not n.startswith("temp_") and n not in ("time_s", "run")
-        ]
+        names = [name for name in each.columns if name not in each.measured and not varying(name)]
         labels = [value for name, value in each.labels.items() if name != "repeat"]
         for i in range(len(each)):
             key = (each.path, *(label[i] for label in labels), *(round(float(each.columns[n][i]), 4) for n in names))
