@@ -120,12 +120,12 @@ class Volume:
         return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
 
     def _around(self, index: int, nodes: Array, within: int) -> Array:
-        """Places between the nodes, and those beyond them at which the ends hold."""
+        """Places between the nodes, and where the ends hold: these count as much as half a cell."""
         low, high = self.ranges[index].tolist()
         step = (nodes[-1] - nodes[0]) / (len(nodes) - 1) / within
-        before = np.arange(low, nodes[0] - step / 2, step)
-        after = nodes[-1] + step * np.arange(1, int((high - nodes[-1]) / step + 0.5) + 1)
-        return np.concatenate([before, between(nodes, within), after])
+        before = np.linspace(low, nodes[0], within // 2, endpoint=False) if nodes[0] - low > step else np.zeros(0)
+        after = np.linspace(high, nodes[-1], within // 2, endpoint=False) if high - nodes[-1] > step else np.zeros(0)
+        return np.concatenate([before, between(nodes, within), after[::-1]])
 
     def _nodes(self, index: int, count: int) -> Array:
         low, high = (self.covered[index] / self.units[index]).tolist()
