@@ -78,3 +78,12 @@ def test_a_folder_stands_for_the_programs_below_it(ncfix: Any, shop: Any) -> Non
     result = ncfix("check", deep.parent, "--json")
     assert result.code == ExitCode.UNREADABLE
     assert [each["path"] for each in result.json()["files"]] == [str(deep.parent / "b.ngc"), str(deep / "a.ngc")]
+
+
+def test_the_first_example_leaves_nothing_to_remark_on(ncfix: Any, examples: Any) -> None:
+    """`./try` shows what a correction does, not what is wrong with its program."""
+    programs, machines = examples / "programs", examples / "machines"
+    result = ncfix(
+        "check", programs / "blade.nc", "-m", machines / "wCBXFZYSt.toml", "--setup", programs / "blade.setup.toml"
+    )
+    assert (result.code, "nothing found" in result.err) == (ExitCode.DONE, True), result.err
