@@ -17,7 +17,7 @@ from ncfix.program.sinumerik.vocabulary import HARMLESS, OF_THE_CONTROL, PROBING
 LOUD_M = frozenset({20, 60, 170, 300})
 """M codes, in tenths, that end programs or change tools."""
 
-QUIET_WORDS = frozenset("SHM")
+QUIET_WORDS = frozenset("SH")
 INNER = frozenset({"if", "else", "endif"})
 
 

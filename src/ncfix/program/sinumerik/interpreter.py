@@ -171,7 +171,7 @@ class Interpreter:
                     continue
         self.span = None
         if turn.subprogram is None:
-            call_word(turn, self.find)
+            call_word(control, turn, self.find)
         if self.recorder is not None:
             main, line = not course.calls, self.place().line
             self.recorder.record(control, unit, index, turn, main=main, line=line)

@@ -264,10 +264,16 @@ def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
     return True
 
 
-def call_word(turn: Turn, find: Find) -> None:
+def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
     """`L123`: a subprogram by its number."""
     value = turn.words.values.get("L")
+    if "L" not in turn.words.values:
+        return
+    if turn.modal:
+        control.suspended["cycle"] = "a modal subprogram (MCALL L) is in force, which ncfix does not follow"
+        return
     if value is None:
+        control.refusal = control.refusal or "which subprogram is called (L) is known only at run time"
         return
     unit = find(f"L{value:g}")
     if unit is None:
@@ -281,6 +287,8 @@ def call_word(turn: Turn, find: Find) -> None:
 def finish_block(control: Sinumerik, turn: Turn) -> None:
     """Codes and words of the block, and its motion."""
     words, plan = turn.words, turn.plan
+    if "G" in words.values:
+        control.refusal = control.refusal or "a G code that is computed (G=..) is not followed"
     codes(control, turn)
     if turn.frame:
         framing.programmable(control, turn.frame, words)
