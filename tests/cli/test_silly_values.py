@@ -49,6 +49,13 @@ def test_silly_values_are_refused(
     assert {path: path.read_bytes() for path in Path().iterdir()} == before
 
 
+def test_a_size_of_parts_that_is_none(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
+    for said in ("abc", "0", "-5"):
+        monkeypatch.setenv("NCFIX_PART_BYTES", said)
+        result = ncfix("fix", shop.program, "-m", shop.machine, "-o", shop.folder / "out.ngc", "--assume-zero")
+        assert (result.code, "NCFIX_PART_BYTES" in result.err) == (2, True)
+
+
 def test_every_message_in_json_has_a_hint(shop: Shop, ncfix: Ncfix) -> None:
     shop.machine.write_text("x = 1\n")
     result = ncfix("machine", "check", shop.machine, "--json")

@@ -13,7 +13,7 @@ from typing import IO, TYPE_CHECKING
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, Target, shown, stdin
-from ncfix.diagnostics import Place, RefusedError
+from ncfix.diagnostics import Place, RefusedError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
@@ -31,7 +31,10 @@ def part_bytes() -> int:
     """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
     from ncfix.compensate.stream import PART_BYTES
 
-    return max(int(os.environ.get("NCFIX_PART_BYTES") or PART_BYTES), 1)
+    said = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
+    if not said.isdecimal() or int(said) < 1:
+        raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {said!r}, and not a number of bytes", hint="unset it")
+    return int(said)
 
 
 def long_from() -> int:
