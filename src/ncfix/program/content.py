@@ -24,7 +24,8 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     for family, pattern in dialect.foreign:
         if found := re.search(pattern, source[:PROBE_BYTES]):
             text = f"this is {family}, not {dialect.title}"
-            raise SourceError.of("NCF103", text, place_of(source, found.start(), path, "utf-8"), "see `ncfix dialects`")
+            hint = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
+            raise SourceError.of("NCF103", text, place_of(source, found.start(), path, "utf-8"), hint)
 
 
 def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:
