@@ -88,3 +88,20 @@ def test_a_fault_ends_one_program_and_not_the_others(shop: Shop, ncfix: Ncfix, m
     assert [file["output"] is None for file in result.json()["files"]] == [True, False]
     assert "Traceback" not in result.err
     assert "Traceback" in ncfix("--debug", *arguments, "--force").err
+
+
+def test_tables_are_written_all_or_not_at_all(shop: Shop, ncfix: Ncfix, monkeypatch: pytest.MonkeyPatch) -> None:
+    from ncfix import files
+
+    write, left = files.write_whole, [1, 2]
+
+    def full(path: str, data: bytes, replace: bool = False) -> None:
+        if not left:
+            raise files.unwritable(path, OSError(28, "No space left on device"))
+        left.pop()
+        write(path, data, replace)
+
+    monkeypatch.setattr(files, "write_whole", full)
+    result = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "tables")
+    assert (result.code, "NCF007" in result.err, left) == (2, True, [])
+    assert list((shop.folder / "tables").iterdir()) == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -132,14 +133,21 @@ def check_folder(folder: str) -> None:
 
 
 def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
-    """Write all files, or none if one is there already; raises `UsageError` NCF004 or NCF007."""
+    """Write all files, or none if one is there already or there is no room; raises `UsageError` NCF004 or NCF007."""
     check_folder(folder)
     paths = {os.path.join(folder, name): content for name, content in made.files.items()}
     for path in paths:
         if os.path.lexists(path) and (not force or os.path.islink(path) or not os.path.isfile(path)):
             raise files.exists_already(path)
-    for path, content in paths.items():
-        files.write_whole(path, content, replace=force)
+    fresh = [path for path in paths if not os.path.lexists(path)]
+    try:
+        for path, content in paths.items():
+            files.write_whole(path, content, replace=force)
+    except UsageError:
+        for path in fresh:
+            with suppress(OSError):
+                os.unlink(path)
+        raise
 
 
 def tell(made: Exported, as_json: bool, **more: object) -> None:
