@@ -12,13 +12,14 @@ from ncfix.program.reader import read
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.sinumerik.bypass import bypassed
+from ncfix.program.sinumerik.calling import call_word
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
-from ncfix.program.sinumerik.statements import Turn, act, call_word, finish_block, say
+from ncfix.program.sinumerik.statements import Turn, act, finish_block, say
 from ncfix.program.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix.program.sinumerik.unit import Unit, units_of
 from ncfix.program.sinumerik.unroll import Recorder

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,10 +10,11 @@ from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
+from ncfix.program.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, OTHERS, VECTOR
-from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates, plain_text
+from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
 from ncfix.program.sinumerik.unit import Unit
@@ -31,10 +31,7 @@ from ncfix.program.sinumerik.vocabulary import (
 )
 from ncfix.program.tree import Call, Expression, NamedParameter
 
-Find = Callable[[str], Unit | None]
-
 CONFLICT = "NCF208"
-UNKNOWN_CYCLE = "NCF252"
 FRAME_STAYS = "NCF255"
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
@@ -62,9 +59,6 @@ CIRCLE = frozenset({"I", "J", "K", "AR", "TURN"})
 """Those that do it while G2 or G3 is in force."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
-CALLED_BY_TEXT = frozenset({"call", "extcall"})
-FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
-"""A program named in a text, perhaps with a path."""
 
 FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
 POLES = frozenset({1100, 1110, 1120})
@@ -236,49 +230,6 @@ SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
     "meaw": measure,
     **dict.fromkeys(ENDED_BY.keys() - {"trafoof"}, end_unfollowed),
 }
-
-
-def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
-    """A subprogram, or a cycle of the machine's builder."""
-    if turn.modal:
-        text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
-        control.suspended["cycle"] = text
-        return
-    unit = find(step.name)
-    if unit is not None:
-        turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
-        turn.times = round(turn.words.get("P", 1.0))
-        return
-    text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
-    control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
-    control.lose_all(AFTER_CYCLE)
-
-
-def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
-    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`: whether the program is at hand."""
-    found = FILE.search(plain_text(step.written[0]) or "") if step.written else None
-    unit = find(found["name"]) if found else None
-    if unit is None:
-        return False
-    turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
-    return True
-
-
-def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
-    """`L123`: a subprogram by its number."""
-    value = turn.words.values.get("L")
-    if "L" not in turn.words.values:
-        return
-    if turn.modal:
-        control.suspended["cycle"] = "a modal subprogram (MCALL L) is in force, which ncfix does not follow"
-        return
-    if value is None:
-        control.refusal = control.refusal or "which subprogram is called (L) is known only at run time"
-        return
-    unit = find(f"L{value:g}")
-    if unit is None:
-        raise Fault("NCF231", f"there is no subprogram L{value:g}", "put its file beside the program")
-    turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))
 
 
 # -- the block --------------------------------------------------------------------------------------------------------

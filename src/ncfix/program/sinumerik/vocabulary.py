@@ -137,9 +137,7 @@ UNSEEN = {
 }
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
-OF_THE_CONTROL = re.compile(
-    r"\$(?:p_\w*fr|tc_dp|tc_[se]cp|tc_adpt|tc_carr|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$"
-)
+OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$")
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})

@@ -1,0 +1,66 @@
+"""Calls of subprograms: by name, by number, by a text; and names that are none of ours."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.cycles import AFTER_CYCLE
+from ncfix.program.sinumerik.plans import Calling, plain_text
+from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.unit import Unit
+
+if TYPE_CHECKING:
+    from ncfix.program.sinumerik.statements import Turn
+
+Find = Callable[[str], Unit | None]
+
+UNKNOWN_CYCLE = "NCF252"
+CALLED_BY_TEXT = frozenset({"call", "extcall"})
+FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
+"""A program named in a text, perhaps with a path."""
+
+
+def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """A subprogram, or a cycle of the machine's builder."""
+    if turn.modal:
+        text = f"the modal subprogram {step.name.upper()} is in force, which ncfix does not follow"
+        control.suspended["cycle"] = text
+        return
+    unit = find(step.name)
+    if unit is not None:
+        turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
+        turn.times = round(turn.words.get("P", 1.0))
+        return
+    text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
+    control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
+    control.lose_all(AFTER_CYCLE)
+
+
+def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:
+    """`CALL "NAME"`, `EXTCALL("NAME.SPF")`: whether the program is at hand."""
+    found = FILE.search(plain_text(step.written[0]) or "") if step.written else None
+    unit = find(found["name"]) if found else None
+    if unit is None:
+        return False
+    turn.subprogram, turn.called, turn.times = unit, step, round(turn.words.get("P", 1.0))
+    return True
+
+
+def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
+    """`L123`: a subprogram by its number."""
+    value = turn.words.values.get("L")
+    if "L" not in turn.words.values:
+        return
+    if turn.modal:
+        control.suspended["cycle"] = "a modal subprogram (MCALL L) is in force, which ncfix does not follow"
+        return
+    if value is None:
+        control.refusal = control.refusal or "which subprogram is called (L) is known only at run time"
+        return
+    unit = find(f"L{value:g}")
+    if unit is None:
+        raise Fault("NCF231", f"there is no subprogram L{value:g}", "put its file beside the program")
+    turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))
