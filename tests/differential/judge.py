@@ -115,7 +115,8 @@ class _Judge:
         self.rough = PRINTED * ~original.exact, PRINTED * ~fixed.exact
         self.length = _lengths(fixed, terms)
         left = [terms.left.get(int(line), frozenset()) for line in original.line]
-        self.left = np.array([[column in columns for column in range(9)] for columns in left]).reshape(-1, 9)
+        rows = [[column in columns for column in range(9)] for columns in left]
+        self.left = np.array(rows, dtype=np.bool_).reshape(-1, 9)
 
     def run(self) -> Verdict:
         if not (self.original.accepted and self.fixed.accepted):

@@ -81,6 +81,6 @@ def _judged(
         judged["not for the control"] += 1
         return []
     judged["compared"] += 1
-    terms = Terms(refused=outcome.refused, passed=corpus.passed_by_rule(source))
+    terms = Terms(refused=outcome.refused, left=outcome.left, passed=corpus.passed_by_rule(source))
     verdict = judge(original, rs274(outcome.text), model, terms)
     return [] if verdict.right else [f"{source!r}\n{outcome.text!r}\n{verdict}"]

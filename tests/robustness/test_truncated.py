@@ -59,6 +59,7 @@ def _judge(case: Case, source: bytes, outcome: product.Outcome, rs274: Callable[
         step=model.linear_step,
         rotary_step=model.rotary_step,
         refused=outcome.refused,
+        left=outcome.left,
         passed=corpus.passed_by_rule(source),
         tool_length={number: length for number, (length, _) in case.controls.tools.items()},
     )
