@@ -23,14 +23,15 @@ SIEMENS = Dialect(
     closure_mm=0.01,
     closure_relative=0.0,
     understands=(
-        "packed words, X=, AC IC DC ACP ACN, R parameters, DEF, arithmetic, strings",
+        "packed words, X=, AC IC DC ACP ACN, R parameters, DEF, arrays, arithmetic, functions of texts",
         "G0 G1 G2 G3 with I J K, CR=, AR=, TURN=; CIP, CT; G90 G91, G70 G71 G700 G710, DIAMON DIAM90",
-        "IF WHILE FOR LOOP REPEAT CASE GOTO, labels, PROC with parameters, subprograms in the text or beside it",
+        "IF WHILE FOR LOOP REPEAT CASE GOTO, labels, PROC with parameters, subprograms in the text or beside it, also "
+        "by CALL and EXTCALL",
         "G54 ... G599, G500, TRANS ROT MIRROR and what is added to them, SCALE alike in all axes, G58 G59",
         "TRAORI with rotary words, A3= B3= C3= or A2= B2= C2= (--strategy full corrects the direction)",
         "CYCLE800 axis by axis, by solid or projected angles",
         "CYCLE81 ... CYCLE89, CYCLE840 where the axes stand or by MCALL",
-        "polar AP= RP= with G110 ... G112, where both are written",
+        "polar AP= RP= with G110 ... G112, lines and arcs about the pole",
         "G41 G42: the programmed contour is corrected, the control offsets it",
     ),
     passes=(
@@ -39,7 +40,8 @@ SIEMENS = Dialect(
     ),
     refuses=(
         "what depends on values known at run time only: global data, $ variables, parameters of a PROC by itself",
-        "splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes",
+        "splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes, fixed stops, axes "
+        "and G codes named by variables",
         "LEAD and TILT, surface normals, directions under ORIMKS; CYCLE800 by rotary axes, or without turning them",
         "holes and pockets that a cycle makes up; everything after a block or synchronized action not understood",
         "blocks executed from several states, without --flatten",
