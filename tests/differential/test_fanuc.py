@@ -51,7 +51,7 @@ class Fanuc(Generator):
         """Holes with levels of their own, and other motions right behind them."""
         if self.incremental or self.inverse or self.plane != "G17":
             return
-        at_level = self.rng.random() < 0.5
+        at_level = self.rng.random() < 0.5 and not self.inch  # in inches R and Z would be rounded apart
         self.block("G0", {"Z": 4.0 if at_level else 30.0})
         retract = self.rng.choice(("G98", "G99"))
         kind = self.rng.choice(("G81", "G82 P1", f"G83 Q{self.number(3.0)}", "G85"))
