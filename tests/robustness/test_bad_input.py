@@ -116,7 +116,7 @@ MACHINES = {
     "too few coefficients": ("[0.011, -0.008]", "[0.011]", "coefficients"),
     "an empty range": ("[-20000, 20000]", "[1, 1]", "range"),
     "not a number": ("coefficients = [25e-6]", "coefficients = [nan]", "coefficients"),
-    "no TOML": ('name = "judge', "name = judge", "line"),
+    "no TOML": ('name = "judge', "name = judge", "not TOML"),
 }
 
 
