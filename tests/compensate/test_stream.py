@@ -214,6 +214,13 @@ def test_a_refusal_that_reaches_back_is_seen(machine: Machine) -> None:
             streamed(source, machine, size, jobs=jobs)
 
 
+def test_a_refusal_that_reaches_back_through_refused_motions_is_seen(machine: Machine) -> None:
+    lines = b"".join(b"X%d.\n" % (9000 + k % 9) for k in range(200))
+    source = b"G21 G90 G94 F800 G17\nG1 X0 Y0 Z5 B0 C0\n" + lines + b"G2 X0 Y9000. R9000.\nM2\n"
+    with pytest.raises(NotInPartsError, match="reaches back"):
+        streamed(source, machine, 100)
+
+
 def test_errors_are_those_of_the_whole(machine: Machine) -> None:
     source = program(1, 60, 0.0)
     for wrong in (b"G1 X1 X2", b"G1 X%", b"G2 X1 Y1 I5 J5", b"U5", b"G84.5"):

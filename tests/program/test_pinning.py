@@ -26,7 +26,8 @@ def pinned(text: str, refused: int, dialect: str = "linuxcnc") -> list[int]:
     moves = moves_of(text, dialect)
     kept = np.zeros(len(moves), dtype=bool)
     kept[refused] = True
-    found, added = closure_of_refusals(moves, kept)
+    closure = closure_of_refusals(moves, kept)
+    found, added = closure.kept, closure.added
     assert sorted(np.flatnonzero(found & ~kept).tolist()) == sorted(added)
     arcs = [row for row in np.flatnonzero(found).tolist() if row == refused or moves.kind[row] == Kind.ARC]
     assert all(cause == next(row for row in arcs if row > each) for each, cause in added.items())
@@ -81,7 +82,7 @@ def test_arcs_of_klartext(text: str, expected: list[int]) -> None:
     moves = trace(
         read(body.encode(), "part.h", "heidenhain"), Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()
     ).moves
-    found, _ = closure_of_refusals(moves, np.array([False, False, True]))
+    found = closure_of_refusals(moves, np.array([False, False, True])).kept
     assert np.flatnonzero(found[:2]).tolist() == expected
 
 
@@ -92,7 +93,7 @@ def test_holes_are_drilled_where_their_blocks_say() -> None:
 def test_a_bound_increment_begins_where_it_began() -> None:
     moves = moves_of("G1 X1 Y1\nY2\nG91 X5")
     kept = np.array([False, False, False, True])
-    _, added = closure_of_refusals(moves, kept, kept)
+    added = closure_of_refusals(moves, kept, kept).added
     assert added == {2: 3, 1: 3}
 
 
@@ -116,7 +117,7 @@ def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: i
     except Exception:  # an arc that cannot reach its end
         return
     kept = (moves.rule != Rule.CORRECT) | np.array([refused >> row & 1 for row in range(len(moves))], dtype=bool)
-    found, _ = closure_of_refusals(moves, kept)
+    found = closure_of_refusals(moves, kept).kept
     off = np.zeros(3, dtype=bool)
     for row in range(len(moves)):
         own = moves.programmed[row].any() and not moves.incremental[row] and moves.kind[row] == Kind.ARC
@@ -126,3 +127,10 @@ def test_refused_arcs_close_whatever_is_before_them(lines: list[str], refused: i
             off &= ~moves.programmed[row]
         elif not found[row]:
             off[:] = True
+
+
+@pytest.mark.parametrize(("text", "unmoored"), [("G1 X1\nG2 X3 Y0 I1 J0", True), ("G1 X1 Y0\nG2 X3 Y0 I1 J0", False)])
+def test_a_refusal_that_needs_what_was_before_the_first_motion_says_so(text: str, unmoored: bool) -> None:
+    program = read(f"G21 G90 G94 G17 F100\n{text}\nM2\n".encode(), "part.ngc", "linuxcnc")
+    moves = trace(program, Setup(assume_zero=True), ("X", "Y", "Z"), frozenset()).moves
+    assert closure_of_refusals(moves, np.array([True, True])).unmoored is unmoored

@@ -57,9 +57,10 @@ class Before:
 class Settled:
     """A plan that can be written, and its text.
 
-    moves    the motions as programmed
-    kept     (n,) those left as they were
-    reasons  block -> why it was refused
+    moves     the motions as programmed
+    kept      (n,) those left as they were
+    reasons   block -> why it was refused
+    unmoored  a refusal needs something before the first motion as it was
     """
 
     moves: Moves
@@ -67,6 +68,7 @@ class Settled:
     emission: Emission
     kept: Mask
     reasons: dict[int, Reason]
+    unmoored: bool
 
     def shown(self, rapids: bool) -> Mask:
         """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them."""
@@ -86,13 +88,15 @@ class Settled:
 class Agreed:
     """A plan that nothing speaks against but, perhaps, its text.
 
-    kept     (n,) motions left as they were
-    reasons  block -> why it was refused
+    kept      (n,) motions left as they were
+    reasons   block -> why it was refused
+    unmoored  a refusal needs something before the first motion as it was
     """
 
     plan: Plan
     kept: Mask
     reasons: dict[int, Reason]
+    unmoored: bool
 
 
 def settle(
@@ -119,7 +123,7 @@ def settle(
             agreed = replace(agreed, plan=replace(agreed.plan, pieces=moving))
             continue
         if not emission.conflicts:
-            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons)
+            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons, agreed.unmoored)
         if emission.conflicts.keys() <= agreed.reasons.keys():
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
         for block, why in emission.conflicts.items():
@@ -144,8 +148,9 @@ def agree(
         state = State(direction=before.direction)
     bound = np.zeros(len(moves), dtype=bool)
     while True:
-        kept, pinned = closure_of_refusals(moves, kept, bound)
-        for row, cause in pinned.items():
+        closure = closure_of_refusals(moves, kept, bound)
+        kept = closure.kept
+        for row, cause in closure.added.items():
             why = LED if bound[cause] else PINNED
             reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
@@ -157,7 +162,7 @@ def agree(
             refused[finding.moves] = True
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
         if not (refused.any() or (~bound[astray]).any()):
-            return Agreed(planned, kept, reasons)
+            return Agreed(planned, kept, reasons, closure.unmoored)
         _explain_findings(reasons, (*against, *planned.findings), moves, refused)
         kept |= refused
         bound[astray] = True

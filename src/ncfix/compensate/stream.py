@@ -160,7 +160,7 @@ class Corrector:
             before = replace(before, direction=unit.direction)
             first = None if before.kept or _still_off(moves, before) else first
         settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
-        if before is not None and settled.kept[0] != before.kept:
+        if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
             raise NotInPartsError("a refusal reaches back into an earlier part")
         if not part.last:
             share.leave(_left(settled))

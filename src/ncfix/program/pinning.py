@@ -7,6 +7,8 @@ an end or centre of its own no longer closes, so what is before it must end wher
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,17 +22,29 @@ STILL = 1e-9
 """A component of a unit normal so near to 1 is 1."""
 
 
-def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> tuple[Mask, dict[int, int]]:
+@dataclass(frozen=True, slots=True)
+class Refusals:
+    """Motions that have to be left as they were.
+
+    kept      (n,) all of them
+    added     those that others need: row -> the row that needs it
+    unmoored  something before the first motion would have to stay, too
+    """
+
+    kept: Mask
+    added: dict[int, int]
+    unmoored: bool
+
+
+def closure_of_refusals(moves: Moves, kept: Mask, bound: Mask | None = None) -> Refusals:
     """Extend `kept` (n,) so that refused arcs begin where they began.
 
     bound  (n,) other motions that must begin where they began, along the axes that they name
-
-    Returns the extended mask, and the rows added, each with the row that needs it.
     """
     walk = _Walk(moves, kept.copy(), np.zeros(len(moves), dtype=bool) if bound is None else bound)
     for row in np.flatnonzero(kept & walk.anchored)[::-1].tolist():
         walk.back_from(row)
-    return walk.kept, walk.added
+    return Refusals(walk.kept, walk.added, walk.unmoored)
 
 
 class _Walk:
@@ -41,6 +55,7 @@ class _Walk:
         self.kept = kept
         self.bound = bound
         self.added: dict[int, int] = {}
+        self.unmoored = False
         self.reached = len(moves)
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
@@ -75,6 +90,7 @@ class _Walk:
             if self.anchored[row]:
                 needed |= self._plane(row)
                 cause = row
+        self.unmoored |= bool(needed.any())
 
     def _plane(self, row: int) -> Mask:
         """The axes of an arc's plane; of other motions those that they name."""
