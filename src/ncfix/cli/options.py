@@ -35,12 +35,17 @@ SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".SPF", ".mpf", ".MPF")
 
 LONGEST = 5000.0
 """mm: no tool is longer."""
+FINEST_UM = 0.01
+"""No control has digits for a finer tolerance, and pieces without number would be sought for it."""
 
 
 class Positive(click.ParamType):  # type: ignore[type-arg]
-    """A finite number above zero."""
+    """A finite number above zero, and not below the least that makes sense."""
 
     name = "number"
+
+    def __init__(self, least: float = 0.0) -> None:
+        self.least = least
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """The number."""
@@ -50,6 +55,8 @@ class Positive(click.ParamType):  # type: ignore[type-arg]
             found = math.nan
         if not 0 < found < math.inf:
             self.fail(f"{value!r} is not a number above zero", param, ctx)
+        if found < self.least:
+            self.fail(f"{value!r} is less than {self.least:g}, the least that makes sense", param, ctx)
         return found
 
 
@@ -82,7 +89,7 @@ class Length(click.ParamType):  # type: ignore[type-arg]
 
 tolerance_option = click.option(
     "--tolerance-um",
-    type=Positive(),
+    type=Positive(FINEST_UM),
     default=1.0,
     show_default=True,
     help="How far the tool tip may leave the intended path.",
