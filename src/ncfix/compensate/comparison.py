@@ -16,6 +16,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.flanks import other_side, uncertain
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rows import some
 from ncfix.compensate.simulation import TipError, actual_tip, batches, samples
 from ncfix.diagnostics import DifferenceError
 from ncfix.machine import Machine, State
@@ -81,18 +82,16 @@ def compare(machine: Machine, original: Moves, other: Moves, state: State = Stat
     intended, actual = Curve.of(meant, meant.tip), _as_made(done)
     _check_alike(intended, actual)
     there, back = _there(intended, actual), _back(intended, actual)
-    flank = _on_other_side(done, actual)
-    if flank is not None:
-        there, back = _nearer(there, _there(intended, flank)), _nearer(back, _back(intended, flank))
-    return there, back
+    flank = Flank.of(done, actual)
+    return (there, back) if flank is None else (flank.there(there, intended), flank.back(back, intended))
 
 
 def error_of(machine: Machine, moves: Moves, state: State = State()) -> TipError:  # noqa: B008
     """How far a program on this machine is from what it means, along what is made: in the measure of `compare`."""
     intent = Intent(machine, moves, state)
     intended, actual = Curve.of(intent, intent.tip), _as_made(intent)
-    there, flank = _there(intended, actual), _on_other_side(intent, actual)
-    return there if flank is None else _nearer(there, _there(intended, flank))
+    there, flank = _there(intended, actual), Flank.of(intent, actual)
+    return there if flank is None else flank.there(there, intended)
 
 
 def _as_made(done: Intent) -> Curve:
@@ -110,27 +109,54 @@ def _back(intended: Curve, actual: Curve) -> TipError:
     return TipError(intended.rows, intended.fraction, intended.points, nearest(actual, intended))
 
 
-def _on_other_side(done: Intent, actual: Curve) -> Curve | None:
-    """The path with axes that turn round on the other side of their play, where they may be; None if none does."""
-    turning = uncertain(done, actual.rows, actual.fraction)
-    if not turning.any():
-        return None
-    motions = np.zeros((len(done.moves), turning.shape[1]), dtype=bool)
-    np.logical_or.at(motions, actual.rows, turning)
+@dataclass(frozen=True, slots=True)
+class Flank:
+    """A path with axes that turn round on the other side of their play, where they may be.
 
-    def tip(rows: Index, fraction: Array) -> Array:
-        return other_side(done, rows, fraction, motions[rows])
+    curve    the path
+    samples  (j,) those at which it is another
+    motions  (n,) those on which it is
+    """
 
-    parts = batches(len(actual.rows))
-    sides = [other_side(done, actual.rows[part], actual.fraction[part], turning[part]) for part in parts]
-    return replace(actual, points=np.concatenate(sides), tip=tip)
+    curve: Curve
+    samples: Index
+    motions: Mask
+
+    @classmethod
+    def of(cls, done: Intent, actual: Curve) -> Flank | None:
+        """Of a path on the real machine; None if no axis turns round."""
+        turning = uncertain(done, actual.rows, actual.fraction)
+        samples = np.flatnonzero(turning.any(axis=1))
+        if not samples.size:
+            return None
+        motions = np.zeros((len(done.moves), turning.shape[1]), dtype=bool)
+        np.logical_or.at(motions, actual.rows, turning)
+
+        def tip(rows: Index, fraction: Array) -> Array:
+            return other_side(done, rows, fraction, motions[rows])
+
+        points = actual.points.copy()
+        points[samples] = other_side(done, actual.rows[samples], actual.fraction[samples], turning[samples])
+        return cls(replace(actual, points=points, tip=tip), samples, some(motions))
+
+    def there(self, error: TipError, intended: Curve) -> TipError:
+        """The error from what is made to what is meant, with this path at its samples where that is nearer."""
+        near = Neighbours.of(intended, self.curve)
+        return _nearer(error, self.samples, near.nearest(self.samples), self.curve.points[self.samples])
+
+    def back(self, error: TipError, intended: Curve) -> TipError:
+        """The error from what is meant to what is made, with this path where its motions are nearer."""
+        near = Neighbours.of(self.curve, intended)
+        samples = np.flatnonzero(self.motions[self.curve.rows[near.found]].any(axis=1))
+        return _nearer(error, samples, error.intended[samples], near.nearest(samples))
 
 
-def _nearer(one: TipError, other: TipError) -> TipError:
-    """Of two errors along the same samples, the smaller one at each."""
-    better = (other.size < one.size)[:, None]
-    intended, actual = np.where(better, other.intended, one.intended), np.where(better, other.actual, one.actual)
-    return TipError(one.rows, one.fraction, intended, actual)
+def _nearer(error: TipError, samples: Index, intended: Array, actual: Array) -> TipError:
+    """The error with other pairs of points at some samples, where they are nearer to one another."""
+    better = np.linalg.norm(actual - intended, axis=1) < error.size[samples]
+    points = error.intended.copy(), error.actual.copy()
+    points[0][samples[better]], points[1][samples[better]] = intended[better], actual[better]
+    return TipError(error.rows, error.fraction, *points)
 
 
 def _check_alike(intended: Curve, actual: Curve) -> None:
@@ -140,18 +166,42 @@ def _check_alike(intended: Curve, actual: Curve) -> None:
         raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")
 
 
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """The samples of a path near which the nearest points to those of another one are looked for.
+
+    wanted  (k, 4) the samples of the other one, with the length of path up to them
+    found   (k, c) the samples nearest to them
+    """
+
+    curve: Curve
+    wanted: Array
+    found: Index
+
+    @classmethod
+    def of(cls, curve: Curve, other: Curve) -> Neighbours:
+        """Of `curve`, for the samples of `other`."""
+        from scipy.spatial import KDTree
+
+        scale = curve.total / other.total if other.total else 1.0
+        wanted = np.column_stack([other.points, ALONG * scale * other.length])
+        tree = KDTree(np.column_stack([curve.points, ALONG * curve.length]))
+        _, found = tree.query(wanted, k=min(NEIGHBOURS, len(curve.rows)))
+        return cls(curve, wanted, np.asarray(found).reshape(len(wanted), -1))
+
+    def nearest(self, samples: Index) -> Array:
+        """The points of the path that are nearest to samples (j,) of the other one, (j, 3) mm."""
+        parts = [samples[part] for part in batches(len(samples))]
+        return np.concatenate(
+            [np.empty((0, 3)), *(_closest(self.curve, self.found[part], self.wanted[part]) for part in parts)]
+        )
+
+
 def nearest(curve: Curve, other: Curve) -> Array:
     """The points of `curve` that are nearest to the samples of `other`, (k, 3) mm."""
-    from scipy.spatial import KDTree
-
     if not len(other.rows):
         return np.empty((0, 3))
-    scale = curve.total / other.total if other.total else 1.0
-    wanted = np.column_stack([other.points, ALONG * scale * other.length])
-    tree = KDTree(np.column_stack([curve.points, ALONG * curve.length]))
-    _, found = tree.query(wanted, k=min(NEIGHBOURS, len(curve.rows)))
-    found = np.asarray(found).reshape(len(wanted), -1)
-    return np.concatenate([_closest(curve, found[part], wanted[part]) for part in batches(len(wanted))])
+    return Neighbours.of(curve, other).nearest(np.arange(len(other.rows)))
 
 
 def _closest(curve: Curve, found: Index, wanted: Array) -> Array:
