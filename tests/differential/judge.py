@@ -127,7 +127,7 @@ class _Judge:
         near = np.array([linear] * 3 + [rotary] * 3 + [linear] * 3) + LEFT * self.left
         by_rule = np.array([self.terms.passed(int(line)) for line in self.original.line], dtype=np.bool_)
         segments, self.seen = match(
-            self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance, by_rule
+            self.original, self.fixed, self.machine, self.length, near, self.terms.tolerance, by_rule, self.left
         )
         for k, text in segments.complaints:
             self.verdict.complain(int(self.original.line[k]), text)
@@ -169,10 +169,12 @@ class _Judge:
 
     def stood_still(self, segments: Segments) -> None:
         """An axis that is said to be left where it stood makes the way of the original, and no other."""
-        whole = self.fixed.end[segments.last] - self.fixed.start[segments.first]
-        way = np.abs(whole - (self.original.end - self.original.start))
-        for k in np.flatnonzero((way > 1e-6 + 2 * self.rough[0][:, None]) & self.left)[:3]:
-            self.verdict.complain(int(self.original.line[k // 9]), "an axis that was to be left was moved")
+        rows = np.flatnonzero(self.left.any(axis=1) & (segments.fate != Fate.WRONG))
+        whole = self.fixed.end[segments.last[rows]] - self.fixed.start[segments.first[rows]]
+        way = np.abs(whole - (self.original.end - self.original.start)[rows])
+        moved = (way > 1e-6 + 2 * self.rough[0][rows, None]) & self.left[rows]
+        for line in self.original.line[rows[moved.any(axis=1)]][:3]:
+            self.verdict.complain(int(line), "an axis that was to be left was moved")
 
     def without(self, off: Floats, command: Floats, left: NDArray[np.bool_], length: float) -> float:
         """How far a tip is off (3,) but for the ways along which axes (9,) that were left would take it."""
@@ -258,7 +260,11 @@ class _Judge:
         self, what: str, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64], u: float,
         entry: Floats, exit_: Floats,
     ) -> None:  # fmt: skip
-        """Distance of the real tip from the intended path at fraction u of every piece."""
+        """Distance of the real tip from the intended path at fraction u of every piece.
+
+        An axis that was left takes the tip along the path too, so that another of its points is the nearest one. There
+        the tip is compared with where it should be at the same time.
+        """
         if not pieces.size:
             return
         command = paths.at(self.fixed, pieces, np.full(len(pieces), u))
@@ -269,10 +275,10 @@ class _Judge:
         def intended(fraction: Floats) -> Floats:
             return self.machine.tip(paths.at(self.original, of, fraction), self.length[pieces])
 
-        fraction, distance = paths.nearest(intended, real, guess, low, high)
+        distance = paths.nearest(intended, real, guess, low, high)[1]
+        off = real - intended(guess)
         for row in np.flatnonzero(self.left[of].any(axis=1)):
-            off = (real - intended(fraction))[row]
-            distance[row] = self.without(off, command[row], self.left[of[row]], self.length[pieces[row]])
+            distance[row] = self.without(off[row], command[row], self.left[of[row]], self.length[pieces[row]])
         excused = self.entry_error(segments, pieces, of) * (1 - u)
         allowed = self.terms.tolerance + np.sqrt(3) * self.halves(of, pieces) + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
@@ -281,7 +287,7 @@ class _Judge:
     def entry_error(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> Floats:
         """How far the tip is off where a motion begins, if the one before was not corrected; it fades on the way."""
         begins = pieces == segments.first[of]
-        off = np.linalg.norm(self.started[pieces] - self.original.start[of], axis=1)
+        off = np.linalg.norm(np.where(self.left[of], 0.0, self.started[pieces] - self.original.start[of]), axis=1)
         return np.where(begins & (off > 2 * self.halves(of, pieces)), off, 0.0)
 
     def rotary_rounding(

@@ -23,6 +23,7 @@ LOOKAHEAD = 4000  # pieces that one motion may have
 FAR = 1.0  # mm, degree: a piece farther from the original path than this belongs to something else
 LINEAR = np.array([1.0] * 3 + [0.0] * 3 + [1.0] * 3)
 SMALL = 0.3  # mm: as large as a correction may be
+STILL = 1e-6  # mm, degree: rounding of what the interpreter tells
 ONE_PECK = 3  # motions: down, out, and back
 CYCLES = {730, 760, *range(810, 900, 10)}
 
@@ -69,6 +70,7 @@ class _Matcher:
     near: Floats
     tolerance: float
     by_rule: NDArray[np.bool_]
+    left: NDArray[np.bool_]
     fate: list[int] = field(default_factory=list)
     first: list[int] = field(default_factory=list)
     last: list[int] = field(default_factory=list)
@@ -136,9 +138,15 @@ class _Matcher:
         return not closed or progress[0] > 0.5 or int(self.fixed.kind[j]) == ARC
 
     def nearest(self, k: int, j: int) -> int:
-        """The last pieces of a finely cut arc may all be near its end: the one that is nearest."""
+        """The last pieces of a finely cut arc may all be near its end: the one that is nearest.
+
+        What moves an axis that the arc left where it stood is the beginning of the next motion.
+        """
         while self.original.kind[k] == ARC and j + 1 < len(self.fixed) and self.arrives(k, j + 1):
-            if not self.same_kind(k, j + 1) or self.distance(k, j + 1) >= self.distance(k, j):
+            moved = np.abs(self.fixed.end[j + 1] - self.fixed.start[j + 1]) > STILL
+            if (moved & self.left[k]).any() or not self.same_kind(k, j + 1):
+                break
+            if self.distance(k, j + 1) >= self.distance(k, j):
                 break
             j += 1
         return j
@@ -232,6 +240,7 @@ def match(
     near: Floats,
     tolerance: float,
     by_rule: NDArray[np.bool_],
+    left: NDArray[np.bool_],
 ) -> tuple[Segments, Floats]:
     """The segments, and (m, 9) where the corrected motions end as the machine with errors does them.
 
@@ -239,6 +248,7 @@ def match(
     near       (n, 9) mm, degree: how near ends must be to count as reached; the judge looks closer afterwards
     tolerance  mm: added for the ends of arcs
     by_rule    (n,) original motions that must not be touched
+    left       (n, 9) axes that were left where they stood
     """
     seen = machine.embedded(fixed.end, length) if len(fixed) else fixed.end
-    return _Matcher(original, fixed, seen, near, tolerance, by_rule).run(), seen
+    return _Matcher(original, fixed, seen, near, tolerance, by_rule, left).run(), seen
