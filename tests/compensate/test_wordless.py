@@ -189,6 +189,18 @@ def test_the_error_that_is_left_is_what_is_told() -> None:
     assert abs(off[2]).max() < 0.3e-3
 
 
+@pytest.mark.parametrize("arc", ["G2 I6 J2", "G2 Y224 I6 J2"])
+def test_the_centre_of_an_arc_goes_with_the_axis_that_is_left(arc: str) -> None:
+    """Else the radius would be another by what is left: where the other axes turn round, the tip would be off by it."""
+    done = fixed(f"G21 G90 G94 F500\nG0 X100 Y50 Z20\nT1 M6\nG1 Y220 Z30\n{arc}\nM2\n")
+    (left,) = done.report.left
+    (word,) = re.findall(r"I([\d.]+)", done.text.decode())
+    assert left.axis == "X"
+    assert left.most > 4e-3
+    assert float(word) == pytest.approx(6, abs=1e-3)
+    assert done.report.error_after_um["max"] < 1.0  # type: ignore[operator]
+
+
 # -- any program ------------------------------------------------------------------------------------------------------
 
 

@@ -75,10 +75,18 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
 
 
 def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
-    """X Y Z that the corrected path wants at `LOOKS` fractions of each arc, (k, LOOKS, 3), and the fractions."""
+    """X Y Z that the corrected path wants at `LOOKS` fractions of each arc, (k, LOOKS, 3), and the fractions.
+
+    Of axes that get no word it wants what they can do: their way as programmed, from where they stand.
+    """
     fraction = np.arange(1, LOOKS + 1) / (LOOKS + 1)
-    wanted = intent.guessed(real, np.repeat(rows, LOOKS), np.tile(fraction, len(rows)))
-    return wanted[:, intent.columns].reshape(len(rows), LOOKS, 3), fraction
+    each, at = np.repeat(rows, LOOKS), np.tile(fraction, len(rows))
+    wanted = intent.guessed(real, each, at)[:, intent.columns]
+    if intent.mute is not None:
+        off = (real.start - intent.moves.start)[each[:, None], intent.columns]
+        programmed = intent.segments.at(each, at)[:, intent.columns]
+        wanted = np.where(intent.mute[each], programmed + off, wanted)
+    return wanted.reshape(len(rows), LOOKS, 3), fraction
 
 
 def _mean_centre(intent: Intent, arcs: Segments, rows: Index, wanted: Array, fraction: Array) -> Array:
