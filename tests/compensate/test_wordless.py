@@ -201,6 +201,22 @@ def test_the_centre_of_an_arc_goes_with_the_axis_that_is_left(arc: str) -> None:
     assert done.report.error_after_um["max"] < 1.0  # type: ignore[operator]
 
 
+def test_what_is_left_on_the_way_is_told_though_the_end_is_right() -> None:
+    text = "G21 G90 G94 F500\nG0 X-150 Y50 Z20\nT1 M6\nG1 X104\nM2\n"
+    done = fixed(text, tolerance_um=COARSE)
+    first, second = (
+        follow(read(each, "part.nc", "linuxcnc"), smooth_machine(), ASSUMED).trace.moves
+        for each in (text.encode(), done.text)
+    )
+    cut, fraction = np.ones(99, dtype=np.intp), np.linspace(0.01, 1.0, 99)
+    commands = second.start[1] + fraction[:, None] * (second.end - second.start)[1]
+    off = Intent(smooth_machine(), first, State()).gap(cut, fraction, commands)
+    left = next(each for each in done.report.left if each.axis == "Z")
+    assert abs(off[-1, 2]) < 0.5e-3
+    assert abs(off[:, 2]).max() == pytest.approx(left.most, abs=0.1e-3)
+    assert left.most > 2e-3
+
+
 # -- any program ------------------------------------------------------------------------------------------------------
 
 

@@ -100,6 +100,25 @@ def distance(intent: Intent, real: Segments, rows: Index, fraction: Array) -> Ar
     return size
 
 
+def beside(intent: Intent, real: Segments, rows: Index) -> Array | None:
+    """How far axes that get no word are at most from where they should be on the way of motions `rows` (k,).
+
+    (n, n_axes) mm, 0 for other axes and motions, without the ends of motions; None if there are no such axes.
+    """
+    on = rows[lacking(intent, rows)]
+    if not on.size:
+        return None
+    assert intent.wordless is not None
+    counts, fraction = interior(intent, real, on, FIRST, 1)
+    move = on[owners(counts)]
+    result = np.zeros(intent.wordless.shape)
+    for part in slices(len(move), BATCH):
+        which, at = move[part], fraction[part]
+        off = np.abs(intent.guessed(real, which, at) - real.at(which, at))
+        np.maximum.at(result, which, np.where(intent.wordless[which], off, 0.0))
+    return result
+
+
 def uneasy_starts(intent: Intent, kept: Mask) -> Mask:
     """Motions that may not begin where they should, though the one before ended where it should, (n,).
 

@@ -19,10 +19,13 @@ class Known:
 
     before  (n,) mm: how far off the tip is without correction; NaN where that is not known
     end     (n, n_axes) commands at which it is where it should be, to 1 nm
+    beside  (n, n_axes) mm: how far axes that get no word are at most from where they should be on the way there; 0 for
+            all others. None: there are none
     """
 
     before: Array
     end: Array
+    beside: Array | None = None
 
     def at(self, written: Written, piece: Index) -> tuple[Mask, Array, Array]:
         """Which of these pieces (k,) end where errors are known, and these: before and after (k,) mm.

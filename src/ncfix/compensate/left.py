@@ -28,7 +28,7 @@ class Left:
     motions    how many motions would have moved it
     cuts       how many of these cut
     stretches  their lines, from and to
-    most       how far it is from where it should be at their ends, at most, mm or rad
+    most       how far it is from where it should be, at their ends and along cuts, at most, mm or rad
     """
 
     axis: str
@@ -62,7 +62,7 @@ class Left:
             many = f"{self.motions} motions ({self._where()}), {self.cuts or 'none'} of which cut"
         far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
         text = (
-            f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be at the end: "
+            f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be: "
             "the program has not said where it is"
         )
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
@@ -85,6 +85,8 @@ def left_where_they_stand(program: Program, settled: Settled, steps: Array, own:
     if moves.placed is None or known is None or moves.placed.all():
         return {}
     off = np.abs(known.end - moves.end - settled.shift)
+    if known.beside is not None:
+        off = np.maximum(off, known.beside)
     lacking = moves.wordless & (off >= steps / 2) & ~settled.kept[:, None]
     if own is not None:
         lacking &= own[:, None]

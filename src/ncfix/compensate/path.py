@@ -22,7 +22,7 @@ from ncfix.compensate.ends import corrected, with_closed_circles, with_rotary_as
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Cutter, Split, joined, split, taken
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.judge import deviations, uneasy_starts
+from ncfix.compensate.judge import beside, deviations, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.round import may_be_round
 from ncfix.compensate.rows import finite
@@ -97,14 +97,16 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     if (broken & bound).any():
         again = _plan(intent, strategy, demands, kept | (broken & bound))
         return replace(again, findings=(*ends.findings, _stuck(np.flatnonzero(broken & bound)), *again.findings))
-    deviation = _judged(intent, real, kept, broken, strategy, demands)
+    followed = _followed(intent, real, kept, strategy, demands)
+    deviation = _judged(intent, real, kept, broken, followed, demands)
     limit = demands.budget.path
     over = np.flatnonzero((deviation > limit) & ~bound)
     parts = _parts(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
-    return with_approaches(replace(planned, known=Known(ends.before, ends.wanted)), approaches)
+    known = Known(ends.before, ends.wanted, beside(intent, real, np.flatnonzero(followed)))
+    return with_approaches(replace(planned, known=known), approaches)
 
 
 def _real(
@@ -126,14 +128,19 @@ def _real(
     return replace(real, centre=centre, sweep=sweep, arc=programmed.arc & ~broken), broken
 
 
-def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, strategy: Strategy, demands: Demands) -> Array:
-    """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
-    deviation = np.zeros(len(kept))
+def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, demands: Demands) -> Mask:
+    """(n,) motions that are looked at along their way."""
     if not strategy.follows_path:
-        return deviation
+        return np.zeros(len(kept), dtype=bool)
     kind = intent.moves.kind
     followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
-    followed &= ~kept & intent.moving & finite(real.start)
+    result: Mask = followed & ~kept & intent.moving & finite(real.start)
+    return result
+
+
+def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: Mask, demands: Demands) -> Array:
+    """How far the tip leaves the intended path along each motion, (n,) mm; 0 where it is not looked at."""
+    deviation = np.zeros(len(kept))
     rows = np.flatnonzero(followed & ~broken)
     deviation[rows] = deviations(intent, real, rows, uneasy_starts(intent, kept), demands.budget.path)
     deviation[followed & broken] = np.inf
