@@ -15,7 +15,6 @@ from ncfix_siemens.options import SIGNS
 from ncfix_siemens.syntax import VALUE_FILES, parsed, settings
 from ncfix_siemens.table import Table
 
-WRITTEN = {"value_sign": SIGNS, "product_terms": ("", *TERMS)}
 UNSAID = "ncfix writes it as a comment: ; ncfix: value_sign=error product_terms=only X=AX1 ..."
 
 

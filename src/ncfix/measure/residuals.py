@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtr
 
 from ncfix.diagnostics import Place
 from ncfix.measure.measurement import Array, Index
@@ -55,19 +54,6 @@ def place(problem: Problem, found: Residuals, index: int) -> Place:
     measurement = problem.observations[int(found.observation[index])].measurement
     row = int(found.row[index])
     return Place(measurement.path) if row < 0 else measurement.place(row)
-
-
-def runs_test(values: Array) -> float:
-    """The probability of so few runs of one sign, in order, by chance (Wald and Wolfowitz); 1 for too few values."""
-    signs = np.sign(values[np.abs(values) > 0])
-    up, down = int((signs > 0).sum()), int((signs < 0).sum())
-    n = up + down
-    if min(up, down) < 8:
-        return 1.0
-    runs = 1 + int((np.diff(signs) != 0).sum())
-    mean = 1 + 2 * up * down / n
-    variance = (mean - 1) * (mean - 2) / (n - 1)
-    return float(ndtr((runs - mean) / np.sqrt(variance)))
 
 
 def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Generic, TypeVar
+
 import numpy as np
 
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
@@ -13,19 +15,33 @@ from ncfix.program.turns import is_dragged
 LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 
 
-class WordWriter:
-    """Puts the words of one block right; what is written is gathered in `out` and `added`."""
+LayoutT = TypeVar("LayoutT")
 
-    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
+
+class BlockWriter(Generic[LayoutT]):
+    """One block in any language, and what its motion is to become; what is written is gathered in `out` and `added`.
+
+    columns  the axes in the order in which words are added
+    half     (n_axes,) half an output step of each
+    """
+
+    def __init__(self, program: Program, block: int, layout: LayoutT, target: Target) -> None:
         self.program = program
         self.block = block
         self.layout = layout
         self.target = target
         self.out = Rendered()
         self.added: list[str] = []
-        self.code = TANGENTIAL.get(target.code, target.code)
         self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
+
+
+class WordWriter(BlockWriter[Layout]):
+    """Puts the words of one block right."""
+
+    def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
+        super().__init__(program, block, layout, target)
+        self.code = TANGENTIAL.get(target.code, target.code)
         self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
 
     def _value(self, word: Word, otherwise: float) -> float:

@@ -24,10 +24,6 @@ POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 
 POSITION_READ = "NCF241"
 ALARM = 3000
-STOPS = frozenset({ALARM, 3006})
-"""Setting these stops the machine with an alarm or a message."""
-
-Hook = Callable[[float, bool], None]
 
 
 @dataclass(slots=True)

@@ -8,11 +8,11 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.block_words import BlockWriter
 from ncfix.program.klartext.layout import Layout, tilts
 from ncfix.program.klartext.number_text import Style, value_of
 from ncfix.program.klartext.turns import on_its_side
-from ncfix.program.layout import AXIS_LETTERS
-from ncfix.program.target import Rendered, Target
+from ncfix.program.target import Target
 from ncfix.program.tree import Literal, Program, Span, Word
 
 FloatArray = NDArray[np.float64]
@@ -21,19 +21,12 @@ VECTOR_DIGITS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees; the control takes eight."""
 
 
-class WordWriter:
-    """Puts the words of one block right; what is written is gathered in `out` and `added`."""
+class WordWriter(BlockWriter[Layout]):
+    """Puts the words of one block right."""
 
     def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
-        self.program = program
-        self.block = block
-        self.layout = layout
-        self.target = target
-        self.out = Rendered()
-        self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
-        self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
+        super().__init__(program, block, layout, target)
         self.style = Style(layout.comma)
-        self.added: list[str] = []
         self.own_pole = False
 
     def _polar_columns(self) -> tuple[int, ...]:
