@@ -156,6 +156,12 @@ def test_a_wrong_setting_is_named_with_those_that_there_are() -> None:
     assert "sign" in words(caught.value)
 
 
+def test_settings_that_are_strange_or_missing_are_all_said_at_once() -> None:
+    with pytest.raises(UsageError) as caught:
+        get_control("fanuc").settings({"sing": "error", "ordre": "XYZ"})
+    assert [message.code for message in caught.value.messages] == ["NCF485"] * 3
+
+
 def test_a_perfect_machine_gets_tables_that_do_nothing() -> None:
     for control in ("fanuc", "heidenhain", "heidenhain-kinematics", "isg", "linuxcnc", "gcode"):
         made = exported(control, single_error("EXX").replace(effects=()))

@@ -99,4 +99,9 @@ CODES = {
         "The same file is named twice, perhaps under two names. Measurements that count twice look better.",
         "Leave it out once; a measurement that was repeated is another file, or has a column `repeat`.",
     ),
+    "NCF022": Code(
+        "standard input for two inputs",
+        "`-` stands for standard input, and what has been read from it is gone.",
+        "Give one of the inputs as a file.",
+    ),
 }

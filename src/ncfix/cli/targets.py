@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import IO
+from weakref import WeakSet
 
 from ncfix import files
 from ncfix.batch.gathering import Gathered, gathered
@@ -17,6 +18,8 @@ from ncfix.diagnostics import Place, UsageError
 
 STREAM = "-"
 """Standard input or output as a file name."""
+_TAKEN: WeakSet[IO[bytes]] = WeakSet()
+"""Standard input, when an input has been read from it."""
 
 
 def read(path: str) -> bytes:
@@ -30,10 +33,15 @@ def read(path: str) -> bytes:
 
 
 def stdin() -> IO[bytes]:
-    """Standard input; raises `SourceError` NCF002 if it is closed."""
+    """Standard input, once; raises `SourceError` NCF002 if it is closed, `UsageError` NCF022 if it has been taken."""
     if sys.stdin is None:
         raise files.unreadable(shown(STREAM), OSError(errno.EBADF, "it is closed"))
-    return sys.stdin.buffer
+    stream = sys.stdin.buffer
+    if stream in _TAKEN:
+        text = "standard input is to be two inputs, and can only be read once"
+        raise UsageError.of("NCF022", text, hint="give one of them as a file")
+    _TAKEN.add(stream)
+    return stream
 
 
 def shown(path: str) -> str:

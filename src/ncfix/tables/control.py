@@ -161,15 +161,20 @@ class Control(ABC):
         raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
 
     def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
-        """All options with those given; raises `UsageError` NCF485 for one unknown or, if `complete`, missing."""
-        for key in given:
-            if key not in self.options:
-                known = ", ".join(self.options) or "none"
-                raise UsageError.of("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
-        for key, option in self.options.items():
-            if complete and option.default is None and key not in given:
-                text = f"{self.name} needs the option {key!r}: {option.text}"
-                raise UsageError.of("NCF485", text, hint=f"--set {key}=VALUE")
+        """All options with those given; all that are unknown or, if `complete`, missing are `UsageError` NCF485."""
+        known = ", ".join(self.options) or "none"
+        strange = [
+            Message("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
+            for key in given
+            if key not in self.options
+        ]
+        missing = [
+            Message("NCF485", f"{self.name} needs the option {key!r}: {option.text}", hint=f"--set {key}=VALUE")
+            for key, option in self.options.items()
+            if complete and option.default is None and key not in given
+        ]
+        if strange or missing:
+            raise UsageError.collected((*strange, *missing))
         return {key: given.get(key, option.default or "") for key, option in self.options.items()}
 
     def described(self) -> dict[str, Any]:
