@@ -126,7 +126,15 @@ class Units:
             yield Part(joined(programs), moves, last)
             pending = []
             if last:
+                self._check_rest()
                 return
+
+    def _check_rest(self) -> None:
+        """Raise `NotInPartsError` if text comes after the end of the program that might belong to it."""
+        while self.follower.to_the_last and not self.rest.strip() and (more := self.read(self.size)):
+            self.rest += more
+        if self.follower.to_the_last and self.rest.strip():
+            raise NotInPartsError("text that may belong to the program comes after its end")
 
     def _texts(self) -> Iterator[tuple[Program, bool]]:
         """The text in parts that end between two blocks of plain words; True with the last one."""

@@ -12,6 +12,8 @@ from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ncfix.program.reach import runs_straight_on
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
     from ncfix.program.target import Rendered, Target
-    from ncfix.program.tree import Anchor, Program, Word
+    from ncfix.program.tree import Anchor, Program, Template, Word
 
 Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
@@ -90,6 +92,7 @@ class Language:
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
     follower  as `follow`, but for a program that comes in parts, of a dialect
+    straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -105,6 +108,7 @@ class Language:
     renumber: Callable[[bytes], bytes] | None = None
     unroll: Unroll | None = None
     follower: Callable[[Dialect, Run], Follower] | None = None
+    straight: Callable[[Template], bool] = runs_straight_on
 
 
 @lru_cache(maxsize=32)

@@ -18,10 +18,7 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.language import Language, language_of
 from ncfix.program.moves import Moves
 from ncfix.program.reader import Reading
-from ncfix.program.tree import Flow, Program, Skip, Template
-
-CALL = 980
-"""M98 in tenths."""
+from ncfix.program.tree import Program, Skip, Template
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing"})
 """The fields of `Moves` that are the same for all rows."""
@@ -37,6 +34,10 @@ class Follower(Protocol):
     @property
     def ended(self) -> bool:
         """The control has come to the end of the program."""
+
+    @property
+    def to_the_last(self) -> bool:
+        """What stands behind the end of the program matters: something was looked for that may be there."""
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part; `last`: nothing comes after it."""
@@ -91,7 +92,7 @@ class PartReader:
         reading.first_line = self.first_line
         before = len(self.templates)
         program = reading.program()
-        if not all(map(_is_straight_on, self.templates[before:])):
+        if not all(map(self.language.straight, self.templates[before:])):
             raise NotInPartsError("the program does not run straight from its first line to its last")
         return program
 
@@ -117,10 +118,6 @@ class PartReader:
         if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
             return False
         return self.language.bulk(program, block) is not None
-
-
-def _is_straight_on(template: Template) -> bool:
-    return not any(isinstance(item, Flow) for item in template.items) and CALL not in template.m_codes
 
 
 def stretch(program: Program, start: int, stop: int) -> Program:

@@ -17,6 +17,9 @@ from ncfix.program.tree import Flow, Template
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""
 
+CALL = 980
+"""M98 in tenths."""
+
 OPENING = frozenset({"sub", "if", "while", "repeat", "do"})
 CLOSING = frozenset({"endsub", "endif", "endwhile", "endrepeat"})
 PROGRAM_ENDS = frozenset({20, 300})
@@ -46,6 +49,11 @@ def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
 def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
     """As `tape_end` for languages without a mark that ends the text: what stands behind the program's end is read."""
     return len(blocks)
+
+
+def runs_straight_on(template: Template) -> bool:
+    """Whether nothing leads from a block of this shape to another part of the text, or from there to it."""
+    return not any(isinstance(item, Flow) for item in template.items) and CALL not in template.m_codes
 
 
 @dataclass(slots=True)

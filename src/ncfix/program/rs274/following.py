@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,14 +58,38 @@ class PartInterpreter(Interpreter):
         return True
 
 
-class RS274Follower:
-    """See `parts.Follower`."""
+class Walk(Protocol):
+    """An interpreter that takes one part after the other.
 
-    def __init__(self, dialect: Dialect, run: Run) -> None:
-        self.control = Control(run.setup, run.axes, run.rotary, dialect, run.kinematics)
+    ended  the program has ended
+    """
+
+    ended: bool
+
+    def go_on(self, program: Program) -> None:
+        """Take the next part."""
+
+    def run_part(self, last: bool, max_blocks: int) -> None:
+        """Follow the part to its end, or to that of the program."""
+
+
+class PartFollower(ABC):
+    """What the followers of all languages do alike; see `parts.Follower`.
+
+    to_the_last  see there
+    """
+
+    to_the_last = False
+
+    def __init__(self, control: Control, run: Run) -> None:
+        self.control = control
         self.resolve = run.resolve
         self.max_blocks = run.max_blocks
-        self.interpreter: PartInterpreter | None = None
+        self.interpreter: Walk | None = None
+
+    @abstractmethod
+    def begin(self, program: Program) -> Walk:
+        """What goes through the program, of which this is the first part."""
 
     @property
     def ended(self) -> bool:
@@ -72,7 +99,7 @@ class RS274Follower:
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""
         if self.interpreter is None:
-            self.interpreter = PartInterpreter(self.control, program, self.resolve, self.max_blocks)
+            self.interpreter = self.begin(program)
         else:
             self.interpreter.go_on(program)
         self.control.builder.clear()
@@ -99,3 +126,14 @@ class RS274Follower:
     def assumed(self) -> tuple[str, ...]:
         """What was taken as zero so far."""
         return tuple(self.control.knowledge.assumed)
+
+
+class RS274Follower(PartFollower):
+    """That of the RS274 family."""
+
+    def __init__(self, dialect: Dialect, run: Run) -> None:
+        super().__init__(Control(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+
+    def begin(self, program: Program) -> Walk:
+        """What goes through the program, of which this is the first part."""
+        return PartInterpreter(self.control, program, self.resolve, self.max_blocks)
