@@ -20,13 +20,15 @@ from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
 
+Lines = np.typing.NDArray[np.int64]
+
 MARK = re.compile(r"[;(]@ *(?P<what>[^)\n]*)")
 DIALECT = re.compile(r"[;(]@ *dialect (?P<name>\w+)")
 FLAT = "flatten"
 NEAR = 1e-3
 """mm and degrees: what is worked out by hand has so many digits."""
 
-SYSTEMS = ("G54", "G55", "G500", "G505", "G54.1P1", "G54.1P2")
+SYSTEMS = ("G54", "G55", "G500", "G505", "G54.1P1", "G54.1P2", "PRESET", "PRESET1", "PRESET2")
 NAMES = ("CUTTER 10", "DRILL 8", "PROBE_6", "2 D2")
 SETUP = Setup(
     work_offsets={name: dict.fromkeys("XYZAC", 0.0) for name in SYSTEMS},
@@ -60,22 +62,23 @@ def faults(path: Path, dialect: str, machine: Machine) -> list[str]:
     refused = {each.line: each.reason for each in report.refused}
     if flat:
         return [f"{line}: {why}" for line, why in refused.items()]
-    return [*lines_left_out(moves, text), *wrong_lines(moves, text, refused)]
+    lines = np.array([program.line(int(block)) for block in moves.block])
+    return [*lines_left_out(moves, lines, text), *wrong_lines(moves, lines, text, refused)]
 
 
-def lines_left_out(moves: Moves, text: str) -> list[str]:
+def lines_left_out(moves: Moves, lines: Lines, text: str) -> list[str]:
     """Lines with a motion of which no comment says what becomes of it."""
     known = marks(text)
-    lines = {int(block) + 1 for block, kind in zip(moves.block, moves.kind, strict=True) if kind != Kind.DWELL}
-    return [f"{line}: a motion, and no comment" for line in sorted(lines - known.keys())]
+    moving = {int(line) for line, kind in zip(lines, moves.kind, strict=True) if kind != Kind.DWELL}
+    return [f"{line}: a motion, and no comment" for line in sorted(moving - known.keys())]
 
 
-def wrong_lines(moves: Moves, text: str, refused: dict[int, str]) -> list[str]:
+def wrong_lines(moves: Moves, lines: Lines, text: str, refused: dict[int, str]) -> list[str]:
     """Lines of which the comment says something else."""
     return [
         f"{line}: {what}: {found}"
         for line, what in marks(text).items()
-        if (found := difference(moves, np.flatnonzero(moves.block == line - 1), what, refused.get(line, "")))
+        if (found := difference(moves, np.flatnonzero(lines == line), what, refused.get(line, "")))
     ]
 
 

@@ -10,7 +10,7 @@ from classes.field import faults
 from ncfix.machine import Machine, load
 
 FOLDER = Path(__file__).parent / "field"
-PROGRAMS = sorted(path for dialect in ("siemens", "fanuc") for path in (FOLDER / dialect).iterdir())
+PROGRAMS = sorted(path for dialect in ("siemens", "fanuc", "heidenhain") for path in (FOLDER / dialect).iterdir())
 
 
 @pytest.fixture(scope="module")

@@ -183,8 +183,9 @@ def seen_under(begin: FloatArray, end: FloatArray, angle: float) -> FloatArray:
     """The point from which the way from begin to end is seen under a signed angle; far away where there is none."""
     chord = end - begin
     half = math.tan(angle / 2)
-    apart = 0.5 / half if abs(half) > 1e-12 else math.inf
-    found: FloatArray = (begin + end) / 2 + apart * np.array([-chord[1], chord[0]])
+    if abs(half) < 1e-12:
+        return np.full(2, math.inf)
+    found: FloatArray = (begin + end) / 2 + 0.5 / half * np.array([-chord[1], chord[0]])
     return found
 
 

@@ -30,6 +30,9 @@ have its place in the cycle."""
 MOVED_AS_A_WHOLE = "NCF280"
 AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
 
+IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 234), 254, *range(270, 278)})
+"""Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
+
 OLD_DRILLING = frozenset({1, 2, 17, 18})
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
 DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
@@ -254,6 +257,9 @@ def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
 
 
 def own_path(control: Control, step: Step) -> None:
-    """A cycle that is not followed: the position is, and then nothing is known."""
+    """A cycle that is not followed: after it X, Y and Z stand nowhere known, and of most cycles the other axes do."""
+    position, unknown = control.position[:], dict(control.unknown)
     refuse(control, OWN_PATH.format(control.cycle.number))
+    if control.cycle.number in IN_SPACE and not step.words.axes >> (Z + 1):
+        control.position, control.unknown = position, unknown
     control.lose(range(3), AFTER_CYCLE)
