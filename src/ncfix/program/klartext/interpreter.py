@@ -13,6 +13,7 @@ from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
+from ncfix.program.klartext.lane import CORNERS, run_lane
 from ncfix.program.klartext.paths import PATHS
 from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.statements import statement
@@ -26,6 +27,7 @@ from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.tree import Opaque, Program, Span
 
 ENDLESS = "NCF233"
@@ -37,8 +39,6 @@ ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
 SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
 NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
 """Addresses in motion blocks that lead nowhere."""
-
-CORNERS = frozenset({"rnd", "chf"})
 
 
 class Recorder(Protocol):
@@ -60,6 +60,8 @@ class Interpreter:
         self.flow: FlowControl | None = None
         self.recorder: Recorder | None = None
         self.span: Span | None = None
+        self.axes = mask_of(control.machine)
+        self.no_lane: tuple[Unit | None, range] = None, range(0)
         control.locate = self.place
 
     def place(self) -> Place:
@@ -74,14 +76,15 @@ class Interpreter:
             base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
             tries = (base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper())
             found = ((each, self.resolve(each)) for each in tries if self.resolve)
-            units = (Unit(read(text, each, self.program.dialect), each) for each, text in found if text)
+            programs = ((each, read(text, each, self.program.dialect)) for each, text in found if text)
+            units = (Unit(program, self.axes, each) for each, program in programs)
             self.files[name] = next(units, None)
         return self.files[name]
 
     def run(self) -> None:
         """Follow the program to its end; raises SourceError where the control would stop."""
         try:
-            main = Unit(self.program)
+            main = Unit(self.program, self.axes)
             self.flow = FlowControl(main, self.find, self.control.scope.parameters, main.begin)
             self.control.unit = main.mm
             self.control.recompose()
@@ -95,13 +98,13 @@ class Interpreter:
         control = self.control
         while flow.block < len(flow.unit):
             unit, block = flow.unit, flow.block
-            plan = unit.plans[block]
+            plan = unit.plan(block)
+            if self.takes_stretch(flow):
+                continue
             flow.block += 1
             if plan.empty:
                 continue
-            self.budget -= 1
-            if self.budget < 0:
-                raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+            self.spend(1)
             control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
             control.external = unit.name
             if not unit.name:
@@ -113,6 +116,23 @@ class Interpreter:
             if self.execute(plan, flow):
                 return
         control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+
+    def takes_stretch(self, flow: FlowControl) -> bool:
+        """Take plain motions many at once; whether any were."""
+        unit, closed = self.no_lane
+        if self.recorder is not None or (unit is flow.unit and flow.block in closed):
+            return False
+        done, worth = run_lane(self.control, flow.unit, flow.block)
+        self.no_lane = flow.unit, range(flow.block + done, worth)
+        flow.block += done
+        self.spend(done)
+        return done > 0
+
+    def spend(self, blocks: int) -> None:
+        """Count blocks that are executed; raises `Fault` when there are too many."""
+        self.budget -= blocks
+        if self.budget < 0:
+            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
 
     def is_skipped(self) -> bool:
         """Whether blocks with `/` are passed over."""
@@ -269,9 +289,8 @@ class Interpreter:
 
     def corner_ahead(self, flow: FlowControl) -> bool:
         """Whether the next block makes a corner of the end of this one."""
-        plans = flow.unit.plans
-        following = (plans[block] for block in range(flow.block, len(plans)) if not plans[block].empty)
-        return next((plan.name in CORNERS for plan in following), False)
+        following = flow.unit.next_plan(flow.block)
+        return following is not None and following.name in CORNERS
 
     def move(self, plan: Plan, step: Step) -> None:
         """What moves in a block, if anything does."""

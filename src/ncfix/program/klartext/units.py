@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.program.klartext.lane_tables import LaneTables
 from ncfix.program.klartext.plans import Plan, plan_of
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.rs274.unit import view
 from ncfix.program.tree import Program
 
 NO_BEGIN = "NCF275"
@@ -18,36 +24,88 @@ class Unit:
     """One program.
 
     name     the file's name, if it was called; empty for the main program
+    axes     bit mask of the letters that the machine has
     numbers  the numbers of the program
     first    where those of each block begin
-    plans    what each block does
     labels   label -> its block, the first of that name
     begin    the block after BEGIN PGM
     mm       mm per unit of length
     """
 
-    def __init__(self, program: Program, name: str = "") -> None:
+    def __init__(self, program: Program, axes: int, name: str = "", before: Unit | None = None) -> None:
         self.program = program
+        self.axes = axes
         self.name = name
-        self.numbers: list[float] = program.numbers.tolist()
-        self.first: list[int] = program.first_number.tolist()
-        shapes = [plan_of(template) for template in program.templates]
-        self.plans: list[Plan] = [shapes[index] for index in program.template.tolist()]
-        self.labels: dict[str, int] = {}
-        for block, plan in enumerate(self.plans):
-            if plan.flow is not None and plan.flow.keyword == "label":
-                self.labels.setdefault(str(plan.flow.label), block)
-        self.begin, self.mm = self._beginning()
+        self.numbers: Sequence[float] = view(program.numbers)
+        self.first: Sequence[int] = view(program.first_number)
+        self.template: Sequence[int] = view(program.template)
+        self._plans: list[Plan] = [] if before is None else before._plans
+        self._plans += map(plan_of, program.templates[len(self._plans) :])
+        self._lanes: LaneTables | None = None
+        self._stops: NDArray[np.int64] | None = None
+        self.labels = self._found_labels()
+        self.begin: int = 0
+        self.mm: float = 1.0 if before is None else before.mm
+        if before is None:
+            self.begin, self.mm = self._beginning()
+
+    def followed_by(self, program: Program) -> Unit:
+        """The next part of the same program: its templates are those of this one, and more."""
+        return Unit(program, self.axes, self.name, self)
 
     def __len__(self) -> int:
-        return len(self.plans)
+        return len(self.template)
+
+    def plan(self, block: int) -> Plan:
+        """What a block does."""
+        return self._plans[self.template[block]]
+
+    def next_plan(self, block: int) -> Plan | None:
+        """What the first block from there on does that does anything."""
+        plans = map(self.plan, range(block, len(self)))
+        return next((plan for plan in plans if not plan.empty), None)
+
+    # -- the fast lane ------------------------------------------------------------------------------------------------
+
+    @property
+    def lanes(self) -> LaneTables:
+        """The shapes of the program as the fast lane sees them."""
+        if self._lanes is None:
+            self._lanes = LaneTables.of(self.program.templates, self._plans, self.axes)
+        return self._lanes
+
+    def lane_end(self, block: int) -> int:
+        """The first block from `block` on that cannot go through the fast lane."""
+        if self._stops is None:
+            closed = ~self.lanes.open[self.program.template]
+            self._stops = np.append(np.flatnonzero(closed), len(self))
+        return int(self._stops[np.searchsorted(self._stops, block)])
+
+    # -- labels, and where it begins ----------------------------------------------------------------------------------
+
+    def _blocks_of(self, shapes: list[int]) -> list[int]:
+        """The blocks of some shapes, in order."""
+        return np.flatnonzero(np.isin(self.program.template, shapes)).tolist() if shapes else []
+
+    def _found_labels(self) -> dict[str, int]:
+        found: dict[str, int] = {}
+        flows = [plan.flow for plan in self._plans]
+        for block in self._blocks_of(
+            [i for i, flow in enumerate(flows) if flow is not None and flow.keyword == "label"]
+        ):
+            flow = flows[self.template[block]]
+            assert flow is not None
+            found.setdefault(str(flow.label), block)
+        return found
 
     def _beginning(self) -> tuple[int, float]:
         """The block after BEGIN PGM, and the unit that it names."""
-        for block, plan in enumerate(self.plans):
-            if plan.statement is None or plan.statement[0] != "program":
-                continue
-            text = self.program.slice(block, plan.statement[1])
+        statements = [plan.statement for plan in self._plans]
+        heads = [i for i, statement in enumerate(statements) if statement is not None and statement[0] == "program"]
+        for block in self._blocks_of(heads):
+            statement = statements[self.template[block]]
+            assert statement is not None
+            text = self.program.slice(block, statement[1])
             if found := BEGIN.match(text):
                 return block + 1, self._unit(found["rest"])
         raise Fault(NO_BEGIN, "there is no BEGIN PGM: this is no Klartext program")

@@ -57,7 +57,7 @@ class Recorder:
 
     def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
         """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
-        plan = unit.plans[block]
+        plan = unit.plan(block)
         if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
             return
         holes = self.holes(plan, control)
@@ -107,7 +107,7 @@ class Recorder:
 
     def is_left_out(self, unit: Unit, block: int) -> bool:
         """Whether a statement is not written: program ends, and what only makes sense with labels and calls."""
-        statement = unit.plans[block].statement
+        statement = unit.plan(block).statement
         assert statement is not None
         text = " ".join(unit.program.slice(block, statement[1]).upper().split())
         return statement[0] == "program" or text.startswith(NOT_WRITTEN)

@@ -1,0 +1,162 @@
+"""The fast lane of Klartext: stretches of straight motions with plain numbers, taken all at once.
+
+It does what the interpreter would do block by block, with the same operations in the same order, so that the results
+are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix import fast
+from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.lane_tables import FEED, RAPID
+from ncfix.program.klartext.lines import FLAT
+from ncfix.program.klartext.units import Unit
+from ncfix.program.moves import FeedMode, Kind
+from ncfix.program.rs274.builder import Stretch
+from ncfix.program.rs274.lane import filled, followed, followed_compiled, left_adrift
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SHORTEST = 16
+"""Stretches of fewer blocks go one by one."""
+
+LONGEST = 1 << 16
+"""Blocks that are taken at once."""
+
+CORNERS = frozenset({"rnd", "chf"})
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A stretch as the control takes it, one row per block.
+
+    path    (n + 1, 9) the command before the first block, and at the end of each
+    feed    (n,) feed in force, mm/min
+    motion  (n,) `RAPID` or `FEED`
+    side    (n,) radius compensation in force
+    mask    (n,) axis words, as bits; 0: the block moves nothing
+    """
+
+    path: FloatArray
+    feed: FloatArray
+    motion: IntArray
+    side: IntArray
+    mask: IntArray
+
+    def head(self, count: int) -> Stage:
+        """The first blocks of it."""
+        if count == len(self.feed):
+            return self
+        return Stage(
+            self.path[: count + 1], self.feed[:count], self.motion[:count], self.side[:count], self.mask[:count]
+        )
+
+
+def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
+    """Take the stretch that begins with a block.
+
+    Returns how many blocks are taken, 0 for none, and the first block at which it is worth while to try again.
+    """
+    if not is_open(control):
+        return 0, block + 1
+    end = unit.lane_end(block)
+    stop = before_corner(unit, block, min(end, block + LONGEST))
+    if stop - block < SHORTEST:
+        return 0, end + 1
+    stage = stage_of(control, unit, block, stop)
+    count = count_on_one_turn(control, stage)
+    if count < SHORTEST:
+        return 0, block + count + 1
+    take(control, stage.head(count), unit, block)
+    return count, block + count
+
+
+def before_corner(unit: Unit, block: int, stop: int) -> int:
+    """Where a stretch has to stop: the motion before a corner (RND, CHF) is no plain one."""
+    following = unit.next_plan(stop)
+    if following is None or following.name not in CORNERS:
+        return stop
+    busy = np.flatnonzero(~unit.lanes.empty[unit.program.template[block:stop]])
+    return block + int(busy[-1]) if len(busy) else stop
+
+
+def is_open(control: Control) -> bool:
+    """Whether the state allows the fast lane at all."""
+    modal, path = control.modal, control.path
+    known = not (control.unknown or control.shaky) and control.preset_checked and control.tool_called
+    turned = control.is_rotated or control.transformations.tilted
+    special = path.corner or path.by_vector or path.spatial or control.cycle.modal or control.ends is not None
+    plain = modal.feed_mode == FeedMode.PER_MINUTE and not (modal.incremental or modal.arc_absolute)
+    return known and plain and not (turned or special)
+
+
+def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
+    """What the blocks of a stretch say, and where they lead."""
+    program, tables = unit.program, unit.lanes
+    shapes, first = program.template[start:stop], program.first_number[start:stop]
+    follow = followed_compiled if fast.engaged() else followed
+    path, words = follow(control, program.numbers, first, shapes, tables.words)
+    feed = filled(control.unit * words, ~np.isnan(words), control.modal.feed)
+    own = tables.side[shapes]
+    side = filled(own.astype(np.float64), own >= 0, control.modal.compensated).astype(np.int64)
+    return Stage(path, feed, tables.words.motion[shapes], side, tables.words.mask[shapes])
+
+
+def count_on_one_turn(control: Control, stage: Stage) -> int:
+    """How many blocks run before one in which a rotary axis takes the shorter way round past a turn (M126)."""
+    if not control.shortest:
+        return len(stage.feed)
+    turns = np.zeros(len(stage.feed), dtype=np.bool_)
+    for index in control.machine:
+        if control.rotary[index]:
+            turns |= np.rint(np.diff(stage.path[:, index]) / (2 * math.pi)) != 0
+    return int(np.argmax(turns)) if turns.any() else len(turns)
+
+
+def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
+    """Add the motions of a stretch, and leave the control as they leave it."""
+    control.suspended.pop("M130", None)
+    control.external, control.tilted = unit.name, False
+    last = block + len(stage.feed) - 1
+    control.row_block = control.row_block if unit.name else last
+    moving = np.flatnonzero(stage.mask != 0)
+    if len(moving):
+        blocks = np.full(len(moving), control.row_block) if unit.name else block + moving
+        mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
+        styles = styles_of(control, stage.motion[moving], stage.side[moving])
+        adrift = left_adrift(control, mask)
+        control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
+        control.position = ends[-1].tolist()
+        keep_tangent(control, stage.path)
+    control.modal.feed = float(stage.feed[-1])
+    control.modal.compensated = int(stage.side[-1])
+
+
+def styles_of(control: Control, motion: IntArray, side: IntArray) -> IntArray:
+    """The styles of motions whose start and end are known."""
+    styles = np.empty(len(motion), dtype=np.int64)
+    for sided in np.unique(side).tolist():
+        control.modal.compensated = sided
+        for code, kind in ((RAPID, Kind.RAPID), (FEED, Kind.FEED)):
+            rows = (motion == code) & (side == sided)
+            if rows.any():
+                styles[rows] = control.style_of(kind, code)
+    return styles
+
+
+def keep_tangent(control: Control, path: FloatArray) -> None:
+    """Note in which direction the last motion went that had a way."""
+    ways = np.diff(path[:, :3], axis=0)
+    for row in np.flatnonzero(np.abs(ways).max(axis=1) > FLAT / 2)[::-1].tolist():
+        x, y, z = ways[row].tolist()
+        length = math.hypot(x, y, z)
+        if length > FLAT:
+            control.path.tangent = (x / length, y / length, z / length)
+            return
