@@ -10,14 +10,21 @@ from ncfix.program.rs274.control import Unknown
 from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, rotated
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
+from ncfix.program.sinumerik.increments import unsteady
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
 
 RUNTIME = "where the axis {} stands is known only at run time"
+RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
 POLAR = "NCF223"
 POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
 NO_POLE = "polar coordinates (AP, RP) while no pole is known"
+NO_RADIUS = "a polar radius (RP) of zero: the control takes the distance from the pole instead"
+ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the axes have left the last polar position"
 TURN = 2 * math.pi
+POLAR_WORDS = frozenset({"AP", "RP"})
+NEAR_POLE = 1e-6
+"""mm"""
 STILL = 1e-9
 """rad; an axis that is nearer to where it shall be stands there already."""
 
@@ -87,7 +94,11 @@ def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: 
     """Take one axis word."""
     index, value = INDEX[letter], words.values[letter]
     form = words.forms.get(letter, "")
-    if form != INCREMENTAL and (form or not control.modal.incremental):
+    incremental = counts_on(control, form)
+    if incremental and (why := unsteady(control, index)):
+        lost[index] = why
+        return
+    if not incremental:
         control.check_offset()
         lost.pop(index, None)
         if index in control.shaky:
@@ -96,8 +107,9 @@ def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: 
         lost[index] = RUNTIME
         return
     step = control.scale[index] * value
-    if form == INCREMENTAL or (not form and control.modal.incremental):
-        step *= 2.0 if index == 0 and control.modal.diameter and control.modes.diameter == "DIAM90" else 1.0
+    if incremental:
+        if index == 0 and control.modes.diameter == "DIAM90":
+            words.refusal, step = words.refusal or RADIUS, 2.0 * step
         program[index] += step
     elif form in TURNING:
         program[index] = turned(form, program[index], step, known=index not in control.lost)
@@ -107,6 +119,11 @@ def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: 
     else:
         assert form in ("", ABSOLUTE)
         program[index] = step
+
+
+def counts_on(control: Sinumerik, form: str) -> bool:
+    """Whether a word in this form is an increment."""
+    return form == INCREMENTAL or (not form and control.modal.incremental)
 
 
 def turned(form: str, here: float, angle: float, *, known: bool) -> float:
@@ -138,16 +155,45 @@ def polar(control: Sinumerik, words: Words, program: Vector, lost: Unknown) -> s
     """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
     plane, pole = control.modal.plane, control.modes.pole
     angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
+    why = doubtful_polar_word(control, words, program, radius)
     control.modes.polar = angle, radius
     control.check_offset()
-    if pole is None or angle is None or radius is None:
-        lost |= dict.fromkeys((plane.first, plane.second), RUNTIME if pole else NO_POLE)
+    if pole is None or angle is None or radius is None or why:
+        lost |= dict.fromkeys((plane.first, plane.second), why or (RUNTIME if pole else NO_POLE))
         return {plane.first, plane.second}
     program[plane.first] = pole[0] + radius * math.cos(angle)
     program[plane.second] = pole[1] + radius * math.sin(angle)
     for index in (plane.first, plane.second):
         lost.pop(index, None)
     return {plane.first, plane.second}
+
+
+def doubtful_polar_word(control: Sinumerik, words: Words, here: Vector, radius: float | None) -> str:
+    """Why nobody can say where polar words lead, though they are known.
+
+    A radius of zero means the distance of the start. A radius alone goes with the angle of the start, or with the last
+    one; increments count from either. So the axes must stand where the last polar words have led them.
+    """
+    if radius is not None and abs(radius) < NEAR_POLE:
+        return NO_RADIUS
+    forms = {address: counts_on(control, words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
+    angle, distance = control.modes.polar
+    first = angle if forms.get("AP", True) else None
+    second = distance if forms.get("RP", False) else None
+    return "" if first is second is None or stands_there(control, here, first, second) else ASIDE
+
+
+def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance: float | None) -> bool:
+    """Whether the axes stand at this angle and distance about the pole, as far as they are given."""
+    plane, pole = control.modal.plane, control.modes.pole
+    if pole is None or control.lost.keys() & {plane.first, plane.second}:
+        return False
+    x, y = here[plane.first] - pole[0], here[plane.second] - pole[1]
+    near = distance is None or abs(math.hypot(x, y) - distance) < NEAR_POLE
+    if angle is None:
+        return near
+    ahead, aside = x * math.cos(angle) + y * math.sin(angle), x * math.sin(angle) - y * math.cos(angle)
+    return near and ahead > NEAR_POLE and abs(aside) < NEAR_POLE
 
 
 def doubtful_polar(control: Sinumerik, words: Words) -> str:
@@ -165,7 +211,7 @@ def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
         return None
     value *= math.pi / 180 if address == "AP" else control.stretch
     form = words.forms.get(address, "")
-    if form == INCREMENTAL or (not form and control.modal.incremental):
+    if counts_on(control, form):
         return None if before is None else before + value
     return value
 
@@ -179,6 +225,7 @@ def set_pole(control: Sinumerik, words: Words, code: int) -> None:
         control.settle_all()
         known = not {plane.first, plane.second} & control.lost.keys()
         known = known and not control.places.adrift & mask_of((plane.first, plane.second))
+        known = known and not (unsteady(control, plane.first) or unsteady(control, plane.second))
         base = (here[plane.first], here[plane.second]) if known else None
     elif code == 1120:
         base = control.modes.pole or (0.0, 0.0)
@@ -206,8 +253,10 @@ def machine_destination(control: Sinumerik, words: Words) -> End:
         if letter not in words.values:
             continue
         index, value, form = INDEX[letter], words.values[letter], words.forms.get(letter, "")
-        if form == INCREMENTAL or (not form and control.modal.incremental):
+        if counts_on(control, form):
             target[index] += control.of_setup(letter) * (value or 0.0)
+            if why := unsteady(control, index, by_machine=True):
+                unknown[index] = why
         else:
             target[index] = tool[index] + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
             unknown.pop(index, None)

@@ -11,11 +11,14 @@ from ncfix.program.rs274.coordinates import INCH, INDEX, PLANES, Vector, zeros
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.increments import had_from_the_start
 from ncfix.program.sinumerik.state import Sinumerik
 
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"
 ROTARY_FRAME = "a {} of a rotary axis"
+MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
+FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
 LENGTH_ACROSS = "$sc_tool_length_const"
 PLANE_LENGTH = (
@@ -38,9 +41,28 @@ def programmable(control: Sinumerik, name: str, words: Words) -> None:
         control.suspended["frame"] = fault
     elif name == kind:
         control.suspended.pop("frame", None)
-    before = control.frames.program if name != kind else WORLD
-    control.frames.program = before.then(frame)
+    frames = control.frames
+    before = frames.program if name != kind else WORLD
+    if name == kind:
+        over_fine(control, name, words)
+    elif name == "atrans":
+        plain = frames.added is not None and before.rotation == WORLD.rotation and before.scale == 1.0
+        frames.added = total(frames.added or WORLD.shift, frame.shift) if plain else None
+    frames.program = before.then(frame)
     control.refresh()
+
+
+def over_fine(control: Sinumerik, name: str, words: Words) -> None:
+    """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
+    frames = control.frames
+    if frames.fine and axis_values(words):
+        control.suspended["frame"] = FINE_STAYS.format(name.upper())
+    frames.added, frames.fine = WORLD.shift, False
+
+
+def total(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
+    """Two shifts as one."""
+    return tuple(a + b for a, b in zip(first, second, strict=True))
 
 
 def translation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
@@ -95,15 +117,23 @@ def unit(control: Sinumerik, index: int) -> float:
 
 
 def programmed_shift(control: Sinumerik, words: Words, code: int) -> None:
-    """G58 and G59 with axis words: the shift of the programmable frame is replaced, or added to."""
+    """G58 and G59 with axis words replace the absolute and the additive part of the shift."""
     values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
     if any(value is None for value in words.values.values()):
         control.refusal = control.refusal or FRAME_AT_RUNTIME.format(f"G{code // 10}")
         return
-    frame = control.frames.program
+    frames = control.frames
+    shift, added = frames.program.shift, frames.added
+    if added is None:
+        control.suspended["frame"] = MIXED_SHIFTS.format(code // 10)
+        return
     if code == 590:
-        values = {index: value + frame.shift[index] for index, value in values.items()}
-    control.frames.program = with_shift(frame, values)
+        frames.added = with_shift(Affine(added), values).shift
+        values = {index: shift[index] - added[index] + value for index, value in values.items()}
+        frames.fine = True
+    else:
+        values = {index: value + added[index] for index, value in values.items()}
+    frames.program = with_shift(frames.program, values)
     control.refresh()
 
 
@@ -183,7 +213,9 @@ def take_up(control: Sinumerik) -> None:
     vector: Vector = zeros()
     vector[2] = control.knowledge.tool_length(0)
     control.tools.offset = 0
+    before = control.footing
     control.switch_tcp(vector)
+    had_from_the_start(control, before)
 
 
 def set_length(control: Sinumerik) -> None:

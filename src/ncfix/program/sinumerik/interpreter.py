@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import reduce
+from operator import or_
+
+import numpy as np
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
@@ -15,6 +19,7 @@ from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.calling import call_word
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.increments import stand
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.poles import all_or_none
@@ -117,6 +122,7 @@ class Interpreter:
             if course.unit.plan(course.block).lane is not None and self.lane_is_open():
                 done = run_lane(control, course.unit, course.block, main)  # type: ignore[arg-type]
                 if done:
+                    self.stand(done)
                     course.block += done
                     control.heading = None
                     self.spend(done)
@@ -130,10 +136,18 @@ class Interpreter:
     def lane_is_open(self) -> bool:
         """Whether plain motions may go many at a time."""
         control = self.control
-        if self.recorder is not None:
+        if self.recorder is not None or (control.modal.incremental and control.counted != control.footing):
             return False
         busy = control.at_start or control.modes.modal_cycle or self.course.sections or self.tangents
         return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90")
+
+    def stand(self, blocks: int) -> None:
+        """The axes that these blocks have named have been brought somewhere."""
+        control, unit, block = self.control, self.course.unit, self.course.block
+        if control.counted != control.footing:
+            shapes = np.unique(unit.program.template[block : block + blocks])
+            named = reduce(or_, (unit.plan_of_shape(shape).axes for shape in shapes.tolist()))
+            stand(control, named, by_machine=False)
 
     def spend(self, blocks: int) -> None:
         """Count executed blocks; raises `Fault` when there are too many."""

@@ -22,12 +22,16 @@ class Frames:
     settable  its shift
     swivel    the plane of CYCLE800
     program   TRANS, ROT, SCALE, MIRROR
+    added     what of its shift is the additive part (ATRANS, G59), mm and rad; None where nobody can say
+    fine      G59 has set that part
     """
 
     name: str = NO_SYSTEM
     settable: Affine = WORLD
     swivel: Affine = WORLD
     program: Affine = WORLD
+    added: tuple[float, ...] | None = WORLD.shift
+    fine: bool = False
 
     @property
     def whole(self) -> Affine:

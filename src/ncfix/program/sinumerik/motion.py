@@ -62,8 +62,6 @@ def straight(control: Sinumerik, words: Words, code: int) -> None:
 
 def refusal_of(control: Sinumerik, words: Words) -> str:
     """Why a straight motion is refused, though its end is known."""
-    if control.modes.diameter == "DIAM90" and "X" in words.values and control.modal.incremental:
-        return "an increment of X as a radius while absolute ones are diameters (DIAM90)"
     if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.runtime("RND", "RNDM", "CHF", "CHR"):
         return "a rounding or chamfer is known only at run time"
     if "ANG" in words.values:
@@ -82,7 +80,7 @@ def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
     kind = Kind.RAPID if code == 0 else Kind.FEED
-    control.go(kind, words, end, code, passing=MACHINE.format(name))
+    control.go(kind, words, end, code, passing=MACHINE.format(name), by_machine=True)
 
 
 def measure(control: Sinumerik, words: Words) -> None:
@@ -114,7 +112,7 @@ def to_reference(control: Sinumerik, words: Words, code: int) -> None:
     lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
     words = Words(words.block, {}, {}, sum(1 << index for index in gone))
     end = End(control.position[:], unknown, lost)
-    control.go(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code])
+    control.go(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
 
 
 def dwell(control: Sinumerik, words: Words) -> None:

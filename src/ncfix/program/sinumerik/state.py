@@ -27,6 +27,7 @@ from ncfix.program.rs274.modal import Modal
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Setup
 from ncfix.program.sinumerik.affine import WORLD, shifted
+from ncfix.program.sinumerik.increments import Footing, footings, stand
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
 from ncfix.program.sinumerik.variables import Variables
 
@@ -59,6 +60,7 @@ class Sinumerik(Control):
     whole  the motion must not be split
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
+    counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
     heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
@@ -84,6 +86,7 @@ class Sinumerik(Control):
         self.named = Named()
         super().__init__(setup, axes, rotary, dialect, kinematics)
         self.lost = dict(self.unknown)
+        self.counted: list[Footing] = list(self.footing)
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
@@ -101,6 +104,7 @@ class Sinumerik(Control):
         if self.modal.diameter:
             self.scale[0] /= 2
         self._frame = -1
+        self.footing = footings(self, whole)
         if self.rotation != before:
             self.hide_in_turned_frame()
         self.places.watch(self.anchors(), self.rotation)
@@ -240,8 +244,12 @@ class Sinumerik(Control):
         passing: str = "",
         arc: Arc | None = None,
         settles: int | None = None,
+        by_machine: bool = False,
     ) -> None:
-        """A motion to `end`, with the reason for which it is refused or passed; `settles` as in `Control.move`."""
+        """A motion to `end`, with the reason for which it is refused or passed; `settles` as in `Control.move`.
+
+        by_machine  its words are machine coordinates
+        """
         axes = words.axes
         if words.values.keys() & {"AP", "RP"}:
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
@@ -254,6 +262,7 @@ class Sinumerik(Control):
         self._note_heading(kind, end, arc, follows=not passing and not refusal)
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
         self.whole = False
+        stand(self, axes, by_machine=by_machine)
         self.forget_settled()
 
     def _counted(self, words: Words) -> list[int]:
