@@ -13,8 +13,9 @@ from time import process_time
 from typing import Any
 
 from ncfix import fast
-from ncfix.compensate import path, settle, stream
+from ncfix.compensate import corrector, path, settle, stream
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.task import Task
 from ncfix.machine import load
 from ncfix.program import dialects, parts
 from ncfix.program.rs274.following import RS274Follower
@@ -35,8 +36,8 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
     ("split what leaves the tolerance", path, "_parts"),
     ("check limits", settle, "findings"),
     ("write: which words change, digits", settle, "emit"),
-    ("write: put the text together", stream, "spliced"),
-    ("figures: tip errors before and after", stream, "path_error"),
+    ("write: put the text together", corrector, "spliced"),
+    ("figures: tip errors before and after", corrector, "path_error"),
 )
 
 
@@ -55,7 +56,7 @@ def main() -> None:
 
 def corrected(source: bytes) -> None:
     """Correct a program, part by part."""
-    task = stream.Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
+    task = Task(load(MACHINE), SETUP, FixOptions(), None, "part.nc", dialects.get("linuxcnc"))
     stream.Stream(task, io.BytesIO(source).read, lambda data: None).run()
 
 

@@ -13,11 +13,12 @@ from typing import Any
 import pytest
 
 from ncfix import fast
-from ncfix.compensate import stream
+from ncfix.compensate import corrector
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError
-from ncfix.compensate.stream import Stream, Task
+from ncfix.compensate.stream import Stream
+from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Machine, load
 from ncfix.program import dialects
@@ -174,7 +175,7 @@ def test_a_writer_that_gets_one_digit_wrong_is_caught(
         text = spliced(source, splices)
         return with_a_digit_wrong(text, rng) if parts == broken else text
 
-    monkeypatch.setattr(stream, "spliced", wrong)
+    monkeypatch.setattr(corrector, "spliced", wrong)
     try:
         for broken in (1, 2, 3, 1, 2, 3, 1, 2, 3):
             parts = 0

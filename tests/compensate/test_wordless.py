@@ -18,7 +18,8 @@ from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.stream import Stream, Task
+from ncfix.compensate.stream import Stream
+from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
 from ncfix.program.dialects import get

@@ -98,7 +98,8 @@ class Job:
     def _outlet(
         self, source: Source, target: Target, dialect: Dialect, find: Find, jobs: int
     ) -> Iterator[tuple[Stream, Outlet]]:
-        from ncfix.compensate.stream import Stream, Task
+        from ncfix.compensate.stream import Stream
+        from ncfix.compensate.task import Task
 
         if source.size is None or source.size >= compiled_from():
             fast.engage()

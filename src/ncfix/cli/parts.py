@@ -29,7 +29,7 @@ COPIED = 1 << 20
 
 def part_bytes() -> int:
     """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
-    from ncfix.compensate.stream import PART_BYTES
+    from ncfix.compensate.task import PART_BYTES
 
     said = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
     if not said.isdecimal() or int(said) < 1:

@@ -1,0 +1,168 @@
+"""The parts of a program, corrected and proved one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.compensate.crew import Read, Share
+from ncfix.compensate.double import suspected
+from ncfix.compensate.findings import Mask
+from ncfix.compensate.fix import stamp_of
+from ncfix.compensate.following import placed
+from ncfix.compensate.proof import SelfCheckError, differences
+from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
+from ncfix.compensate.tally import Tally
+from ncfix.compensate.task import Task
+from ncfix.compensate.units import Part, Unit, Units
+from ncfix.compensate.verify import path_error
+from ncfix.diagnostics import Message, NcfixError
+from ncfix.machine import State
+from ncfix.program import stamp
+from ncfix.program.moves import Moves
+from ncfix.program.parts import NotInPartsError, PartReader
+from ncfix.program.tree import Program
+from ncfix.program.writer import Splices, spliced
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A part that has been corrected and proved; of the first one, what makes one think that it was corrected before.
+
+    text   what it is now
+    tally  what there is to report of it
+    """
+
+    text: bytes
+    tally: Tally
+    suspicion: tuple[Message, ...] = ()
+
+
+class Corrector:
+    """Goes through a program and corrects its parts, or some of them. `work` is called once.
+
+    head     the first part
+    at       where the stamp stands in what is written
+    stamped  the stamp, as far as it was known then; empty if there is none
+    """
+
+    def __init__(self, task: Task, read: Read) -> None:
+        self.task = task
+        self.machine = placed(task.machine, task.setup)
+        reader = PartReader(task.path, task.dialect)
+        self.units = Units(
+            task.machine, self.machine, task.setup, task.options, reader, task.follower(), read, task.size
+        )
+        self.again, self.proof = PartReader(task.path, task.dialect), task.follower()
+        self.again.templates, self.again.index = reader.templates, reader.index
+        self.head: Program | None = None
+        self.at = 0
+        self.stamped = b""
+
+    def work(self, share: Share) -> Iterator[tuple[int, Done]]:
+        """The number of each part of the share, and what it has become; the others are only followed."""
+        foreign = False
+        for number, unit in enumerate(self.units):
+            if not share.has(number):
+                foreign = True
+                self.again.first_line += len(unit.part.program)
+                self.proof.follow(unit.part.program, unit.part.last)
+                continue
+            yield number, self._corrected(unit, number, share, foreign)
+            foreign = False
+
+    def stamp(self) -> bytes:
+        """The stamp as it has to be by what is known now."""
+        assert self.head is not None
+        text = stamp_of(self.head, self.task.machine, self.task.options, self.units.assumed)
+        return stamp.insertion(self.head, text).text
+
+    def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
+        """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
+        task, part = self.task, unit.together()
+        moves = part.moves
+        nowhere = np.zeros(len(moves.axes))
+        guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
+        first: Agreed | None = agree(moves, self.machine, task.dialect, task.options, guess)
+        before = share.before(number)
+        if before is not None:
+            before = replace(before, direction=unit.direction)
+            first = None if before.kept or _still_off(moves, before) else first
+        settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
+        if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
+            raise NotInPartsError("a refusal reaches back into an earlier part")
+        if not part.last:
+            share.leave(_left(settled))
+        text = self._text(part.program, settled, before is None)
+        if before is not None and foreign:
+            self.proof.stand(before.position)
+        own = np.ones(len(moves), dtype=bool)
+        own[:1] = unit.head is None
+        self._prove(text, settled, own, part.last)
+        tally = Tally()
+        tally.add(part.program, settled, own, increments(self.machine))
+        if task.options.verify:
+            self._look(part, settled, own, unit, tally)
+        return Done(text, tally, self._suspicion(settled) if before is None else ())
+
+    def _suspicion(self, settled: Settled) -> tuple[Message, ...]:
+        return suspected(settled, self.machine.least_increment[0], self.task.path, self.task.options.force)
+
+    def _text(self, program: Program, settled: Settled, first: bool) -> bytes:
+        """The corrected text of a part."""
+        splices = settled.emission.splices
+        if not first:
+            stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
+            return spliced(program.source, splices)[stop:]
+        edit = stamp.insertion(program, stamp_of(program, self.task.machine, self.task.options, ()))
+        self.at = edit.start
+        self.head = program
+        if len(splices):
+            self.stamped = self.stamp()
+            edit = replace(edit, text=self.stamped)
+            splices = Splices.joined([splices, Splices.of([edit])])
+        return spliced(program.source, splices)
+
+    def _prove(self, text: bytes, settled: Settled, own: Mask, last: bool) -> None:
+        """The text is read and followed again: the control must understand what the plan meant."""
+        try:
+            program = self.again.read(text)
+            again = self.proof.follow(program, last)
+        except NcfixError as error:
+            raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
+        self.again.first_line += len(program)
+        wrong = differences(settled, again, own[settled.plan.pieces.move])
+        if wrong is None or wrong.any():
+            raise NotInPartsError("the program takes frames or values from where the machine stands")
+
+    def _look(self, part: Part, settled: Settled, own: Mask, unit: Unit, tally: Tally) -> None:
+        """Find out the tip errors before and after, with the numbers as the control will understand them."""
+        emission, moves = settled.emission, settled.moves
+        pieces = replace(settled.plan.pieces, end=emission.end, centre=emission.centre)
+        errors = path_error(
+            self.machine,
+            moves,
+            pieces,
+            emission.start,
+            state=State() if unit.head is None else State(direction=unit.direction),
+            rows=own & settled.shown(self.task.options.split_rapids),
+            tilts=False,
+            known=settled.plan.known,
+        )
+        tally.figures(errors, part.program.lines(moves.block))
+
+
+def _still_off(moves: Moves, before: Before) -> bool:
+    """Whether an axis goes on standing off its place where a part begins, which its plan did not know."""
+    return bool((moves.wordless[0] & (before.shift != 0)).any())
+
+
+def _left(settled: Settled) -> Before:
+    """What a part leaves to the next one, but for the way in which the axes came there."""
+    plan, moves = settled.plan, settled.moves
+    shift = plan.start[-1] - moves.start[-1]
+    shift = np.where(np.isfinite(shift), shift, 0.0)
+    nowhere = np.zeros(len(shift), dtype=np.int8)
+    return Before(bool(settled.kept[-1]), shift, nowhere, settled.emission.end[-1].copy())

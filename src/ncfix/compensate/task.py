@@ -1,0 +1,50 @@
+"""What all parts of a program that is corrected while it is read have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.strategies import get_strategy
+from ncfix.machine import Machine
+from ncfix.program.dialect import Dialect
+from ncfix.program.language import Run, language_of
+from ncfix.program.parts import Follower, NotInPartsError
+from ncfix.program.setup import Setup
+
+PART_BYTES = 3 << 19
+"""How much text is a part: the columns of a part take about thirty times as much memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What all parts of a program have in common.
+
+    resolve  gives the text of a subprogram file by its name
+    size     bytes of a part
+    """
+
+    machine: Machine
+    setup: Setup
+    options: FixOptions
+    resolve: Resolve | None
+    path: str
+    dialect: Dialect
+    size: int = PART_BYTES
+
+    def follower(self) -> Follower:
+        """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
+        make = language_of(self.dialect).follower
+        if make is None:
+            raise NotInPartsError(f"{self.dialect.title} is followed as a whole")
+        axes, rotary = self.machine.axis_names, rotary_names(self.machine)
+        kinematics = kinematics_of(self.machine)
+        found: Follower = make(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
+        return found
+
+    def check(self) -> None:
+        """Raise `NotInPartsError` for what has to be looked at as a whole."""
+        strategy = get_strategy(self.options.strategy)
+        if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
+            raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
