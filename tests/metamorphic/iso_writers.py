@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -154,11 +155,66 @@ def by_tip(machine: Machine):
     return write
 
 
+def steady(path: Route) -> Route:
+    """The same places with the tool always tilted to one side: there is one way to it, and it is the nearest."""
+    return [replace(step, a=round(10.0 + abs(step.a) / 2, 3), c=round(step.c / 3, 3)) for step in path]
+
+
+def by_direction(machine: Machine):
+    """With tool-centre-point control, and the direction of the tool as a vector (G43.5)."""
+
+    def write(path: Route) -> str:
+        path = steady(path)
+        q = positions(path, machine)
+        ways = machine.tip(q, 0.0) - machine.tip(q, 100.0)
+        first = f"G0 {tilting(machine)}{path[0].a:.3f} C{path[0].c:.3f}\n"
+        lines = [
+            f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} I{v[0]:.7f} J{v[1]:.7f} K{v[2]:.7f} F500."
+            for (p, step), v in zip(tip_words(path, machine), ways, strict=True)
+        ]
+        return HEAD + first + "G43.5 H1\n" + "\n".join(lines) + "\n" + TAIL
+
+    return write
+
+
+def by_angles(machine: Machine):
+    """The same with rotary words (G43.4)."""
+    tips = by_tip(machine)
+
+    def write(path: Route) -> str:
+        path = steady(path)
+        first = f"G0 {tilting(machine)}{path[0].a:.3f} C{path[0].c:.3f}\n"
+        return tips(path).replace("G43.4 H1\n", first + "G43.4 H1\n")
+
+    return write
+
+
 TURN = (20.0, 30.0, -10.0)
 ORIGIN = np.array([12.0, -7.5, 3.0])
 
 
-def in_plane(machine: Machine):
+def as_angles(rotation: np.ndarray) -> str:
+    """The plane by Euler angles."""
+    return "G68.2 X{:.3f} Y{:.3f} Z{:.3f} I{:.3f} J{:.3f} K{:.3f}\n".format(*ORIGIN, *TURN)
+
+
+def as_points(rotation: np.ndarray) -> str:
+    """The plane by three points, the frame of which is turned once more about Z."""
+    x, y, _ = (rotation @ turn("z", -25.0)).T
+    points = (ORIGIN, ORIGIN + 40.0 * x, ORIGIN + 30.0 * y - 20.0 * x)
+    lines = [f"G68.2 P2 Q{n} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f}\n" for n, p in enumerate(points, 1)]
+    return "G68.2 P2 Q0 X0 Y0 Z0 R25.\n" + "".join(lines)
+
+
+def as_vectors(rotation: np.ndarray) -> str:
+    """The plane by two vectors."""
+    x, _, z = rotation.T
+    origin = "X{:.3f} Y{:.3f} Z{:.3f}".format(*ORIGIN)
+    vectors = ["I{:.8f} J{:.8f} K{:.8f}".format(*(3.0 * v)) for v in (x, z)]
+    return f"G68.2 P3 Q1 {origin} {vectors[0]}\nG68.2 P3 Q2 {vectors[1]}\n"
+
+
+def in_plane(machine: Machine, said: Callable[[np.ndarray], str] = as_angles):
     """The same in a tilted plane (G68.2)."""
     tilt = tilting(machine)
 
@@ -170,8 +226,7 @@ def in_plane(machine: Machine):
             lines.append(
                 f"G{min(step.code, 1)} X{p[0]:.6f} Y{p[1]:.6f} Z{p[2]:.6f} {tilt}{step.a:.3f} C{step.c:.3f} F500."
             )
-        frame = "G68.2 X{:.3f} Y{:.3f} Z{:.3f} I{:.3f} J{:.3f} K{:.3f}\n".format(*ORIGIN, *TURN)
-        return HEAD + "G43 H1\n" + frame + "\n".join(lines) + "\nG69\n" + TAIL
+        return HEAD + "G43 H1\n" + said(rotation) + "\n".join(lines) + "\nG69\n" + TAIL
 
     return write
 

@@ -71,7 +71,18 @@ def test_tip_control_on_and_off(dialect: str, name: str, root: Path, figures: Ca
 
 
 @pytest.mark.parametrize("name", FIVE_AXES)
-def test_tilted_plane_on_and_off(name: str, root: Path, figures: Callable[[str], None]) -> None:
+def test_a_vector_and_rotary_words(name: str, root: Path, figures: Callable[[str], None]) -> None:
     found = without_play(load(str(root / f"examples/machines/{name}.toml")))
-    relation = Relation(f"G68.2 and G43.4 of {name}", write.in_plane(found), write.by_tip(found), 3 * STEP, rotary=True)
-    check(relation, "fanuc", found, figures)
+    ways = write.by_direction(found), write.by_angles(found)
+    check(Relation(f"G43.5 and G43.4 of {name}", *ways, 3 * STEP, rotary=True), "fanuc", found, figures)
+
+
+FORMS = {"G68.2": write.as_angles, "G68.2 P2": write.as_points, "G68.2 P3": write.as_vectors}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", FIVE_AXES)
+def test_tilted_plane_on_and_off(name: str, form: str, root: Path, figures: Callable[[str], None]) -> None:
+    found = without_play(load(str(root / f"examples/machines/{name}.toml")))
+    ways = write.in_plane(found, FORMS[form]), write.by_tip(found)
+    check(Relation(f"{form} and G43.4 of {name}", *ways, 3 * STEP, rotary=True), "fanuc", found, figures)

@@ -103,6 +103,12 @@ TRACE_CODES: dict[str, Code] = {
         "with all rotary axes at zero, or as it lies at that moment, is set on the control; ncfix takes the first.",
         "Switch G43.4 on with the rotary axes at zero, or make sure of the parameters (19696 WKP, 19754 RPS).",
     ),
+    "NCF219": Code(
+        "Direction of the tool that the machine cannot take",
+        "A direction of the tool (I J K of G43.5) has no length, or is one in which the rotary axes cannot point the "
+        "tool within their travels. A control raises an alarm.",
+        "Check the vector, and that the machine file is the right one.",
+    ),
     "NCF220": Code(
         "Impossible arc",
         "The control would refuse the arc: it does not close, has no radius or no centre, or cannot reach its end.",

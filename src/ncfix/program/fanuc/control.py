@@ -9,7 +9,8 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.rules import RULES
 from ncfix.program.fanuc.variables import Variables
 from ncfix.program.moves import Kinematics
-from ncfix.program.rs274.control import Control
+from ncfix.program.pointing import Pointing
+from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.setup import POINTLESS, Setup
 from ncfix.program.tree import Template
@@ -26,6 +27,11 @@ class MacroControl(Control):
     length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
     length_number  the last H; None if the program has named none
     coming         gives the shapes of the blocks that follow in the text
+    defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
+    dynamic        the work offset turns with the tables (G254 of Haas)
+    vectors        the direction of the tool is given by I J K (G43.5)
+    points         somewhere in the program it has been
+    pointing       how the machine points its tool; empty until it is asked, None in it if it cannot be known
     """
 
     def __init__(
@@ -43,6 +49,12 @@ class MacroControl(Control):
         self.length_code = 0
         self.length_number: int | None = None
         self.coming: Callable[[], Iterable[Template]] = lambda: ()
+        self.defining = 0
+        self.definition: dict[int, Block] = {}
+        self.dynamic = False
+        self.vectors = False
+        self.points = False
+        self.pointing: list[Pointing | None] = []
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

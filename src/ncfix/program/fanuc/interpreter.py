@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from ncfix.program.fanuc import polar, system
+from ncfix.program.fanuc import dynamic, polar, system, vectors
 from ncfix.program.fanuc.arithmetic import variable_number
 from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
@@ -23,8 +23,9 @@ from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import NON_MODAL, ROTATION
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
-from ncfix.program.rs274.order import DWELL
+from ncfix.program.rs274.order import DWELL, MACHINE
 from ncfix.program.rs274.parameters import Store
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 
@@ -240,14 +241,38 @@ class MacroInterpreter(Interpreter):
             if is_system(number):
                 system.was_set(self.control, number, value, runtime)
 
+    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+        """The motion code that a block executes; a direction of the tool (G43.5) is a motion, too."""
+        found = super().motion_of(plan, codes)
+        vector = self.control.vectors and not plan.letters.isdisjoint(vectors.COMPONENTS)
+        if found is None and vector and codes.motion is None and not codes.takes:
+            return self.control.modal.motion if self.control.modal.motion in vectors.STRAIGHT else None
+        return found
+
     def move(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block."""
         before = self.control.builder.count
-        super().move(block, codes, motion)
+        if dynamic.turned(self.control, block):
+            self.control.suspended[dynamic.KEY] = dynamic.MOVED
+        if self.control.vectors:
+            self.by_vector(block, codes, motion)
+        else:
+            super().move(block, codes, motion)
         self.moved = self.control.builder.count > before
         if self.moved and not self.unit_said:
             text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
             self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
+
+    def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
+        control, axes = self.control, vectors.turning(self.control)
+        before, why = control.refusal, "" if MACHINE in codes.g.values() else vectors.directed(control, block, motion)
+        control.refusal = before or why
+        super().move(block, codes, motion)
+        if why:
+            control.refusal = before
+            control.lose(axes if why != vectors.ON_ARC or block.values.keys() & {*"IJK"} else (), vectors.AFTER_VECTOR)
+        control.places.lose(mask_of(axes))
 
     # -- calls and ends -----------------------------------------------------------------------------------------------
 

@@ -13,10 +13,11 @@ from ncfix.program.fanuc.blocks import parse_block
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.corners import axes_of_corner, has_corners
 from ncfix.program.fanuc.interpreter import MacroInterpreter
+from ncfix.program.fanuc.render import render
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Run
-from ncfix.program.layout import Layout
+from ncfix.program.layout import CENTRE_LETTERS, Layout
 from ncfix.program.moves import Trace
 from ncfix.program.rs274.language import RS274, writable
 from ncfix.program.rs274.unroll import unrolled
@@ -42,7 +43,8 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
     walk.run()
-    return finished(walk.control, program, walk.control.builder.moves())
+    moves = replace(walk.control.builder.moves(), pointing=walk.control.pointing[0] if walk.control.points else None)
+    return finished(walk.control, program, moves)
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
@@ -53,6 +55,8 @@ def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What blocks need to be written many at a time; those with a number without a point are not."""
     words = program.templates[int(program.template[block])].words
+    if any(word.address in CENTRE_LETTERS for word in words):
+        return None
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None
@@ -71,6 +75,7 @@ FANUC: Language = replace(
     parse=parse_block,
     follow=follow,
     layout=layout,
+    render=render,
     bulk=in_bulk,
     unroll=unroll,
     follower=None,

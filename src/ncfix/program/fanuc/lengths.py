@@ -8,10 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.program.fanuc.data import CHANGED
+from ncfix.program.fanuc.vectors import INCLINED, turning
 from ncfix.program.rs274 import lengths
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.coordinates import Z
 from ncfix.program.rs274.groups import LENGTH
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.tree import Comment, Tape, Word
 
 if TYPE_CHECKING:
@@ -29,10 +31,15 @@ TURNED_TEXT = (
     "rotary axes stand turned where G43.4 is switched on; X Y Z are taken to ride on the workpiece as it lies with all"
     " of them at zero (parameters 19696 WKP, 19754 RPS)"
 )
-TIP_CONTROL = (434, 435)
+BY_ANGLE, BY_VECTOR = 434, 435
+HAAS_TIP = 2340
+TIP_CONTROL = (BY_ANGLE, BY_VECTOR)
 NOTHING = 1e-12
 PLAIN_CANCEL = 490
 CANCEL = (PLAIN_CANCEL, 491)
+SAME = {491: PLAIN_CANCEL, BY_VECTOR: BY_ANGLE, HAAS_TIP: BY_ANGLE}
+"""What codes do to the length of the tool."""
+
 G91 = 910
 REFERENCE = frozenset((280, 300, 530))
 ENDS = frozenset((20, 300))
@@ -45,6 +52,7 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
     """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
     before = control.offsets.tool[Z]
     control.suspended.pop(CHANGED, None)
+    direct(control, block, code)
     if code in CANCEL:
         control.length_code = 0
     else:
@@ -52,9 +60,19 @@ def tool_offset(control: MacroControl, block: Block, code: int) -> None:
         take_number(control, block)
         if code in TIP_CONTROL:
             note_turned(control)
-    lengths.tool_offset(control, block, PLAIN_CANCEL if code in CANCEL else code)
+    lengths.tool_offset(control, block, SAME.get(code, code))
     if control.offsets.tool[Z] != before and "Z" not in block.values and not settled(control):
         control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
+
+
+def direct(control: MacroControl, block: Block, code: int) -> None:
+    """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them."""
+    control.suspended.pop(INCLINED, None)
+    control.vectors = code == BY_VECTOR
+    if control.vectors:
+        control.places.lose(mask_of(turning(control)))
+        if block.get("Q") != 0.0:
+            control.suspended[INCLINED] = INCLINED
 
 
 def settled(control: MacroControl) -> bool:
@@ -94,6 +112,8 @@ def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:
     if "H" not in block.values or LENGTH in codes.g or codes.call is not None:
         return
     if control.length_code:
+        inclined = {key: why for key, why in control.suspended.items() if key == INCLINED}
         tool_offset(control, block, control.length_code)
+        control.suspended |= inclined
     else:
         control.length_number = whole(block.values["H"], "H")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix.program.fanuc import data, lengths, mirror, polar, references, tilt
+from ncfix.program.fanuc import data, dynamic, lengths, mirror, polar, references, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
 from ncfix.program.fanuc.variables import is_system
@@ -33,6 +33,7 @@ FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} 
     670: MACRO,
     491: groups.LENGTH,
     531: groups.NON_MODAL,
+    536: groups.NON_MODAL,
     270: groups.NON_MODAL,
     290: groups.NON_MODAL,
     682: groups.ROTATION,
@@ -75,6 +76,7 @@ FANUC = Rules(
         501: mirror.mirror,
         511: mirror.mirror,
         531: tilt.align,
+        536: tilt.align,
         680: tilt.rotate,
         682: tilt.tilt,
         683: tilt.tilt,
@@ -83,7 +85,7 @@ FANUC = Rules(
         **dict.fromkeys(ALL_CYCLES, cycle),
     },
     cycles=ALL_CYCLES,
-    takes=frozenset({40, 100, 270, 290, 531, 650, 660, 661, 670}),
+    takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670}),
     system=is_system,
     compiled=compiled,
 )
@@ -96,8 +98,17 @@ HAAS_MADE = (120, 130, 470, 1500)
 
 HAAS = replace(
     FANUC,
-    g_groups=FANUC_G | dict.fromkeys(HAAS_MADE, groups.NON_MODAL) | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM),
-    steps={**FANUC.steps, **dict.fromkeys(HAAS_MADE, data.made), **dict.fromkeys(HAAS_OFFSETS, data.extended)},
+    g_groups=FANUC_G
+    | dict.fromkeys(HAAS_MADE, groups.NON_MODAL)
+    | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM)
+    | {lengths.HAAS_TIP: groups.LENGTH, dynamic.ON: groups.ROTATION, dynamic.OFF: groups.ROTATION},
+    steps={
+        **FANUC.steps,
+        **dict.fromkeys(HAAS_MADE, data.made),
+        **dict.fromkeys(HAAS_OFFSETS, data.extended),
+        **dict.fromkeys((dynamic.ON, dynamic.OFF), dynamic.dynamic_offset),
+        lengths.HAAS_TIP: lengths.tool_offset,
+    },
     takes=FANUC.takes | set(HAAS_MADE),
     repeats="L",
     adds_rotations=True,

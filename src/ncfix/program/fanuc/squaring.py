@@ -21,18 +21,21 @@ if TYPE_CHECKING:
 
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
 LENGTH = 100.0
+PLACES = (X, Y, Z)
 
 
 @dataclass(frozen=True, slots=True)
 class Squared:
     """Where the machine stands when the tool is square to the frame.
 
-    position  the command, all letters
+    position  the command, all letters, where the linear axes stand still
+    about_tip the same where they follow, and the tip stays where it is
     degrees   angle of each letter
     several   other rotary positions would do as well
     """
 
     position: Vector
+    about_tip: Vector
     degrees: tuple[float, ...]
     several: bool
 
@@ -55,16 +58,26 @@ def turned_square(control: MacroControl) -> Squared | None:
     position = control.position[:]
     for index, value in zip(machine, kinematics(here, off, on), strict=True):
         position[index] = value
-    return Squared(position, tuple(value / DEGREE for value in position), len(ways) > 1)
+    about_tip = [position[i] if control.rotary[i] else control.position[i] for i in range(len(position))]
+    return Squared(position, about_tip, tuple(value / DEGREE for value in position), len(ways) > 1)
 
 
 def pointing_of(control: MacroControl) -> Pointing | None:
     """How the machine points its tool; None unless by two rotary axes."""
+    if not control.pointing:
+        control.pointing.append(found_out(control))
+    return control.pointing[0]
+
+
+def found_out(control: MacroControl) -> Pointing | None:
+    """`pointing_of`, asked of the kinematics."""
     machine, kinematics = control.machine, control.kinematics
     turning = [column for column, index in enumerate(machine) if control.rotary[index]]
     if kinematics is None or len(turning) != 2:
         return None
-    spatial = [machine.index(index) for index in (X, Y, Z)]
+    spatial = [machine.index(index) for index in PLACES if index in machine]
+    if len(spatial) < len(PLACES):
+        return None
 
     def direction(first: float, second: float) -> NDArray[np.float64]:
         values = [0.0] * len(machine)

@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ncfix.program.fanuc.planes import are_square, by_axes, by_points, euler, in_order
 from ncfix.program.fanuc.squaring import SQUARED, turned_square
 from ncfix.program.moves import Kind
 from ncfix.program.rs274 import tcp
@@ -16,13 +19,10 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.coordinates import (
     IDENTITY,
     LETTERS,
-    PLANES,
     Rotation,
     X,
     Y,
     Z,
-    about,
-    product,
     zeros,
 )
 from ncfix.program.rs274.settings import unfollowed
@@ -33,51 +33,87 @@ if TYPE_CHECKING:
     from ncfix.program.rs274.control import Block
 
 TILT, CANCEL = 682, 690
-EULER, ROLL_PITCH_YAW = 0, 1
+EULER, ROLL_PITCH_YAW, POINTS, VECTORS = range(4)
 ORDER = 123
 """X, Y, Z: the order of the turns of G68.2 P1, if its Q does not name another."""
 
-ABOUT = {"1": PLANES[190], "2": PLANES[180], "3": PLANES[170]}
-"""The plane in which a turn about X, Y or Z is."""
+LAST = {POINTS: 3, VECTORS: 2}
+"""Q of the last of the blocks that together say how the plane lies."""
 
-ALIGNMENT = "tool axis alignment (G53.1)"
-NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane (G53.1) is not known"
+DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
+NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
 TURNED_TO = "NCF243"
+ALIGNMENTS = {531: "tool axis alignment (G53.1)", 536: "tool axis alignment (G53.6)"}
+ABOUT_TIP = 536
 
 
 def tilt(control: MacroControl, block: Block, code: int) -> None:
-    """G68.2 X Y Z I J K: the frame at X Y Z, turned by I J K; forms that are not followed are refused."""
+    """G68.2: the frame at X Y Z, turned as its P says; forms that are not followed are refused."""
     form = whole(block.get("P", EULER), "P of G68.2")
-    order = str(whole(block.get("Q", ORDER), "Q of G68.2"))
-    known = form == EULER or (form == ROLL_PITCH_YAW and sorted(order) == ["1", "2", "3"])
-    if control.mirrored or code != TILT or not known:
+    if control.mirrored or code != TILT or not is_followed(block, form):
         unfollowed(control, block, code)
         return
     if block.runtime:
         control.refusal = control.refusal or "the tilted plane (G68.2) is known only at run time"
+    if form in LAST:
+        define(control, block, form)
+        return
     angles = block.get("I"), block.get("J"), block.get("K")
+    begin(control, euler(*angles) if form == EULER else in_order(order_of(block), angles), block)
+
+
+def is_followed(block: Block, form: int) -> bool:
+    """Whether a block says how the plane lies in a way that is certain."""
+    number, turned = whole(block.get("Q", -1.0), "Q of G68.2"), bool(block.get("R"))
+    if form == POINTS:
+        shifted = any(block.get(letter) for letter in "XYZ")
+        return not shifted if number == 0 else number in (1, 2, 3) and {"X", "Y", "Z"} <= block.values.keys()
+    if form == VECTORS:
+        return number in (1, 2) and not turned and not block.values.keys().isdisjoint("IJK")
+    in_known_order = form == EULER or (form == ROLL_PITCH_YAW and sorted(order_of(block)) == ["1", "2", "3"])
+    return in_known_order and not turned
+
+
+def order_of(block: Block) -> str:
+    """The order of the turns, "123"."""
+    return str(whole(block.get("Q", ORDER), "Q of G68.2"))
+
+
+def define(control: MacroControl, block: Block, form: int) -> None:
+    """One of the blocks that give three points (Q1 to Q3, turned by R of Q0), or vectors along X and Z (Q1, Q2)."""
+    number = whole(block.get("Q"), "Q of G68.2")
+    if form != control.defining or number == 0 or number in control.definition:
+        control.defining, control.definition = form, {}
+    control.definition[number] = block
+    given = control.definition
+    if not {*range(1, LAST[form] + 1)} <= given.keys():
+        control.suspended[DEFINING] = DEFINING
+        return
+    control.definition = {}
+    control.suspended.pop(DEFINING, None)
+    if form == POINTS:
+        first, second, third = (np.array([given[n].get(letter) for letter in "XYZ"]) for n in (1, 2, 3))
+        turn = given[0].get("R") if 0 in given else 0.0
+        begin(control, by_points(first, second, third, turn), given[1])
+        return
+    x, z = (np.array([given[n].get(letter) for letter in "IJK"]) for n in (1, 2))
+    if are_square(x, z):
+        begin(control, by_axes(x, z), given[1])
+    else:
+        unfollowed(control, block, TILT)
+
+
+def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
+    """Into the tilted plane whose origin a block names."""
     end(control)
-    control.offsets.rotation = euler(*angles) if form == EULER else in_order(order, angles)
+    control.offsets.rotation = rotation
     feature = zeros()
     for index in (X, Y, Z):
-        feature[index] = control.modal.unit * block.get(LETTERS[index])
+        feature[index] = control.modal.unit * origin.get(LETTERS[index])
     control.offsets.feature = feature
     control.tilted = True
     tcp.switch(control, control.offsets.tool, True)
     control.refresh()
-
-
-def euler(first: float, second: float, third: float) -> Rotation:
-    """Turned about Z, then about the new X, then about the new Z, degrees."""
-    return product(about(PLANES[170], first), product(about(PLANES[190], second), about(PLANES[170], third)))
-
-
-def in_order(order: str, angles: tuple[float, float, float]) -> Rotation:
-    """Turned about X, Y and Z of the workpiece in an order such as "123", degrees."""
-    rotation = IDENTITY
-    for axis in order:
-        rotation = product(about(ABOUT[axis], angles[int(axis) - 1]), rotation)
-    return rotation
 
 
 def rotate(control: MacroControl, block: Block, code: int) -> None:
@@ -86,6 +122,8 @@ def rotate(control: MacroControl, block: Block, code: int) -> None:
         unfollowed(control, block, CANCEL if code == CANCEL else TILT)
         return
     if code == CANCEL:
+        control.definition = {}
+        control.suspended.pop(DEFINING, None)
         end(control)
     elif block.values.keys() & {"I", "J", "K"}:
         unfollowed(control, block, TILT)
@@ -103,19 +141,30 @@ def end(control: MacroControl) -> None:
     control.refresh()
 
 
-# -- G53.1 ------------------------------------------------------------------------------------------------------------
+# -- G53.1, G53.6 -----------------------------------------------------------------------------------------------------
 
 
 def align(control: MacroControl, block: Block, code: int) -> None:
-    """G53.1: the rotary axes turn so that the tool stands square to the plane; the linear axes stand still."""
+    """The rotary axes turn so that the tool stands square to the plane.
+
+    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
+    """
     turning = [index for index in control.machine if control.rotary[index]]
     target, unknown = control.position[:], dict(control.unknown)
     found = turned_square(control) if turning else None
     if turning and found is None:
         unknown |= {index: NOT_SOLVED for index in (*turning, X, Y, Z) if index in control.machine}
     elif found is not None:
-        target = found.position
+        target = found.about_tip if code == ABOUT_TIP else found.position
         if found.several:
             angles = " ".join(f"{LETTERS[index]}{found.degrees[index]:.3f}" for index in turning)
-            control.warn(TURNED_TO, f"G53.1 is taken to turn to {angles}, the nearest of several ways", SQUARED)
-    control.move(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENT)
+            name = f"G{code / 10:g}"
+            control.warn(TURNED_TO, f"{name} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+    if code == ABOUT_TIP and (block.get("R") or not control.length_code or is_other_length(control, block)):
+        unknown |= {index: NOT_SOLVED for index in (X, Y, Z) if index in control.machine}
+    control.move(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code])
+
+
+def is_other_length(control: MacroControl, block: Block) -> bool:
+    """Whether H of a block is another length than the one in force."""
+    return "H" in block.values and whole(block.values["H"], "H") != control.tools.offset

@@ -208,7 +208,7 @@ class Interpreter:
         codes = plan.codes or self.computed_codes(plan)
         if codes.unknown:
             self.unknown_codes(plan, codes)
-        motion = motion_of(control, plan, codes)
+        motion = self.motion_of(plan, codes)
         check_words(control, plan, codes, motion)
         if plan.command is not None:
             self.command(plan.command)
@@ -219,6 +219,10 @@ class Interpreter:
         if self.recorder:
             self.recorder.words(self.flow.unit, index, plan, codes, block)
         return self.after(codes, block)
+
+    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+        """The motion code that a block executes."""
+        return motion_of(self.control, plan, codes)
 
     def settings(self, codes: Codes, block: Block) -> None:
         """What a block sets before its motion."""

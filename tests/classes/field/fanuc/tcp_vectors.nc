@@ -1,9 +1,22 @@
 O0013
 G21 G90 G17 G54
 T1 M6
-G0 A0 C0 (@ A0)
-G43.5 H1 X0 Y0 Z50. I0 J0 K1. (@ refused)
-G1 X10. I0 J-0.5 K0.8660254 F500. (@ refused)
-X20. (@ refused)
+G0 A0 C0 (@ A0 C0)
+G43.5 H1 X0 Y0 Z50. I0 J0 K1. (@ X0 Y0 Z50 A0 C0)
+G1 X10. I0 J-0.5 K0.8660254 F500. (@ X10 Y0 Z50 A30 C0)
+X20. (@ X20 Y0 Z50 A30 C0)
+I0.5 K0.8660254 (@ X20 Z50 A30 C90)
+Y5. I50. J0. K86.60254 (@ Y5 A30 C90)
+G0 X20. Y5. Z50. (@ refused)
+G3 X10. Y15. R10. (@ refused)
+G0 X10. Y15. Z50. (@ refused)
+G2 X20. Y5. I0 J-10. (@ refused)
+G1 X0 A10. (@ refused)
+G1 X0 Y0 Z50. (@ refused)
 G49
+G0 X0 Y0 Z100. A0 C0 (@ X0 Y0 Z100 A0)
+G43.5 H1 Q2. Z50. (@ refused)
+G1 X10. I0 J-0.5 K0.8660254 (@ refused)
+G49
+G0 X0 Y0 Z100. A0 C0 (@ X0 Y0 Z100 A0)
 M30
