@@ -17,6 +17,7 @@ from ncfix.compensate.budget import Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
+from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.idle import without_idle
 from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
@@ -115,9 +116,9 @@ def settle(
     first    the plan to begin with, from `agree`, if that has been made already
     """
     agreed = first or agree(moves, machine, program.dialect, options, before)
-    done = None if before is None else before.position
+    done, kinematics = None if before is None else before.position, kinematics_of(machine)
     while True:
-        emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done)
+        emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done, kinematics)
         moving = without_idle(moves, agreed.plan.pieces, emission, 0 if done is None else 1)
         if moving is not agreed.plan.pieces:
             agreed = replace(agreed, plan=replace(agreed.plan, pieces=moving))

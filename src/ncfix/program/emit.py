@@ -16,7 +16,7 @@ from ncfix.program.bulk import Bulk
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.levels import LevelBook
-from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
+from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule, TcpState
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
@@ -30,6 +30,8 @@ FloatArray = NDArray[np.float64]
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
 FLOW = "the block is more than words"
 MODE_LOST = "a kept block that follows relies on its motion code"
+ALIKE = 1e-7
+"""mm and rad; positions that are the same but for rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,24 +89,33 @@ def emit(
     least_increment: FloatArray,
     reading: Reading | None = None,
     done: FloatArray | None = None,
+    kinematics: Kinematics | None = None,
 ) -> Emission:
     """Write `pieces` into the program.
 
     least_increment  (n_axes,) mm and rad: what the control can resolve
     reading          what a control made of an earlier attempt, if it was not what was meant
     done             (n_axes,) the command at the end of the first motion, if that is written already
+    kinematics       what the machine's own say where tool-centre-point control goes on or off; else an attempt shows it
     """
     reading = reading or Reading(moves.frame, moves.frames)
-    return _Emitter(program, moves, pieces, least_increment, reading).run(done)
+    return _Emitter(program, moves, pieces, least_increment, reading, kinematics).run(done)
 
 
 class _Emitter:
     """The walk over the motions; `run()` is called once."""
 
     def __init__(
-        self, program: Program, moves: Moves, pieces: Pieces, least_increment: FloatArray, reading: Reading
+        self,
+        program: Program,
+        moves: Moves,
+        pieces: Pieces,
+        least_increment: FloatArray,
+        reading: Reading,
+        kinematics: Kinematics | None,
     ) -> None:
         self.program = program
+        self.kinematics = kinematics
         self.language = language_of(program.dialect)
         self.moves = moves
         self.pieces = pieces
@@ -187,9 +198,26 @@ class _Emitter:
     def _resync(self, row: int) -> None:
         """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
         jump = self.jumps[row]
-        if jump.any():
+        if jump.any() and not self._switched(row):
             read = self.moves.start if self.reading.start is None else self.reading.start
             self.position = np.where(jump, read[row], self.position)
+
+    def _switched(self, row: int) -> bool:
+        """Where nothing but tool-centre-point control, or a tool length in it, has changed: the axes stand still.
+
+        X Y Z have other numbers then, also those that a correction has put beside their places.
+        """
+        if row == 0 or self.kinematics is None or self.reading.start is not None:
+            return False
+        moves, states = self.moves, [_tcp_state(self.moves, each) for each in (row - 1, row)]
+        known = bool(np.isfinite([self.position, moves.end[row - 1], moves.start[row]]).all())
+        if states[0] == states[1] or not known:
+            return False
+        meant = self.kinematics(moves.end[row - 1].tolist(), *states)
+        if np.abs(meant - moves.start[row]).max() > ALIKE:
+            return False
+        self.position = np.array(self.kinematics(self.position.tolist(), *states))
+        return True
 
     def _retract(self, row: int) -> None:
         """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
@@ -348,6 +376,12 @@ class _Emitter:
                 edits.append(Edit(at, at, "".join(self.eol + line for line in rendered.lines).encode("latin-1")))
                 added += len(rendered.lines)
         return tuple(edits), added
+
+
+def _tcp_state(moves: Moves, row: int) -> TcpState:
+    """Whether tool-centre-point control is on in a motion, and with which length."""
+    on = bool(moves.tcp[row])
+    return TcpState(on, float(moves.tool_length[row]) if on else 0.0)
 
 
 def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> FloatArray:

@@ -268,13 +268,18 @@ def test_plain_blocks_go_through_the_fast_lane_with_the_same_result() -> None:
     assert np.array_equal(fast.programmed, slow.programmed)
 
 
-def test_ct_does_not_go_on_from_an_older_motion() -> None:
-    """Many plain motions go at once and leave no direction behind; CT in a file of its own asks for it too late."""
+def test_ct_goes_on_from_the_last_of_many_motions_that_went_at_once() -> None:
     plain = "".join(f"X{n} Y{n % 3}\n" for n in range(400))
+    turn = 2 * math.atan2(1 * 50 + 2 * 101, 1 * 101 - 2 * 50)
     found = follow(f"G0 X-5 Y0\nG1 F100\n{plain}SUB1\n", files={"SUB1": "CT X500 Y50\nM17\n"}).moves
-    assert "direction" in found.reasons[found.reason[-1]]
-    known = follow(f"G0 X-5 Y0\nG1 F100\n{plain}CT X500 Y50\n").moves
-    assert known.sweep[-1] == pytest.approx(2 * math.atan2(1 * 50 + 2 * 101, 1 * 101 - 2 * 50))
+    assert found.sweep[-1] == pytest.approx(turn)
+    for between in ("", "F200\n", "A3\n" * 30, "X399 Y0\n" * 20):
+        known = follow(f"G0 X-5 Y0 A3\nG1 F100\n{plain}{between}CT X500 Y50\n", axes="XYZA").moves
+        assert known.sweep[-1] == pytest.approx(turn)
+    lost = follow(
+        f"G0 X-5 Y0\nG1 F100\n{plain}{''.join(f'A{n}' + chr(10) for n in range(40))}CT X500 Y50\n", axes="XYZA"
+    )
+    assert "direction" in lost.moves.reasons[lost.moves.reason[-1]]
 
 
 @pytest.mark.parametrize("change", ["T2\nM6", "T2 M=6", "T1=2\nM06", "T=2 M=06 ;M6"])

@@ -180,6 +180,11 @@ class Builder:
         self._stretches.append(stretch)
         self.count += len(stretch.block)
 
+    @property
+    def latest(self) -> Stretch | None:
+        """The motions that came together last; None if single ones came behind them, or none at all."""
+        return self._stretches[-1] if self._stretches and not self._buffer.block else None
+
     def _flush(self) -> None:
         if self._buffer.block:
             self._stretches.append(self._buffer.stretch())

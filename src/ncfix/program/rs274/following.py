@@ -29,7 +29,7 @@ class PartInterpreter(Interpreter):
     last = False
     ended = False
 
-    def go_on(self, program: Program) -> None:
+    def next_part(self, program: Program) -> None:
         """Take the next part."""
         self.main = self.main.followed_by(program)
         self.flow.unit, self.flow.block = self.main, 0
@@ -66,7 +66,7 @@ class Walk(Protocol):
 
     ended: bool
 
-    def go_on(self, program: Program) -> None:
+    def next_part(self, program: Program) -> None:
         """Take the next part."""
 
     def run_part(self, last: bool, max_blocks: int) -> None:
@@ -101,7 +101,7 @@ class PartFollower(ABC):
         if self.interpreter is None:
             self.interpreter = self.begin(program)
         else:
-            self.interpreter.go_on(program)
+            self.interpreter.next_part(program)
         self.control.builder.clear()
         self.interpreter.run_part(last, self.max_blocks)
         return self.control.builder.moves()

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Find = Callable[[str], Unit | None]
 
+NO_SUBPROGRAM = "NCF231"
 UNKNOWN_CYCLE = "NCF252"
 CALLED_BY_TEXT = frozenset({"call", "extcall"})
 FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
@@ -62,5 +63,5 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
         return
     unit = find(f"L{value:g}")
     if unit is None:
-        raise Fault("NCF231", f"there is no subprogram L{value:g}", "put its file beside the program")
+        raise Fault(NO_SUBPROGRAM, f"there is no subprogram L{value:g}", "put its file beside the program")
     turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))

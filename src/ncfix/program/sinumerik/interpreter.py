@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import reduce
 from operator import or_
 
@@ -36,11 +36,18 @@ NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
+PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
+"""What `TOOL_CHANGE` finds has this in it, which is found sooner."""
 SAFE_ACTION = re.compile(
     r"(?:DO|WHEN|WHENEVER|EVERY|FROM)\b(?!.*\b(?:DELDTG|STOPREOF|POS|POSA|MOV|PRESETON|TRAILON|LEADON|COUPON|OVR|MEASA|"
     r"MEAWA|SYNFCT|FTOC)\b)",
     re.IGNORECASE,
 )
+
+
+def changes_tools(plans: Iterable[Plan], source: bytes) -> bool:
+    """Whether a text has an M6, so that T by itself changes no tool."""
+    return any(60 in plan.m for plan in plans) or bool(PERHAPS.search(source) and TOOL_CHANGE.search(source))
 
 
 class Interpreter:
@@ -59,9 +66,7 @@ class Interpreter:
         self.again: int | None = None
         self.recorder: Recorder | None = None
         control.locate = self.place
-        plans = self.units[0].text.plans
-        self.at_once = not any(60 in plan.m for plan in plans) and not TOOL_CHANGE.search(program.source)
-        self.tangents = any("ct" in plan.names for plan in plans)
+        self.at_once = not changes_tools(self.units[0].text.plans, program.source)
         control.solitary = frozenset(block for unit in self.units for block in unit.solitary())
         for parameter in self.units[0].parameters:
             control.variables.scopes[0].kinds[parameter.name] = ""
@@ -81,8 +86,7 @@ class Interpreter:
             source = next(sources, None)
             if source:
                 program = read(source, name, self.units[0].program.dialect)
-                self.files[key] = unit = units_of(program, external=name)[0]
-                self.tangents |= any("ct" in plan.names for plan in unit.text.plans)
+                self.files[key] = units_of(program, external=name)[0]
         return self.files[key]
 
     def run(self) -> Moves:
@@ -92,9 +96,13 @@ class Interpreter:
         except AtRuntimeError:
             self.again = sweep(self.course)
         except Fault as fault:
-            self.span = fault.span or self.span
-            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+            raise self.error(fault) from None
         return all_or_none(demoted(self.control.builder.moves(), self.again), self.units[0].program)
+
+    def error(self, fault: Fault) -> SourceError:
+        """What is wrong, with the place where it is."""
+        self.span = fault.span or self.span
+        return SourceError.of(fault.code, fault.text, self.place(), fault.hint)
 
     def unrolled(self, recorder: Recorder) -> list[FlatLine]:
         """The blocks of the program as they are executed; raises SourceError NCF237 where that is not known before."""
@@ -104,18 +112,17 @@ class Interpreter:
         except AtRuntimeError:
             raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
         except Fault as fault:
-            self.span = fault.span or self.span
-            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+            raise self.error(fault) from None
         return recorder.lines
 
-    def walk(self) -> None:
-        """Block after block."""
+    def walk(self) -> bool:
+        """Block after block; whether the program ends before its text does."""
         course, control = self.course, self.control
         while True:
             course.turn_back()
             if course.block >= course.unit.stop:
                 if not course.calls:
-                    return
+                    return False
                 course.finish()
                 continue
             main = not course.unit.external
@@ -124,21 +131,21 @@ class Interpreter:
                 if done:
                     self.stand(done)
                     course.block += done
-                    control.heading = None
+                    control.head_on()
                     self.spend(done)
                     continue
             plan = course.unit.plan(course.block)
             course.block += 1
             self.spend(1)
             if self.execute(plan):
-                return
+                return True
 
     def lane_is_open(self) -> bool:
         """Whether plain motions may go many at a time."""
         control = self.control
         if self.recorder is not None or (control.modal.incremental and control.counted != control.footing):
             return False
-        busy = control.at_start or control.modes.modal_cycle or self.course.sections or self.tangents
+        busy = control.at_start or control.modes.modal_cycle or self.course.sections
         return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90")
 
     def stand(self, blocks: int) -> None:

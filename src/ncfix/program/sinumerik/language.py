@@ -13,6 +13,7 @@ from ncfix.program.moves import Trace
 from ncfix.program.reach import whole_text
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
+from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_on
 from ncfix.program.sinumerik.interpreter import Interpreter
 from ncfix.program.sinumerik.layout import layout_of
 from ncfix.program.sinumerik.numbering import renumbered
@@ -61,4 +62,6 @@ SINUMERIK = Language(
     unroll=unroll,
     bulk=in_bulk,
     renumber=renumbered,
+    follower=SinumerikFollower,
+    straight=runs_straight_on,
 )

@@ -285,6 +285,17 @@ class Sinumerik(Control):
         elif any(step):
             self.heading = None
 
+    def head_on(self) -> None:
+        """Keep the direction in which the last of many motions of the fast lane ended, as `go` does of single ones."""
+        stretch = self.builder.latest
+        if stretch is None:
+            return
+        steps = stretch.end - stretch.start
+        rows = range(len(steps) - 1, -1, -1)
+        last = next((row for row in rows if steps[row].any()), None)
+        if last is not None:
+            self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
+
     def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
         index = super()._style(kind, rule, reason, code)
         held = self.modes.swivelled and not self.modes.transformed

@@ -56,6 +56,11 @@ class Text:
         plans = [plan_of(template) for template in program.templates]
         return cls(program, plans, view(program.template), view(program.first_number), view(program.numbers))
 
+    def followed_by(self, program: Program) -> Text:
+        """The next part of the same program: its templates are those of this one, and more."""
+        self.plans.extend(plan_of(template) for template in program.templates[len(self.plans) :])
+        return Text(program, self.plans, view(program.template), view(program.first_number), view(program.numbers))
+
 
 @dataclass(slots=True, eq=False)
 class Unit:

@@ -1,0 +1,83 @@
+"""Programs of any dialect corrected part by part and as a whole, and the comparison of both."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from ncfix.compensate.fix import fix_program
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.stream import Stream, Task
+from ncfix.machine import Machine
+from ncfix.program import dialects
+from ncfix.program.parts import NotInPartsError
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
+SETUP = Setup(assume_zero=True)
+FIGURES = ("error_before_um", "error_after_um", "max_correction_um")
+
+Found = tuple[bytes, dict[str, Any]]
+
+
+def streamed(
+    source: bytes,
+    machine: Machine,
+    dialect: str,
+    size: int,
+    jobs: int = 1,
+    setup: Setup = SETUP,
+    files: Mapping[str, bytes] | None = None,
+) -> Found:
+    """Text and report of a program that is corrected in parts of so many bytes; raises `NotInPartsError`."""
+    out: list[bytes] = []
+    given = io.BytesIO(source)
+    task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", dialects.get(dialect), size)
+    done = Stream(task, given.read, out.append, jobs).run()
+    text, stamp = b"".join(out), done.stamp
+    assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
+    return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()
+
+
+def whole(
+    source: bytes,
+    machine: Machine,
+    dialect: str,
+    setup: Setup = SETUP,
+    files: Mapping[str, bytes] | None = None,
+) -> Found:
+    """The same as a whole."""
+    fixed = fix_program(read(source, "p.nc", dialect), machine, setup, OPTIONS, (files or {}).get)
+    return fixed.text, fixed.report.as_dict()
+
+
+def assert_alike(found: Found, expected: Found) -> None:
+    """The same bytes, and the same report but for the last digit of figures."""
+    assert found[0].decode("latin-1") == expected[0].decode("latin-1")
+    for name, value in expected[1].items():
+        if name in FIGURES:
+            assert found[1][name] == pytest.approx(value, abs=2e-4), name
+        else:
+            assert found[1][name] == value, name
+
+
+def compared(
+    source: bytes,
+    machine: Machine,
+    dialect: str,
+    size: int,
+    jobs: int = 1,
+    setup: Setup = SETUP,
+    files: Mapping[str, bytes] | None = None,
+) -> str:
+    """Why a program was not corrected in parts; empty if it was, and came out as it does as a whole."""
+    try:
+        found = streamed(source, machine, dialect, size, jobs, setup, files)
+    except NotInPartsError as error:
+        return str(error)
+    assert_alike(found, whole(source, machine, dialect, setup, files))
+    return ""
