@@ -16,10 +16,11 @@ from ncfix.program.bulk import Bulk
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.levels import LevelBook
-from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule, TcpState
+from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
+from ncfix.program.standstill import renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
@@ -30,8 +31,6 @@ FloatArray = NDArray[np.float64]
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
 FLOW = "the block is more than words"
 MODE_LOST = "a kept block that follows relies on its motion code"
-ALIKE = 1e-7
-"""mm and rad; positions that are the same but for rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +121,7 @@ class _Emitter:
         self.reading = reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
-        self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
+        self.decimals = [decimals_of(frame, least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
         self.wordless, self.increments = moves.wordless, moves.increments
@@ -198,26 +197,12 @@ class _Emitter:
     def _resync(self, row: int) -> None:
         """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
         jump = self.jumps[row]
-        if jump.any() and not self._switched(row):
-            read = self.moves.start if self.reading.start is None else self.reading.start
-            self.position = np.where(jump, read[row], self.position)
-
-    def _switched(self, row: int) -> bool:
-        """Where nothing but tool-centre-point control, or a tool length in it, has changed: the axes stand still.
-
-        X Y Z have other numbers then, also those that a correction has put beside their places.
-        """
-        if row == 0 or self.kinematics is None or self.reading.start is not None:
-            return False
-        moves, states = self.moves, [_tcp_state(self.moves, each) for each in (row - 1, row)]
-        known = bool(np.isfinite([self.position, moves.end[row - 1], moves.start[row]]).all())
-        if states[0] == states[1] or not known:
-            return False
-        meant = self.kinematics(moves.end[row - 1].tolist(), *states)
-        if np.abs(meant - moves.start[row]).max() > ALIKE:
-            return False
-        self.position = np.array(self.kinematics(self.position.tolist(), *states))
-        return True
+        if not jump.any():
+            return
+        began = self.reading.start
+        read = self.moves.start if began is None else began
+        still = renamed(self.moves, row, self.position, self.kinematics) if began is None else None
+        self.position = np.where(jump, read[row], self.position) if still is None else still
 
     def _retract(self, row: int) -> None:
         """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
@@ -378,12 +363,6 @@ class _Emitter:
         return tuple(edits), added
 
 
-def _tcp_state(moves: Moves, row: int) -> TcpState:
-    """Whether tool-centre-point control is on in a motion, and with which length."""
-    on = bool(moves.tcp[row])
-    return TcpState(on, float(moves.tool_length[row]) if on else 0.0)
-
-
 def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> FloatArray:
     """X Y Z of a start position in the numbers in which centres are given (no diameters)."""
     values = np.array([program[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
@@ -398,7 +377,8 @@ def _plane(normal: FloatArray) -> tuple[int, int, int]:
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
 
 
-def _decimals(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
+def decimals_of(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
+    """(n_axes,) digits behind the point that numbers of a frame need for what the control can resolve, mm and rad."""
     return np.array([decimals_for(step) for step in least_increment / frame.scale], dtype=np.int64)
 
 
