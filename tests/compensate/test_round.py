@@ -68,9 +68,10 @@ def test_on_machines_with_all_errors(kind: str) -> None:
     assert len(arcs) < len(lines)
 
 
-def test_play_is_taken_up_by_straight_pieces_between_arcs() -> None:
+@pytest.mark.parametrize("play", [6.0, 150.0])
+def test_play_is_taken_up_by_straight_pieces_between_arcs(play: float) -> None:
     rng = np.random.default_rng(4)
-    machine = random_machine(rng, TOPOLOGIES["three-axis"], ("polynomial",), 10.0, 10.0, backlash=6.0)
+    machine = random_machine(rng, TOPOLOGIES["three-axis"], ("polynomial",), 10.0, 10.0, backlash=play)
     moves = circle(machine)
     result = plan(machine, moves, get_strategy("position"), TOLERANCE, arc_pieces=True)
     errors = dense_errors(machine, moves, result, 60, with_play=True)[result.pieces.move == 1]

@@ -146,10 +146,13 @@ class Generator:
         self.block("G0", {axis: self.place() for axis in "XYZ"})
 
     def other(self) -> None:
-        """No tool change after an arc: the interpreter, as it is called here, then takes its start for its end."""
+        """No tool change after an arc: the interpreter, as it is called here, then takes its start for its end.
+
+        Nor one in inches: it then takes millimetres for inches where it stands, which G92 would go by.
+        """
         words = ("M3 S500", "M5", "M8", "M9", "G4 P0.1", "(a comment)", "", "G64 P0.01", "G61", "T1 M6")
         word = self.rng.choice(words)
-        self.lines.append("M8" if word == "T1 M6" and self.motion in ("G2", "G3") else word)
+        self.lines.append("M8" if word == "T1 M6" and (self.inch or self.motion in ("G2", "G3")) else word)
 
     def machine(self) -> None:
         """Machine coordinates or a reference point, and back to where it is known."""

@@ -26,6 +26,9 @@ WIDEST = 0.95 * np.pi
 SHORTEST = 0.05
 """mm between the ends of the shortest arc that is written."""
 
+JUMP = 2.0
+"""Times the way along the arc: a piece that is longer only takes up a jump (play, a step), which is no circle."""
+
 
 OTHER_CODES = 1000
 """Motion codes in tenths from here on are no G codes."""
@@ -37,13 +40,19 @@ def may_be_round(intent: Intent, rows: Index, closure: Closure, rounding: float)
     Arcs that are not given by a centre or radius (CIP, whose code is none of G0 to G99) stay whole or become straight,
     unless they are written as others.
     """
-    moves = intent.moves
-    spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
-    radius = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
+    moves, radius = intent.moves, radii(intent, rows)
     allowed = np.maximum(closure.mm, closure.relative * radius) / 2
     enough: Mask = intent.segments.arc[rows] & (radius > SHORTEST) & (4 * rounding <= allowed)
     enough &= (moves.modal[rows] < OTHER_CODES) | np.isin(moves.modal[rows], list(TANGENTIAL))
     return enough if APART * rounding < SHORTEST else np.zeros(len(rows), dtype=bool)
+
+
+def radii(intent: Intent, rows: Index) -> Array:
+    """The radius of each arc (k,), mm."""
+    moves = intent.moves
+    spoke = moves.end[rows[:, None], intent.columns] - moves.centre[rows]
+    radius: Array = np.linalg.norm(across(spoke, moves.normal[rows]), axis=1)
+    return radius
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +61,21 @@ class RoundGrid:
 
     normal   (k, 3) of each node's motion
     sweep    (k,) of each node's motion, rad
+    radius   (k,) of each node's motion, mm
     columns  (3,) of X, Y and Z
     """
 
     grid: Grid
     normal: Array
     sweep: Array
+    radius: Array
     columns: Index
 
     @classmethod
     def of(cls, grid: Grid, intent: Intent, rows: Index) -> RoundGrid:
         """Nodes of motions `rows`, which are arcs."""
-        move = rows[owners(grid.counts)]
-        return cls(grid, intent.moves.normal[move], intent.moves.sweep[move], intent.columns)
+        move, moves = rows[owners(grid.counts)], intent.moves
+        return cls(grid, moves.normal[move], moves.sweep[move], radii(intent, move), intent.columns)
 
     @property
     def counts(self) -> Index:
@@ -102,7 +113,7 @@ class RoundGrid:
         ends = start[:, self.columns], end[:, self.columns]
         chord = across(ends[1] - ends[0], normal)
         length = np.linalg.norm(chord, axis=1)
-        arc = (length >= SHORTEST) & (np.abs(turn) <= WIDEST)
+        arc = (length >= SHORTEST) & (np.abs(turn) <= WIDEST) & (length < JUMP * self.radius[first] * np.abs(turn))
         way = np.cross(normal, chord) / np.maximum(length, 1e-300)[:, None]
         height = length / 2 / np.tan(np.where(arc, turn, 1.0) / 2)
         pieces = _on_bisector(Segments(start, end, arc, ends[0], normal, turn, self.columns), way, height)
