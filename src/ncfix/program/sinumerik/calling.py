@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE
+from ncfix.program.sinumerik.framing import into_spindle, set_length
 from ncfix.program.sinumerik.plans import Calling, plain_text
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unit import Unit
@@ -38,6 +39,10 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
     control.lose_all(AFTER_CYCLE)
+    control.changed_by_cycle |= control.fresh_tool
+    if "tool" in control.suspended:
+        into_spindle(control)
+        set_length(control)
 
 
 def call_by_text(turn: Turn, step: Calling, find: Find) -> bool:

@@ -40,6 +40,12 @@ SINUMERIK_CODES: dict[str, Code] = {
         "keeps it depends on its machine data; here it stays.",
         "Program the frame anew after TRAORI or TRAFOOF.",
     ),
+    "NCF257": Code(
+        "Another transformation",
+        "TRAORI(2) and further ones are what the machine's data say: another head, or other rotary axes. The tool is "
+        "followed by the kinematics of the machine file, whichever is called.",
+        "Correct with the machine file of that transformation, or check that both are the same.",
+    ),
     "NCF256": Code(
         "Blocks cannot be numbered anew",
         "Block numbers are targets of jumps, and here nobody can tell which block is meant: a number stands more than "

@@ -17,6 +17,10 @@ from ncfix.program.sinumerik.state import Sinumerik
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"
 ROTARY_FRAME = "a {} of a rotary axis"
+WHO_CHANGES = (
+    "whether T by itself changes the tool is not certain: a name that ncfix does not know has followed a T before"
+)
+DIAMETER_SHIFT = "a shift of X while X is a diameter ({}) is in force: which of the two it is, machine data say"
 MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
 FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
@@ -68,7 +72,8 @@ def total(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, .
 def translation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
     """TRANS."""
     steps = {INDEX[letter]: value for letter, value in axis_values(words).items()}
-    return shifted({index: value * unit(control, index) for index, value in steps.items()}), ""
+    doubtful = DIAMETER_SHIFT.format(control.modes.diameter) if control.modal.diameter and steps.get(0) else ""
+    return shifted({index: value * unit(control, index) for index, value in steps.items()}), doubtful
 
 
 def rotation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
@@ -185,16 +190,18 @@ def compensation(control: Sinumerik, code: int) -> None:
 def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
     """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
     if "T" in words.values or "T" in words.texts:
+        control.fresh_tool = True
         name = words.texts.get("T")
         value = words.values.get("T")
         if name is None and value is None:
             control.refusal = control.refusal or "the tool (T) is known only at run time"
             return
         control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
+    if at_once and control.changed_by_cycle and not change and "D" not in words.values:
+        control.suspended["tool"] = WHO_CHANGES
+        return
     if change or (at_once and ("T" in words.values or "T" in words.texts)):
-        control.tools.spindle = control.tools.selected
-        control.edge = 1
-        control.places.lose(mask_of(control.machine))
+        into_spindle(control)
     if "D" in words.values:
         if words.values["D"] is None:
             control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
@@ -203,6 +210,14 @@ def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
     if change or at_once or "D" in words.values:
         control.at_start = False
         set_length(control)
+
+
+def into_spindle(control: Sinumerik) -> None:
+    """The tool that is selected comes into the spindle, with its edge D1."""
+    control.suspended.pop("tool", None)
+    control.tools.spindle = control.tools.selected
+    control.edge = 1
+    control.places.lose(mask_of(control.machine))
 
 
 def take_up(control: Sinumerik) -> None:

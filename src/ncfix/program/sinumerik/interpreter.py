@@ -26,6 +26,7 @@ from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.statements import Turn, act, finish_block, say
 from ncfix.program.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
+from ncfix.program.sinumerik.synchronous import is_harmless
 from ncfix.program.sinumerik.unit import Unit, units_of
 from ncfix.program.sinumerik.unroll import Recorder
 from ncfix.program.tree import Program, Span
@@ -38,11 +39,6 @@ PROGRAM_ENDS = frozenset({20, 300, 170})
 TOOL_CHANGE = re.compile(rb"(?im)^[^;\n]*(?<![A-Z0-9_])M[ \t]*=[ \t]*0*6(?![\d.])")
 PERHAPS = re.compile(rb"[Mm][ \t]*=[ \t]*0*6")
 """What `TOOL_CHANGE` finds has this in it, which is found sooner."""
-SAFE_ACTION = re.compile(
-    r"(?:DO|WHEN|WHENEVER|EVERY|FROM)\b(?!.*\b(?:DELDTG|STOPREOF|POS|POSA|MOV|PRESETON|TRAILON|LEADON|COUPON|OVR|MEASA|"
-    r"MEAWA|SYNFCT|FTOC)\b)",
-    re.IGNORECASE,
-)
 
 
 def changes_tools(plans: Iterable[Plan], source: bytes) -> bool:
@@ -151,6 +147,7 @@ class Interpreter:
     def stand(self, blocks: int) -> None:
         """The axes that these blocks have named have been brought somewhere."""
         control, unit, block = self.control, self.course.unit, self.course.block
+        control.fresh_tool = False
         if control.counted != control.footing:
             shapes = np.unique(unit.program.template[block : block + blocks])
             named = reduce(or_, (unit.plan_of_shape(shape).axes for shape in shapes.tolist()))
@@ -245,7 +242,7 @@ class Interpreter:
             why = f"the block {say(text)} is not understood, and may move axes or change coordinates"
             control.refusal = control.refusal or why
             control.warn(NOT_UNDERSTOOD, control.refusal, "all motions after it are refused")
-        if "synchronized" in plan.opaque and not SAFE_ACTION.search(text):
+        if "synchronized" in plan.opaque and not is_harmless(text):
             why = f"the synchronized action {say(text)} may move axes"
             control.refusal = control.refusal or why
             control.warn(SYNCHRONOUS, control.refusal, "all motions after it are refused")

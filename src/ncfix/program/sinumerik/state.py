@@ -60,6 +60,8 @@ class Sinumerik(Control):
     whole  the motion must not be split
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
+    fresh_tool  a tool has been called since the last motion
+    changed_by_cycle  a name that is not known has followed a call of a tool at once: it may be what changes it
     counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
     heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
@@ -78,6 +80,7 @@ class Sinumerik(Control):
         self.over: tuple[int, ...] = ()
         self.edge = 0
         self.at_start = True
+        self.fresh_tool = self.changed_by_cycle = False
         self.points = False
         self.heading: Sequence[float] | None = None
         self.whole = False
@@ -255,7 +258,7 @@ class Sinumerik(Control):
             axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
         if settles is None:
             settles = 0 if passing else axes & ~mask_of(self._counted(words))
-        self.lost = end.lost
+        self.lost, self.fresh_tool = end.lost, False
         refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(end.target)
         if not passing and not refusal:
             self.ask_for_length()

@@ -33,6 +33,11 @@ from ncfix.program.tree import Call, Expression, NamedParameter
 
 CONFLICT = "NCF208"
 FRAME_STAYS = "NCF255"
+OTHER_TRANSFORMATION = "NCF257"
+SWITCHED_ON = (
+    "whether CYCLE832 switches TRAORI on depends on the version of the control: "
+    "older ones take that from its second argument"
+)
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
     G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
@@ -115,6 +120,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         framing.diameter(control, name)
     elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
         return
+    elif name == "cycle832":
+        tolerance(control, step)
     elif name in UNFOLLOWED:
         control.suspended[name] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
     elif name in ("orimks", "oriwks"):
@@ -143,10 +150,22 @@ def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
     warn_of_frame(control, step)
+    control.suspended.pop("traori", None)
     if len(step.written) > 1:
         control.suspended["traori"] = "TRAORI with a direction of the tool of its own is in force"
+    number_of = number(step.arguments[0](control)) if step.written else None
+    if number_of is not None and number_of != 1.0:
+        text = f"TRAORI({number_of:g}) is taken as the kinematics of the machine file"
+        control.warn(OTHER_TRANSFORMATION, text, "check that the machine file is that of this transformation")
     control.modes.transformed = True
     control.switch_tcp()
+
+
+def tolerance(control: Sinumerik, step: Calling) -> None:
+    """CYCLE832: older controls take the third digit of its second argument as that of a transformation."""
+    kind = number(step.arguments[1](control)) if len(step.arguments) > 1 else None
+    if kind is not None and round(kind) // 100 % 10 and not control.modes.transformed:
+        control.suspended["traori"] = SWITCHED_ON
 
 
 def warn_of_frame(control: Sinumerik, step: Calling) -> None:

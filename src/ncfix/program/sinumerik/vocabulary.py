@@ -54,7 +54,7 @@ _HARMLESS = """
     walcs0 walcs1 walcs2 walcs3 setms spcon spcof cdon cdof cdof2 dynnorm dynpos dynrough dynsemifin dynfinish dynprec
     compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
     cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
-    cancel cycle832 group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
+    cancel group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
     coupdef coupdel coupon coupof couponc coupofs waitc ctabdef ctabend ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
@@ -137,7 +137,9 @@ UNSEEN = {
 }
 """Names that with an index change what motions after them do, in a way that is not followed."""
 
-OF_THE_CONTROL = re.compile(r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_off|ac_trans)|toff|tcarr$|cutmod$")
+OF_THE_CONTROL = re.compile(
+    r"\$(?:p_\w*fr|tc_(?:dp|[se]cp|adpt|carr)|m[nca]_|aa_(?:off|etrans)|ac_trans)|toff|tcarr$|cutmod$"
+)
 """Names, lower case, with which frames, tool lengths or the machine itself change when they get a value."""
 
 TURNS_OF_THE_TOOL = frozenset({"orivect", "oriaxes", "oriplane", "oripath", "oripaths", "oricurve"})
