@@ -21,6 +21,7 @@ from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import stand
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
+from ncfix.program.sinumerik.orientation import leads_along
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
@@ -142,7 +143,7 @@ class Interpreter:
         if self.recorder is not None or (control.modal.incremental and control.counted != control.footing):
             return False
         busy = control.at_start or control.modes.modal_cycle or self.course.sections
-        return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90")
+        return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90" or leads_along(control))
 
     def stand(self, blocks: int) -> None:
         """The axes that these blocks have named have been brought somewhere."""

@@ -25,8 +25,10 @@ FloatArray = NDArray[np.float64]
 
 VECTOR = ("A3", "B3", "C3")
 ANGLES = ("A2", "B2", "C2")
-_OTHERS = "A4 B4 C4 A5 B5 C5 A6 B6 C6 A7 B7 C7 LEAD TILT THETA PSI PHI NUT"
-OTHERS = frozenset(_OTHERS.split())
+NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
+"""Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
+
+OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
 """Other ways to say how the tool stands, which are not followed."""
 
 BAD_VECTOR = "NCF254"
@@ -41,8 +43,10 @@ WHICH_ANGLES = (
     "whether A2 B2 C2 are Euler or roll-pitch-yaw angles is for ORIEULER or ORIRPY to say, or machine data: "
     f"`variables.{MEANT} = 1` (or 0) in the setup file"
 )
-IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS)"
+IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS) while the program's are turned"
+ALONG_PATH = "the tool turns with the path ({})"
 BY_AXES = "oriaxes"
+BY_PATH = "oripath"
 ON_CURVES = ("oricon", "oricurve", "oripath")
 BY_CURVE = "the tool turns on a cone, or after a curve ({})"
 
@@ -53,13 +57,27 @@ not concerned, but pieces of a motion that strays by more would point it elsewhe
 
 def oriented(control: Sinumerik, words: Words) -> None:
     """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
+    if leads_along(control):
+        words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), turning(control))
+        return
+    words.whole |= bool(NORMALS & words.values.keys())
     others = sorted(OTHERS & words.values.keys())
     ways = [way for way in (VECTOR, ANGLES) if any(address in words.values for address in way)]
     if not others and not ways:
         return
     reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if len(ways) > 1 else by_direction(control, words)
     if reason:
-        words.refuse(reason, [index for index in control.machine if control.rotary[index]])
+        words.refuse(reason, turning(control))
+
+
+def leads_along(control: Sinumerik) -> bool:
+    """Whether each motion turns the tool, as the path turns."""
+    return control.modes.transformed and control.modes.orientation.startswith(BY_PATH)
+
+
+def turning(control: Sinumerik) -> list[int]:
+    """The rotary axes."""
+    return [index for index in control.machine if control.rotary[index]]
 
 
 def by_direction(control: Sinumerik, words: Words) -> str:
@@ -68,7 +86,7 @@ def by_direction(control: Sinumerik, words: Words) -> str:
         return NOT_ON
     if words.runtime(*VECTOR, *ANGLES):
         return AT_RUNTIME
-    if control.modes.orientation_in_machine:
+    if control.modes.orientation_in_machine and control.is_rotated:
         return IN_MACHINE
     if control.modes.orientation.startswith(ON_CURVES):
         return BY_CURVE.format(control.modes.orientation.upper())

@@ -13,7 +13,7 @@ from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import Words, set_pole
-from ncfix.program.sinumerik.orientation import ANGLES, OTHERS, VECTOR
+from ncfix.program.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
@@ -54,7 +54,7 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((400, 410, 420), framing.compensation),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
-MOVING = frozenset({"AP", "RP", *VECTOR, *ANGLES}) | OTHERS
+MOVING = frozenset({"AP", "RP", *VECTOR, *ANGLES}) | NORMALS | OTHERS
 """Words that make a block move even where no axis is named."""
 
 ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
