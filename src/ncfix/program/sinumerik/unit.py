@@ -220,6 +220,11 @@ def parameters(text: str) -> Iterator[Parameter]:
             yield Parameter(found["type"].lower(), found["name"].lower(), bool(found["var"]))
 
 
+def is_remark(plan: Plan) -> bool:
+    """Whether a block does nothing."""
+    return not (plan.settings or plan.steps or plan.g or plan.m or plan.opaque)
+
+
 def units_of(program: Program, external: str = "") -> list[Unit]:
     """The programs of a text, in the order written."""
     text = Text.of(program)
@@ -228,7 +233,8 @@ def units_of(program: Program, external: str = "") -> list[Unit]:
     for block in np.flatnonzero(np.isin(program.template, list(shapes))).tolist():
         if found := HEAD.match(program.text_of(block)):
             heads.append((block, found[1].upper()))
-    starts = heads if heads and heads[0][0] == 0 else [(0, ""), *heads]
+    remarks = heads and all(is_remark(text.plans[shape]) for shape in text.template[: heads[0][0]])
+    starts = [(0, heads[0][1]), *heads[1:]] if remarks else [(0, ""), *heads]
     stops = [block for block, _ in starts[1:]] + [len(program)]
     pairs = zip(starts, stops, strict=True)
     return [Unit(text, block, stop, name, external) for (block, name), stop in pairs if stop > block]
