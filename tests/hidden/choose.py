@@ -72,20 +72,24 @@ def _hide(rng: Generator, spec: Family, wish: Wish, draft: Draft) -> Draft:
     size = 1e-3 * (wish.amplitude_um or spec.amplitudes_um[_turn(rng, _walk(wish, 4), len(spec.amplitudes_um))])
     hidden: list[Specimen] = []
     kin: dict[str, float] = {}
+    fellows: tuple[str, ...] = ()
     tries, fair = 0, True
     while len(hidden) < spec.hidden:
         tries += 1
         entry = pick(rng, spec, wish, draft, tries)
-        specimen = sized(draft.world, entry, entry.draw(rng), rows, near, size)
+        specimen = sized(draft.world, entry, entry.specimen(rng), rows, near, size)
         verdict = judge(rng, spec, draft, seen_from, specimen, tuple(h.entry.name for h in hidden))
         if verdict is not None or tries > PATIENCE * ROUNDS:
             hidden.append(specimen)
-            kin, fair = verdict or {}, fair and verdict is not None
+            fair = fair and verdict is not None
+            kin, fellows = (verdict.kin, verdict.fellows) if verdict else ({}, ())
     world = replace(draft.world, hidden=tuple(hidden))
     if spec.clutter_um:
         others = tuple(e for e in catalogue(world.machine) if e.name not in {h.entry.name for h in hidden})
         world = draw_clutter(rng, world, others, draft.situation, seen_from, draft.sight, 1e-3 * spec.clutter_um)
-    return replace(draft, world=world, relatives=kin, notes=draft.notes | {"draws": tries, "fair": fair})
+    return replace(
+        draft, world=world, relatives=kin, notes=draft.notes | {"draws": tries, "fair": fair, "fellows": fellows}
+    )
 
 
 def _walk(wish: Wish, by: int) -> Wish:

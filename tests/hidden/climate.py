@@ -5,7 +5,7 @@ All values are kelvin above the state at the start. Time is in seconds from the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -15,6 +15,8 @@ from .motion import Array
 
 BODIES = ("spindle", "column", "bed", "table", "ambient")
 STEP, SPAN = 20.0, 16 * 3600.0
+SENSORS_LATE = 0.5, 10.0
+"""minutes"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,14 @@ class Climate:
         """What the sensor shows, degree C."""
         result: Array = self.level + np.interp(time, self.grid, self.sensors[name])
         return result
+
+    def guessed(self, rng: Generator) -> Climate:
+        """As it may have been for all that the sensors tell: they are late, and nobody knows by how much."""
+        bodies = {}
+        for name, values in self.bodies.items():
+            late, believed = (_minutes(rng, *SENSORS_LATE) for _ in range(2))
+            bodies[name] = np.interp(self.grid + believed - late, self.grid, values)
+        return replace(self, bodies=bodies)
 
 
 def lagged(signal: Array, time_constant: float, step: float = STEP) -> Array:
@@ -102,6 +112,6 @@ def _duty(rng: Generator, grid: Array) -> Array:
 
 def _sensed(rng: Generator, body: Array) -> Array:
     """The sensor: its own lag, a gain that is off by up to a sixth, its noise."""
-    slow = lagged(body, _minutes(rng, 0.5, 10))
+    slow = lagged(body, _minutes(rng, *SENSORS_LATE))
     result: Array = slow * rng.uniform(0.85, 1.15) + rng.normal(scale=rng.uniform(0.02, 0.06), size=len(body))
     return result

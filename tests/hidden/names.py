@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Protocol
 
 KINDS = {
     "pitch": r"screw|cyclic|periodic|pitch error|pitch [XYZ]$",
@@ -48,7 +49,12 @@ KINDS = {
     "slip": r"slip|re-?zero|crash",
 }
 BY_SYMBOL = ("radial", "axial", "wobble", "encoder", "worm")
-ALSO = {kind: {"pitch"} for kind in BY_SYMBOL} | {"table stiffness": {"wobble"}}
+ALSO = {kind: {"pitch"} for kind in BY_SYMBOL} | {
+    "table stiffness": {"wobble"},
+    "bed sag": {"ram droop"},
+    "ram droop": {"bed sag"},
+    "gravity sag": {"unbalanced load"},
+}
 ALONG = ("drift", "ambient swing")
 _SYMBOL = re.compile(r"\bE([XYZABC])(0?)([A-Z])\b")
 
@@ -64,11 +70,28 @@ class Named:
     family: str
 
 
+class Nameable(Protocol):
+    """An entry of the catalogue."""
+
+    name: str
+    kind: str
+    axis: str
+    symbols: tuple[str, ...]
+    family: str
+
+
+def named(entry: Nameable) -> Named:
+    """Its names."""
+    return Named(entry.name, entry.kind, entry.axis, entry.symbols, entry.family)
+
+
 def matches(truth: Named, name: str, title: str = "", axis: str | None = None) -> bool:
     """Whether a reported name (with its title and axis, where the report has them) means the hidden effect.
 
     A bare symbol is a curve of that component; it also names the error motions of a rotary axis, whose orders are one
-    name. A table that is softer one way is contained in the wobble of that table, twice per turn.
+    name. A table that is softer one way is contained in the wobble of that table, twice per turn. A sag with its slope
+    is one effect, whether the slide is a bed or a ram: the machine file does not say which. A swivel that turns under
+    its weight and load is out of balance.
     """
     if name.strip().lower() == truth.name.lower() and truth.kind != "curve":
         return True

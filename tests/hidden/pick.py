@@ -1,9 +1,12 @@
 """Which effect is hidden, and whether the data of the design can show it at all.
 
 A benchmark that asks for what no data hold measures nothing. So a specimen is drawn again when less than VISIBLE of
-its displacement is left beside set-up and base constants, or when its closest relative could take its place within
-the noise: what that relative cannot imitate, squared and over the noise's variance, is less than TOLD_APART for an
-effect of the usual size or its own, whichever is larger. (A design is not called bad because an effect is small.)
+its displacement is left beside set-up and base constants, or when even an ideal observer (`ideal.py`) would give less
+than twenty to one for its name against any other that may be said, or another name could take its place within the
+noise (what it cannot imitate, squared and over the noise's variance, is less than TOLD_APART), at the effect's own or
+the usual size, whichever is larger. (A design is not called bad because an effect is small.) In families that spoil the
+design on purpose, it is drawn all the same, and the names that nobody could rule out are noted: there their set is
+right, and the first is not asked.
 """
 
 from __future__ import annotations
@@ -16,16 +19,21 @@ from numpy.random import Generator
 from . import designs
 from .draft import Draft
 from .families import Family
+from .ideal import observer
 from .motion import Array
+from .names import matches, named
 from .physics import Entry, catalogue, foreign, location, vocabulary
 from .situation import joined
 from .visibility import View, first_order, relatives, sensitivities, view
 from .world import Specimen
 
-VISIBLE, FAINT = 0.4, 0.3
+VISIBLE, FAINT, HIDDEN = 0.4, 0.3, 0.15
+CLOSE_ENOUGH, CLUTTER_MM = 0.3, 0.001
 TOLD_APART, CONFUSED = 12.0, 4.0
 SIGMA_MM, USUAL_MM = 0.003, 0.005
 ROUNDS = 30
+PLAYS = ("backlash", "lateral play", "angular play")
+"""What cannot show where every axis comes from one side: its mean is a constant, and its change is that of a curve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +56,10 @@ def pick(rng: Generator, spec: Family, wish: Wish, draft: Draft, tries: int) -> 
     if spec.source == "location":
         return location.entry(machine, draft.notes["lacking"])
     entries = foreign(machine) if spec.source == "foreign" else catalogue(machine)
+    if draft.design.one_sided:
+        entries = tuple(e for e in entries if e.kind not in PLAYS)
     if spec.source in ("blind", "pair"):
-        kinds = ("pitch",) if spec.source == "blind" else ("curve", "backlash", "lateral play", "angular play")
+        kinds = ("pitch",) if spec.source == "blind" else ("curve", *PLAYS)
         entries = tuple(e for e in entries if e.kind in kinds)
     if wish.effect and spec.hidden == 1:
         return next(e for e in entries if e.name == wish.effect)
@@ -60,32 +70,73 @@ def pick(rng: Generator, spec: Family, wish: Wish, draft: Draft, tries: int) -> 
     return same[int(rng.integers(len(same)))]
 
 
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Of a specimen that may be hidden: its closest relatives, name to share of it that they imitate; and the names
+    that nobody could rule out.
+    """
+
+    kin: dict[str, float]
+    fellows: tuple[str, ...] = ()
+
+
 def judge(
     rng: Generator, spec: Family, draft: Draft, seen_from: Array, specimen: Specimen, before: tuple[str, ...]
-) -> dict[str, float] | None:
-    """The closest relatives of a specimen, name to share of it that they imitate; None if it is not fair to ask for
-    it.
-    """
+) -> Verdict | None:
+    """None if it is not fair to ask for this specimen."""
     truth = first_order(seen_from, specimen.twists(draft.situation))
-    share, strength = left_share(draft.sight, truth), _strength(draft.sight, truth)
-    if specimen.entry.name in before or not _shows(spec, share):
+    if specimen.entry.name in before or not _shows(spec, left_share(draft.sight, truth)):
         return None
     if spec.source in ("foreign", "blind"):
-        return {}
-    known = vocabulary if spec.alone else catalogue
-    rivals = tuple(e for e in known(draft.world.machine) if e.name != specimen.entry.name)
+        return Verdict({})
+    rivals = tuple(e for e in vocabulary(draft.world.machine) if not matches(named(specimen.entry), e.name))
     kin = relatives(rng, draft.situation, draft.sight, seen_from, truth, rivals)
-    closest = next(iter(kin))
-    larger = max(1.0, USUAL_MM / specimen.moved_mm) ** 2
-    apart = strength * (1 - kin[closest]) * (1.0 if spec.source == "pair" else larger)
     if any(kin.get(name, 0.0) > 0.8 for name in before):
         return None
     if spec.source == "pair":
-        told = apart < CONFUSED and _told_by_more(rng, draft, specimen, next(e for e in rivals if e.name == closest))
-        return _top(kin) if told else None
-    if not (spec.extra or spec.alone) and apart < TOLD_APART:
+        return Verdict(_top(kin)) if _told_later(rng, draft, specimen, truth, kin, rivals) else None
+    larger = max(1.0, USUAL_MM / specimen.moved_mm)
+    fellows = _fellows(rng, draft, seen_from, specimen.entry, larger * truth, kin, rivals)
+    if fellows and not (spec.extra or spec.alone):
         return None
-    return _top(kin)
+    return Verdict(_top(kin), fellows)
+
+
+def _fellows(
+    rng: Generator,
+    draft: Draft,
+    seen_from: Array,
+    entry: Entry,
+    truth: Array,
+    kin: dict[str, float],
+    rivals: tuple[Entry, ...],
+) -> tuple[str, ...]:
+    """Names that nobody could rule out: what they cannot imitate of the truth is too little beside the noise, or an
+    ideal observer would give less than twenty to one against them.
+    """
+    strength = _strength(draft.sight, truth)
+    alike = {name for name, share in kin.items() if strength * (1 - share) < TOLD_APART}
+    close = tuple(e for e in rivals if kin[e.name] > CLOSE_ENOUGH)
+    if close:
+        shares = len(vocabulary(draft.world.machine)) + draft.sight.base.shape[2]
+        every, clutter = (entry, *close), CLUTTER_MM / np.sqrt(shares)
+        eye = observer(rng, draft.situation, draft.sight, seen_from, every, SIGMA_MM, clutter)
+        alike |= set(eye.fellows(entry.name, truth))
+    return tuple(sorted(alike))
+
+
+def _told_later(
+    rng: Generator,
+    draft: Draft,
+    specimen: Specimen,
+    truth: Array,
+    kin: dict[str, float],
+    rivals: tuple[Entry, ...],
+) -> bool:
+    """Whether the closest relative could take its place within the noise, and not once there are more poses."""
+    closest = next(iter(kin))
+    apart = _strength(draft.sight, truth) * (1 - kin[closest])
+    return apart < CONFUSED and _told_by_more(rng, draft, specimen, next(e for e in rivals if e.name == closest))
 
 
 def _top(kin: dict[str, float]) -> dict[str, float]:
@@ -105,7 +156,7 @@ def _strength(sight: View, truth: Array) -> float:
 
 def _shows(spec: Family, share: float) -> bool:
     if spec.source == "blind":
-        return share < FAINT
+        return share < HIDDEN
     return share > (FAINT if spec.extra else VISIBLE)
 
 

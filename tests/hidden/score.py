@@ -13,7 +13,7 @@ import numpy as np
 from . import remeasure
 from .candidate import Answer, Candidate, Reported, ask
 from .families import FAMILIES, Task
-from .names import Named, matches
+from .names import Named, matches, named
 from .physics import vocabulary
 from .scenario import Scenario, after_um, scenario
 
@@ -24,7 +24,9 @@ CLOSE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What came out of one scenario; None where a question does not arise. `rows` were handed over."""
+    """What came out of one scenario; None where a question does not arise. `rows` were handed over; of `fellows` names
+    an ideal observer would not rule one out.
+    """
 
     family: str
     index: int
@@ -54,6 +56,7 @@ class Record:
     cpu_seconds: float
     error: str
     rows: int = 0
+    fellows: tuple[str, ...] = ()
 
     @property
     def per_300_rows(self) -> float:
@@ -94,12 +97,13 @@ def judged(
         in_set=all(any(_in_set(e, t) for e in answer.effects) for t in truths) if truths else None,
         all_right=_all_right(answer.effects, truths) if truths else None,
         set_size=float(np.mean([_size(e) for e in sets or answer.effects])) if truths and answer.effects else None,
-        false_names=sum(not any(_in_set(e, t) for t in truths) for e in answer.effects),
+        false_names=sum(not any(_in_set(e, t) or _may_be(task, e, t) for t in truths) for e in answer.effects),
         unknown=flagged, closest=max(truth.relatives.values(), default=0.0),
         family_right=_family_right(scene, first) if truth.without else None,
         gap_before_um=gaps["before"], gap_after_um=after, gap_file_um=gaps["file"], floor_um=gaps["floor"],
         resolved=resolved[0], resolved_by_random=resolved[1], seconds=answer.seconds,
         cpu_seconds=answer.cpu_seconds, error=answer.error, rows=int(scene.given.sum()),
+        fellows=tuple(truth.notes.get("fellows", ())),
     )  # fmt: skip
 
 
@@ -109,6 +113,11 @@ def _is(effect: Reported, truth: Named) -> bool:
 
 def _in_set(effect: Reported, truth: Named) -> bool:
     return _is(effect, truth) or any(matches(truth, alias) for alias in effect.aliases)
+
+
+def _may_be(task: Task, effect: Reported, truth: Named) -> bool:
+    """Where the poses are blind to an effect, the little of it that shows is a curve of the same component."""
+    return FAMILIES[task.family].source == "blind" and any(symbol in effect.name for symbol in truth.symbols)
 
 
 def _size(effect: Reported) -> int:
@@ -128,13 +137,9 @@ def _family_right(scene: Scenario, first: Reported | None) -> bool:
     meant = [
         entry
         for entry in vocabulary(scene.draft.world.machine)
-        if matches(_named(entry), first.name, first.title, first.axis)
+        if matches(named(entry), first.name, first.title, first.axis)
     ]
     return any(e.family == truth.family or scene.truth.relatives.get(e.name, 0.0) >= CLOSE for e in meant)
-
-
-def _named(entry: Any) -> Named:
-    return Named(entry.name, entry.kind, entry.axis, entry.symbols, entry.family)
 
 
 def _gap_after(scene: Scenario, candidate: Candidate, answer: Answer, base: Path) -> float | None:

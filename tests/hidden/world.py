@@ -17,6 +17,11 @@ from .physics import Entry, Field
 from .situation import Situation
 from .visibility import View, first_order
 
+FAINT = 0.2
+"""A constant that moves the tip by less than this share of what others do is no further off for that (a knot of a table
+where hardly a pose is).
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Specimen:
@@ -89,11 +94,12 @@ def draw_clutter(
     """All the entries at once and every known constant a little off, `total` mm rms together, sizes of one order of
     magnitude.
     """
-    fields = [entry.draw(rng) for entry in entries]
+    fields = [entry.specimen(rng) for entry in entries]
     weight = np.exp(rng.normal(scale=rng.uniform(0.3, 0.9), size=len(fields)))
     unit = [w / rms(first_order(sensitivity, f(s))) for w, f in zip(weight, fields, strict=True)]
     shifts = sum(first_order(sensitivity, u * f(s)) for u, f in zip(unit, fields, strict=True))
-    off = rng.normal(size=sight.base.shape[2]) / np.array([rms(c) + 1e-30 for c in np.moveaxis(sight.base, 2, 0)])
+    reach = np.array([rms(c) for c in np.moveaxis(sight.base, 2, 0)])
+    off = rng.normal(size=len(reach)) / np.maximum(reach, FAINT * np.median(reach))
     scale = total / rms(shifts + sight.base @ off)
     parts = zip(entries, fields, unit, weight, strict=True)
     clutter = tuple(Specimen(e, f, scale * u, scale * w) for e, f, u, w in parts)

@@ -22,6 +22,7 @@ class Entry:
 
     `kind` and `axis` are how a reported name is recognised (names.py); `family` is what counts as next of kin;
     `draw(rng)` gives a specimen: the small motions (n, n_frames, 6) of all frames in a situation, in arbitrary size.
+    `one_way`: nature knows its sign (what is warm grows, what hangs goes down), and `draw` has it.
     """
 
     name: str
@@ -31,6 +32,14 @@ class Entry:
     symbols: tuple[str, ...]
     family: str
     draw: Callable[[Generator], Field]
+    one_way: bool = False
+
+    def specimen(self, rng: Generator) -> Field:
+        """A draw with either sign, where nature has no preference."""
+        motion = self.draw(rng)
+        if self.one_way or rng.random() < 0.5:
+            return motion
+        return lambda s: -motion(s)
 
 
 def field(parts: dict[tuple[str, str], Signal]) -> Field:

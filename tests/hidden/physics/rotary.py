@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.random import Generator
 
@@ -10,6 +12,7 @@ from ..chain import Joint, Machine
 from ..motion import Array
 from ..situation import Situation
 from .entry import Entry, Field, Signal, field, spread, symbol
+from .linear import lagging, sense
 
 
 def entries(machine: Machine) -> list[Entry]:
@@ -51,10 +54,13 @@ def _pair(rng: Generator, joint: Joint, names: tuple[str, str], first: int) -> F
     )
 
 
-def _entry(joint: Joint, row: int, kind: str, components: tuple[str, ...], draw: object) -> Entry:
+def _entry(
+    joint: Joint, row: int, kind: str, components: tuple[str, ...], draw: Callable[[Generator], Field],
+    one_way: bool = False,
+) -> Entry:  # fmt: skip
     symbols = tuple(symbol(c, joint.name) for c in components)
     family = f"{joint.name} reversal" if kind == "backlash" else f"{joint.name} rotary"
-    return Entry(f"{kind} {joint.name}", row, kind, joint.name, symbols, family, draw)  # type: ignore[arg-type]
+    return Entry(f"{kind} {joint.name}", row, kind, joint.name, symbols, family, draw, one_way)
 
 
 def _radial(joint: Joint) -> Entry:
@@ -114,10 +120,10 @@ def _backlash(joint: Joint) -> Entry:
     about = letters(joint)[3]
 
     def draw(rng: Generator) -> Field:
-        size = curves.play(rng)
-        return field({(joint.name, about): lambda s: size(np.sin(s.column(joint.name)), s.moving(joint.name))})
+        size, way = curves.play(rng), sense(joint) * lagging(rng)
+        return field({(joint.name, about): lambda s: way * size(np.sin(s.column(joint.name)), s.moving(joint.name))})
 
-    return _entry(joint, 26, "backlash", (about,), draw)
+    return _entry(joint, 26, "backlash", (about,), draw, one_way=True)
 
 
 def _seat(joint: Joint, linear: str) -> Entry:

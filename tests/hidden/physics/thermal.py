@@ -12,6 +12,7 @@ from ..climate import lagged
 from ..motion import Array
 from ..situation import Situation
 from .entry import Entry, Field, field, spread, symbol
+from .linear import sense
 
 FAMILY = "thermal"
 
@@ -19,19 +20,31 @@ FAMILY = "thermal"
 def entries(machine: Machine) -> list[Entry]:
     """All of them for one machine."""
     linear = [joint for joint in machine.joints if not joint.rotary]
-    result = [_growth(), _artefact()]
+    result = [_growth(machine), _artefact()]
     result += [_drift(letter) for letter in "XYZ"]
     result += [_swing(letter) for letter in "XYZ"]
     result += [_scale(joint) for joint in linear]
     result += [bend(joint, "AB"[i % 2]) for i, joint in enumerate(linear) if joint.tool_side]
-    result += [centre(joint) for joint in machine.joints if joint.rotary and _carried(machine, joint)]
+    for joint in machine.joints:
+        carrier = carrying(machine, joint)
+        if joint.rotary and carrier is not None:
+            result.append(centre(joint, _common_normal(joint, carrier)))
     return result
 
 
-def _carried(machine: Machine, joint: Joint) -> bool:
-    """Whether another rotary axis carries it: else its centre drifts like the column."""
-    names = [j.name for j in machine.outwards(joint.tool_side)]
-    return any(machine.joint(name).rotary for name in names[: names.index(joint.name)])
+def carrying(machine: Machine, joint: Joint) -> Joint | None:
+    """The rotary axis that carries another; a centre that none carries drifts like the column."""
+    branch = machine.outwards(joint.tool_side)
+    turning = [other for other in branch[: branch.index(joint)] if other.rotary]
+    return turning[-1] if turning else None
+
+
+def _common_normal(joint: Joint, carrier: Joint) -> str:
+    """The direction across both axes, in the triad of the carried one: a shift along it turns with the carrier. (Along
+    the carrier's line it would be the drift of the frame, and no data could tell.)
+    """
+    normal = np.cross(joint.direction, carrier.direction)
+    return "XYZ"[int(np.argmax(np.abs(np.asarray(joint.triad) @ normal)))]
 
 
 def heated(rng: Generator, body: str) -> Callable[[Situation], Array]:
@@ -53,12 +66,17 @@ def heated(rng: Generator, body: str) -> Callable[[Situation], Array]:
     return signal
 
 
-def _growth() -> Entry:
-    """The spindle grows along the tool."""
-    return Entry(
-        "spindle growth", 39, "spindle growth", "", ("EZS",), FAMILY,
-        lambda rng: field({("S", "Z"): heated(rng, "spindle")}),
-    )  # fmt: skip
+def _growth(machine: Machine) -> Entry:
+    """A warm spindle is longer: its nose pushes the tool away, against `tool_direction` (from tip to spindle)."""
+    part = int(np.argmax(np.abs(machine.tool_direction)))
+    way = -float(machine.tool_direction[part])
+
+    def draw(rng: Generator) -> Field:
+        warm = heated(rng, "spindle")
+        return field({("S", "XYZ"[part]): lambda s: way * warm(s)})
+
+    symbols = (symbol("XYZ"[part], "S"),)
+    return Entry("spindle growth", 39, "spindle growth", "", symbols, FAMILY, draw, one_way=True)
 
 
 def _drift(letter: str) -> Entry:
@@ -82,18 +100,20 @@ def _swing(letter: str) -> Entry:
 def _scale(joint: Joint) -> Entry:
     """A warm screw or scale: positioning in proportion to travel from where it is held, somewhere about its middle."""
 
+    way = sense(joint)
+
     def draw(rng: Generator) -> Field:
         warm, held, bow = heated(rng, "bed"), rng.uniform(-0.5, 0.5), spread(rng, 0.02, 0.3)
 
         def signal(s: Situation) -> Array:
             u = s.u(joint.name)
-            result: Array = warm(s) * (u - held + bow * u**2)
+            result: Array = way * warm(s) * (u - held + bow * u**2)
             return result
 
         return field({(joint.name, joint.name): signal})
 
     name = symbol(joint.name, joint.name)
-    return Entry(f"thermal scale {joint.name}", 41, "thermal scale", joint.name, (name,), FAMILY, draw)
+    return Entry(f"thermal scale {joint.name}", 41, "thermal scale", joint.name, (name,), FAMILY, draw, one_way=True)
 
 
 def bend(joint: Joint, component: str) -> Entry:
@@ -107,13 +127,12 @@ def bend(joint: Joint, component: str) -> Entry:
     return Entry(f"thermal bend {name}", 42, "thermal bend", joint.name, (name,), FAMILY, draw)
 
 
-def centre(joint: Joint) -> Entry:
-    """The seat of a rotary axis grows out of the middle of what carries it."""
-    along = int(np.argmax(np.abs(np.asarray(joint.triad) @ np.asarray(joint.direction))))
-    letter = "XYZ"[(along + 1) % 3]
+def centre(joint: Joint, letter: str) -> Entry:
+    """The seat of a rotary axis grows out of the middle of what carries it: a table, or a head beside the spindle."""
+    body = "spindle" if joint.tool_side else "table"
 
     def draw(rng: Generator) -> Field:
-        return field({(joint.name, letter): heated(rng, "table")})
+        return field({(joint.name, letter): heated(rng, body)})
 
     name = f"rotary centre drift {joint.name}"
     return Entry(name, 43, "rotary centre drift", joint.name, (f"E{letter}0{joint.name}",), FAMILY, draw)
@@ -127,7 +146,7 @@ def _artefact() -> Entry:
         parts = {("W", letter): _outward(warm, i) for i, letter in enumerate("XYZ")}
         return field(parts)
 
-    return Entry("artefact growth", 47, "artefact growth", "", ("W",), FAMILY, draw)
+    return Entry("artefact growth", 47, "artefact growth", "", ("W",), FAMILY, draw, one_way=True)
 
 
 def _outward(warm: Callable[[Situation], Array], index: int) -> Callable[[Situation], Array]:

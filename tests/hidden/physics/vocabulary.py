@@ -14,6 +14,7 @@ from ..chain import Joint, Machine
 from . import linear, thermal, weight
 from .entry import Entry, Field, field, spread, symbol
 from .linear import crossed
+from .rotary import letters
 
 
 def sayable(machine: Machine) -> tuple[Entry, ...]:
@@ -27,8 +28,9 @@ def sayable(machine: Machine) -> tuple[Entry, ...]:
     found += [weight.foundation_tilt(machine, joint) for joint in flat]
     found += [_nod(a, b, turn) for a in straight for b in straight if a is not b for turn in "ABC"]
     found += [thermal.bend(joint, turn) for joint in straight for turn in "ABC"]
-    found += [thermal.centre(joint) for joint in turning]
-    found += [make(joint) for joint in turning for make in weight.TURNING if weight.feels_gravity(machine, joint)]
+    found += [thermal.centre(joint, letter) for joint in turning for letter in letters(joint)[1:3]]
+    for joint in turning:
+        found += weight.of_weight(joint) if weight.feels_gravity(machine, joint) else ()
     return tuple(found)
 
 

@@ -7,7 +7,7 @@ from numpy.random import Generator
 
 from .. import curves
 from ..chain import Joint, Machine
-from ..motion import Array, turned
+from ..motion import Array, inverse, moved, turned
 from ..situation import Situation
 from .entry import Entry, Field, Signal, field, spread, symbol
 from .linear import crossed
@@ -64,9 +64,11 @@ def across(s: Situation, joint: Joint) -> tuple[Array, Array, Array]:
     return down[:, "XYZ".index(first)], down[:, "XYZ".index(second)], sign * s.column(joint.name)
 
 
-def mass(s: Situation, own: float) -> Array:
-    """Turning mass in units of 300 kg: the table's own, and the workpiece."""
-    return own + s.load / 300.0
+def mass(s: Situation, joint: Joint, own: float) -> Array:
+    """Turning mass in units of 300 kg: the body's own, and the workpiece on a table; a head carries a tool, and the
+    longer it is the heavier.
+    """
+    return own + (s.length / 1000.0 if joint.tool_side else s.load / 300.0)
 
 
 def _curved(rng: Generator, joint: Joint, power: float) -> tuple[curves.Curve, curves.Curve]:
@@ -115,7 +117,7 @@ def ram_droop(machine: Machine, joint: Joint) -> Entry:
     symbols = _components(machine, joint)
     return Entry(
         f"ram droop {joint.name}", 33, "ram droop", joint.name, symbols, f"{joint.name} geometry",
-        lambda rng: _coupled(machine, joint, rng, 2.7),
+        lambda rng: _coupled(machine, joint, rng, 2.7), one_way=True,
     )  # fmt: skip
 
 
@@ -202,7 +204,7 @@ def _torque(joint: Joint) -> Entry:
         def signal(s: Situation) -> Array:
             a, b, turn = across(s, joint)
             lever = a * np.cos(turn + phase) + b * np.sin(turn + phase)
-            result: Array = mass(s, own) * (lever + bend * lever**2)
+            result: Array = mass(s, joint, own) * (lever + bend * lever**2)
             return result
 
         return field({(joint.name, about): signal, (joint.name, first): lambda s: shift * signal(s)})
@@ -212,15 +214,15 @@ def _torque(joint: Joint) -> Entry:
 
 def _twist(joint: Joint) -> Entry:
     """A trunnion driven from one side: the further from the drive, the more its table lags under torque."""
-    along, _, _, about = letters(joint)
+    about = letters(joint)[3]
 
     def draw(rng: Generator) -> Field:
         phase, bend, own = rng.uniform(-0.8, 0.8), rng.uniform(-0.25, 0.25), rng.uniform(0.2, 0.8)
 
         def signal(s: Situation) -> Array:
             a, b, turn = across(s, joint)
-            torque = mass(s, own) * (a * np.cos(turn + phase) + b * np.sin(turn + phase))
-            place = s.ball() @ np.asarray(joint.triad)["XYZ".index(along)] / 200.0
+            torque = mass(s, joint, own) * (a * np.cos(turn + phase) + b * np.sin(turn + phase))
+            place = _along_the_axis(s, joint) / 200.0
             result: Array = torque * (place + bend * place**2)
             return result
 
@@ -229,13 +231,24 @@ def _twist(joint: Joint) -> Entry:
     return _entry(joint, 31, "trunnion twist", (about,), draw)
 
 
+def _along_the_axis(s: Situation, joint: Joint) -> Array:
+    """How far along a rotary axis the tip is, from the axis' point, mm: whatever turns on it further out."""
+    carriers = s.machine.carriers(s.q)
+    tip = moved(carriers["S"][0], np.asarray(s.machine.tool_point) - np.outer(s.length, s.machine.tool_direction))
+    pose, reference = carriers[joint.name]
+    result: Array = (moved(inverse(pose), tip) - reference) @ np.asarray(joint.direction)
+    return result
+
+
 def _entry(joint: Joint, row: int, kind: str, components: tuple[str, ...], draw: object) -> Entry:
     symbols = tuple(symbol(c, joint.name) for c in components)
     return Entry(f"{kind} {joint.name}", row, kind, joint.name, symbols, f"{joint.name} rotary", draw)  # type: ignore[arg-type]
 
 
-TURNING = (_stiffness, _unbalance, _torque, _twist)
-"""What weight does to a rotary axis, wherever it lies."""
+def of_weight(joint: Joint) -> tuple[Entry, ...]:
+    """What weight does to a rotary axis, wherever it lies; what needs a workpiece, to those of a table only."""
+    on_table = (_unbalance(joint), _twist(joint)) if not joint.tool_side else ()
+    return _stiffness(joint), _torque(joint), *on_table
 
 
 def _tool_droop(machine: Machine) -> Entry:
@@ -252,4 +265,4 @@ def _tool_droop(machine: Machine) -> Entry:
 
         return field({("S", "A"): lambda s: weight(s, 1), ("S", "B"): lambda s: -weight(s, 0)})
 
-    return Entry("tool droop", 36, "tool droop", "", ("EAS", "EBS"), "spindle", draw)
+    return Entry("tool droop", 36, "tool droop", "", ("EAS", "EBS"), "spindle", draw, one_way=True)
