@@ -33,7 +33,7 @@ STAGES: tuple[tuple[str, Any, str], ...] = (
     ("follow it (twice)", RS274Follower, "follow"),
     ("correct the ends of motions", path, "corrected"),
     ("judge the path between them", path, "_judged"),
-    ("split what leaves the tolerance", path, "_parts"),
+    ("split what leaves the tolerance", path, "in_pieces"),
     ("check limits", settle, "findings"),
     ("write: which words change, digits", settle, "emit"),
     ("write: put the text together", corrector, "spliced"),

@@ -12,7 +12,10 @@ from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import stamp_of
 from ncfix.compensate.following import placed
-from ncfix.compensate.proof import SelfCheckError, differences
+from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.plain_figures import figures
+from ncfix.compensate.plain_text import PlainText, written
+from ncfix.compensate.proof import SelfCheckError, differ, differences
 from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
@@ -21,10 +24,13 @@ from ncfix.compensate.verify import path_error
 from ncfix.diagnostics import Message, NcfixError
 from ncfix.machine import State
 from ncfix.program import stamp
+from ncfix.program.language import language_of
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError, PartReader
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
+
+FRAMES = "the program takes frames or values from where the machine stands"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +63,7 @@ class Corrector:
         )
         self.again, self.proof = PartReader(task.path, task.dialect), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
+        self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)
         self.head: Program | None = None
         self.at = 0
         self.stamped = b""
@@ -81,12 +88,45 @@ class Corrector:
 
     def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
         """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
+        course = None if self.planner is None else self.planner.plan(unit)
+        agreed = None if course is not None else self._agreed(unit)
+        before = share.before(number)
+        if before is not None and foreign:
+            self.proof.stand(before.position)
+        if course is not None and before is not None and not before.kept:
+            plain = written(self.language, course, before.position, increments(self.machine))
+            if plain is not None:
+                return self._plainly(course, plain, share)
+        return self._settled(unit, agreed or self._agreed(unit), before, share)
+
+    def _plainly(self, course: Course, plain: PlainText, share: Share) -> Done:
+        """Finish a part of nothing but plain motions."""
+        part, moves = course.part, course.part.moves
+        if not part.last:
+            shift = course.real.start[-1] - moves.start[-1]
+            share.leave(Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy()))
+        text = spliced(part.program.source, plain.splices)
+        again = self._read_again(text, part.last)
+        if len(again) != len(plain.end) or differ(again.end, plain.end).any():
+            raise NotInPartsError(FRAMES)
+        tally = Tally()
+        tally.add_plain(len(moves), plain.added, plain.largest_shift(course), len(plain.splices) > 0)
+        if self.task.options.verify:
+            tally.figures(figures(course, plain, self.task.options.split_rapids), part.program, moves)
+        return Done(text, tally)
+
+    def _agreed(self, unit: Unit) -> Agreed:
+        """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
+        part = unit.together()
+        nowhere = np.zeros(len(part.moves.axes))
+        guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
+        return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
+
+    def _settled(self, unit: Unit, agreed: Agreed, before: Before | None, share: Share) -> Done:
+        """Correct a part by the long way."""
         task, part = self.task, unit.together()
         moves = part.moves
-        nowhere = np.zeros(len(moves.axes))
-        guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
-        first: Agreed | None = agree(moves, self.machine, task.dialect, task.options, guess)
-        before = share.before(number)
+        first: Agreed | None = agreed
         if before is not None:
             before = replace(before, direction=unit.direction)
             first = None if before.kept or _still_off(moves, before) else first
@@ -96,8 +136,6 @@ class Corrector:
         if not part.last:
             share.leave(_left(settled))
         text = self._text(part.program, settled, before is None)
-        if before is not None and foreign:
-            self.proof.stand(before.position)
         own = np.ones(len(moves), dtype=bool)
         own[:1] = unit.head is None
         self._prove(text, settled, own, part.last)
@@ -126,16 +164,20 @@ class Corrector:
         return spliced(program.source, splices)
 
     def _prove(self, text: bytes, settled: Settled, own: Mask, last: bool) -> None:
-        """The text is read and followed again: the control must understand what the plan meant."""
+        """The control must understand what the plan meant."""
+        wrong = differences(settled, self._read_again(text, last), own[settled.plan.pieces.move])
+        if wrong is None or wrong.any():
+            raise NotInPartsError(FRAMES)
+
+    def _read_again(self, text: bytes, last: bool) -> Moves:
+        """What a control makes of the text that was written."""
         try:
             program = self.again.read(text)
             again = self.proof.follow(program, last)
         except NcfixError as error:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
         self.again.first_line += len(program)
-        wrong = differences(settled, again, own[settled.plan.pieces.move])
-        if wrong is None or wrong.any():
-            raise NotInPartsError("the program takes frames or values from where the machine stands")
+        return again
 
     def _look(self, part: Part, settled: Settled, own: Mask, unit: Unit, tally: Tally) -> None:
         """Find out the tip errors before and after, with the numbers as the control will understand them."""
@@ -151,7 +193,7 @@ class Corrector:
             tilts=False,
             known=settled.plan.known,
         )
-        tally.figures(errors, part.program.lines(moves.block))
+        tally.figures(errors, part.program, moves)
 
 
 def _still_off(moves: Moves, before: Before) -> bool:

@@ -18,9 +18,12 @@ from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 
 
-def on_digits(machine: Machine, moves: Moves, pieces: Pieces) -> Pieces:
-    """The pieces with rotary positions as they will be written; those that the program wrote stay as they are."""
-    rows = _newly_written(moves, pieces)
+def on_digits(machine: Machine, moves: Moves, pieces: Pieces, among: Index | None = None) -> Pieces:
+    """The pieces with rotary positions as they will be written; those that the program wrote stay as they are.
+
+    among  (k,) pieces that may have others; all if not given
+    """
+    rows = _newly_written(moves, pieces, np.arange(len(pieces)) if among is None else among)
     if not rows.size:
         return pieces
     move = pieces.move[rows]
@@ -34,10 +37,10 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces) -> Pieces:
     return replace(pieces, end=end)
 
 
-def _newly_written(moves: Moves, pieces: Pieces) -> Index:
+def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
     """Straight pieces with a rotary position that the program does not have as a number of its own."""
-    turned = (pieces.end != moves.end[pieces.move])[:, moves.rotary].any(axis=1)
-    rows: Index = np.flatnonzero(turned & ~pieces.kept & ~pieces.arc)
+    turned = (pieces.end[among] != moves.end[pieces.move[among]])[:, moves.rotary].any(axis=1)
+    rows: Index = among[turned & ~pieces.kept[among] & ~pieces.arc[among]]
     return rows
 
 

@@ -28,19 +28,28 @@ def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 
 
 
 def idle(pieces: Pieces, emission: Emission, first: int = 0) -> Mask:
-    """(m,) straight pieces that another one of their motion can stand for: it goes on from where they begin."""
+    """As `standing_still`, of what was written."""
+    return standing_still(pieces, emission.end, emission.start, first)
+
+
+def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> Mask:
+    """(m,) straight pieces that another one of their motion can stand for: it goes on from where they begin.
+
+    end, start  (m, n_axes), (n, n_axes) commands at the ends of pieces and at the starts of motions, as written
+    first       the motion from which on pieces were written
+    """
     found = np.zeros(len(pieces), dtype=bool)
     goes_on = pieces.move[1:] == pieces.move[:-1]
     rows = np.flatnonzero(np.append(goes_on, False) | np.append(False, goes_on))
     if not rows.size:
         return found
-    move, end = pieces.move[rows], emission.end[rows]
+    move, end = pieces.move[rows], end[rows]
     inner = move[1:] == move[:-1]
     plain = ~(pieces.arc | pieces.kept)[rows] & (move >= first)
     stays = np.zeros(len(rows), dtype=bool)
     stays[1:] = inner & (end[1:] == end[:-1]).all(axis=1)
     begins = np.flatnonzero(np.append(True, ~inner))
-    stays[begins] = (end[begins] == emission.start[move[begins]]).all(axis=1)
+    stays[begins] = (end[begins] == start[move[begins]]).all(axis=1)
     last = np.append(~inner, True)
     before_last = np.append(last[1:] & stays[1:] & inner, False)
     found[rows] = plain & ((stays & ~last) | before_last)

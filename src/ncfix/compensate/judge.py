@@ -14,6 +14,7 @@ from ncfix.compensate.sampling import interior, merged, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.machine.aim import CLOSE
+from ncfix.machine.bow import Bow
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""
@@ -38,7 +39,13 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
     """
     worst = bounds(intent, real, rows, uneasy)
     unknown = np.flatnonzero(~(worst <= SURE * tolerance))
-    worst[unknown] = _look(intent, real, rows[unknown], uneasy, FIRST, 1)
+    worst[unknown] = looked_at(intent, real, rows[unknown], uneasy, tolerance)
+    return worst
+
+
+def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolerance: float) -> Array:
+    """As `deviations`, of motions that no bound speaks for."""
+    worst = _look(intent, real, rows, uneasy, FIRST, 1)
     doubtful = np.flatnonzero(~(worst <= SURE * tolerance))
     if doubtful.size:
         closer = _look(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
@@ -60,14 +67,22 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
         return most
     chosen = slice(None) if plain.all() else plain
     on = rows[chosen]
-    start, end, rotary = real.start[on], real.end[on], intent.machine.rotary
+    start, end, linear = real.start[on], real.end[on], ~intent.machine.rotary
+    shifts = (start - intent.moves.start[on])[:, linear], (end - intent.moves.end[on])[:, linear]
+    most[chosen] = straight_bounds(bow, start, end, shifts, intent.lengths(on), linear)
+    return most
+
+
+def straight_bounds(
+    bow: Bow, start: Array, end: Array, shifts: tuple[Array, Array], tool_lengths: Array, linear: Mask
+) -> Array:
+    """As `bounds`, of straight motions (k, n_axes) between corrected ends, with `shifts` of their linear axes there."""
     farthest = np.maximum(np.abs(start).max(axis=0), np.abs(end).max(axis=0))
-    length = float(np.abs(intent.lengths(on)).max())
-    least, angle = bow.of(np.abs(end - start), farthest, length, rotary)
-    before, after = (start - intent.moves.start[on])[:, ~rotary], (end - intent.moves.end[on])[:, ~rotary]
+    least, angle = bow.of(np.abs(end - start), farthest, float(np.abs(tool_lengths).max()), ~linear)
+    before, after = shifts
     sizes = [lengths(each) for each in (before, after, after - before)]
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
-    most[chosen] = least + CORNER * turned / 8 + CLOSE
+    most: Array = least + CORNER * turned / 8 + CLOSE
     return most
 
 

@@ -101,7 +101,7 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     deviation = _judged(intent, real, kept, broken, followed, demands)
     limit = demands.budget.path
     over = np.flatnonzero((deviation > limit) & ~bound)
-    parts = _parts(intent, real, over, deviation[over], strategy, demands)
+    parts = in_pieces(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
@@ -147,7 +147,7 @@ def _judged(intent: Intent, real: Segments, kept: Mask, broken: Mask, followed: 
     return deviation
 
 
-def _parts(
+def in_pieces(
     intent: Intent, real: Segments, rows: Index, deviation: Array, strategy: Strategy, demands: Demands
 ) -> Split:
     """Motions `rows` in pieces: of arcs in arcs, where the control and the tolerance allow, else in straight ones."""

@@ -88,12 +88,12 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
         return None
-    differs: Mask = _differs(again.end, emission.end[rows]) | _strayed(settled, again, rows)
+    differs: Mask = differ(again.end, emission.end[rows]) | _strayed(settled, again, rows)
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
-    differs[arcs[_differs(off, np.zeros_like(off))]] = True
+    differs[arcs[differ(off, np.zeros_like(off))]] = True
     differs[arcs] |= np.abs(again.sweep[arcs] - _sweeps(settled)[rows[arcs]]) > TURN
     return differs
 
@@ -119,7 +119,8 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
     return strayed
 
 
-def _differs(found: Array, meant: Array) -> Mask:
+def differ(found: Array, meant: Array) -> Mask:
+    """Rows of commands (m, n_axes) that are not the same but for noise."""
     with np.errstate(invalid="ignore"):
         same = np.asarray(np.abs(found - meant) <= SAME)
     if not same.all():

@@ -99,6 +99,18 @@ class Tally:
         for finding in settled.plan.findings:
             self._note(finding, program, moves, own)
 
+    def add_plain(self, motions: int, lines: int, largest: float, changed: bool) -> None:
+        """Take in a part of nothing but motions that were corrected, each in a block of its own.
+
+        lines    that were put in
+        largest  shift of a linear command, mm
+        """
+        self.moves += motions
+        self.compensated += motions
+        self.inserted += lines
+        self.largest = max(self.largest, largest)
+        self.changed |= changed
+
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""
         self.blocks += other.blocks
@@ -117,11 +129,11 @@ class Tally:
         for key, found in other.found.items():
             self._take_found(key, found)
 
-    def figures(self, errors: PathError, lines: NDArray[np.int64]) -> None:
-        """Take in the tip errors of a part; `lines` (n,) of its motions."""
+    def figures(self, errors: PathError, program: Program, moves: Moves) -> None:
+        """Take in the tip errors of a part."""
         self.way += errors.way
         for side, figures in ((self.before, errors.before), (self.after, errors.after)):
-            line = int(lines[figures.move]) if figures.move >= 0 else None
+            line = program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
             side.add(figures, errors.way, line)
 
     def _note(self, finding: Finding, program: Program, moves: Moves, own: Mask) -> None:

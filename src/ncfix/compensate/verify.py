@@ -110,7 +110,7 @@ def path_error(
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
-    tally = _Tally(len(moves))
+    tally = FigureTally(len(moves))
     which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
     for part in samples(written, which, density, least, tilts, known):
         tally.add(part)
@@ -124,10 +124,15 @@ def samples(
     least: int = 2,
     tilts: bool = True,
     known: Known | None = None,
+    uneasy: Mask | None = None,
 ) -> Iterator[Samples]:
-    """Look at pieces `which`, in batches; what is known of their ends need not be looked at."""
+    """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
+
+    uneasy  (n,) motions that may not begin where they should, if that is known
+    """
     counts, along = _counts(written, which, density, least)
-    uneasy = uneasy_starts(written.intent, _kept_motions(written))
+    if uneasy is None:
+        uneasy = uneasy_starts(written.intent, _kept_motions(written))
     if known is not None and not tilts:
         here, before, after = known.at(written, which)
         here[lacking(written.intent, written.pieces.move[which])] = False
@@ -242,7 +247,7 @@ def _kept_motions(written: Written) -> Mask:
     return kept
 
 
-class _Tally:
+class FigureTally:
     """Figures gathered batch by batch."""
 
     def __init__(self, n: int) -> None:

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.bulk_layouts import Layouts
+from ncfix.program.bulk_layouts import CLOSING, OPENING, Layouts
+from ncfix.program.bulk_lines import lines_of, with_lines
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
@@ -29,6 +30,9 @@ Mask = NDArray[np.bool_]
 
 SHORTEST = 16
 """Stretches of fewer motions go one by one."""
+ROUNDED = 1.01
+"""Half output steps by which an axis may stand off its place for nothing but rounding."""
+SWAPPED = bytes.maketrans(b".,", b",.")
 LONGEST = 1 << 12
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
@@ -69,6 +73,8 @@ class Bulk:
         if jumps.any():
             fit &= ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
+        if language.one_by_one is not None and fit.any():
+            fit &= ~language.one_by_one(program, moves, pieces, first_piece)
         breaks = np.ones(len(moves) + 1, dtype=np.bool_)
         breaks[:-1] = ~fit
         ends = np.append(np.flatnonzero(breaks[:-1]), len(moves))
@@ -76,6 +82,45 @@ class Bulk:
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop)
+
+    @property
+    def text(self) -> NDArray[np.uint8]:
+        """The source, with decimal points where it has commas."""
+        comma, source = self.layouts.manner.comma, self.program.source
+        return np.frombuffer(source.translate(SWAPPED) if comma else source, dtype=np.uint8)
+
+    def put(self, splices: Splices) -> None:
+        """Take in what changes, with commas if the program has such."""
+        comma = self.layouts.manner.comma
+        self.parts.append(replace(splices, data=splices.data.translate(SWAPPED)) if comma else splices)
+
+    @classmethod
+    def of_all(
+        cls, language: Language, program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, frame: Frame
+    ) -> Bulk | None:
+        """All motions as one stretch, where they follow each other plainly in this frame; None if they do not qualify.
+
+        first_piece  (n + 1,) the first piece of each motion, and how many there are
+        """
+        layouts, n = Layouts.of(language, program, moves), len(moves)
+        shapes = program.template[moves.block]
+        several = np.flatnonzero(np.diff(first_piece) > 1)
+        if not (_is_plain(frame) and layouts.known[shapes].all() and layouts.further[shapes[several]].all()):
+            return None
+        return cls(program, moves, pieces, first_piece, layouts, np.full(n + 1, n))
+
+    def take_all(self, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+        """Write the stretch of all motions, as `take`; None if that is not clear to its end."""
+        parts: list[FloatArray] = []
+        row = 0
+        while row < len(self.moves):
+            ends = self.take(row, position, frame, decimals)
+            if ends is None:
+                return None
+            parts.append(ends)
+            position, done = ends[-1], self.first_piece[row] + len(ends)
+            row = int(np.searchsorted(self.first_piece, done))
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
         """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
@@ -93,7 +138,7 @@ class Bulk:
         stretch = Stretch.of(self, row, stop, position, frame, decimals).clear_head()
         if not len(stretch.block):
             return None
-        self.parts.append(stretch.splices())
+        self.put(stretch.splices())
         self.added += int(np.count_nonzero(stretch.further))
         return stretch.commands()
 
@@ -108,29 +153,40 @@ class Bulk:
         program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
         ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), line_end(program.source)
         axes, edits = len(here), (stop - row) * (len(here) + 1)
-        commands, data = np.empty_like(ends), np.empty(len(ends) * (axes * ROOM + len(end_of_line)), dtype=np.uint8)
+        blocks = self.moves.block[row:stop]
+        commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * ROOM), dtype=np.uint8)
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
         counts = np.zeros(3, dtype=np.int64)
         done = writing_kernels.write(
-            np.frombuffer(program.source, dtype=np.uint8),
-            (program.blocks, self.moves.block[row:stop], program.first_number, program.template),
+            self.text,
+            (program.blocks, blocks, program.first_number, program.template),
             (program.numbers, program.number_spans),
             (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
             ends,
             pieces - pieces[0],
             here,
             (frame.frame.offset, frame.scale),
-            (decimals, _halves(decimals)),
-            np.frombuffer(end_of_line, dtype=np.uint8),
+            (decimals, _halves(decimals), int(layouts.manner.signed)),
+            (np.frombuffer(end_of_line, dtype=np.uint8), layouts.leads, layouts.openings, layouts.closings),
             (commands, start, end, length, data),
             (np.empty(axes), np.empty(axes), np.empty(axes, dtype=np.bool_), counts),
         )
         if not done:
             return None
         edits, size, lines = counts.tolist()
-        self.parts.append(Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes()))
+        self.put(Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes()))
         self.added += lines
         return commands[:done]
+
+    def _room(self, pieces: IntArray, blocks: NDArray[np.int32], words: int) -> int:
+        """Bytes that the words and lines of some motions take at most; `words`: those of a piece."""
+        lines, line = int(pieces[-1] - pieces[0]), words + len(b"\r\n") + OPENING + CLOSING
+        if not self.layouts.manner.lined:
+            return lines * line
+        several = np.diff(pieces) - 1
+        rows = blocks[several > 0].astype(np.int64)
+        leads = self.layouts.lead_ends(self.program, rows) - self.program.blocks[rows, 0]
+        return lines * line + int((several[several > 0] * leads).sum())
 
 
 def _halves(decimals: IntArray) -> FloatArray:
@@ -226,7 +282,8 @@ class Stretch:
         half = _halves(decimals)
         original = np.where(present, program.numbers[np.maximum(words, 0)], 0.0)
         rewrite = present & ((np.abs(wanted - original) >= half) | np.append(further[1:], False)[:, None])
-        styles = styles_of(np.frombuffer(program.source, dtype=np.uint8), program.number_spans[words[present]])
+        signed = bulk.layouts.manner.signed
+        styles = styles_of(bulk.text, program.number_spans[words[present]], signed=signed)
         digits = np.broadcast_to(decimals, words.shape).copy()
         digits[present] = np.maximum(digits[present], styles.decimals)
         clear = is_plain(wanted, digits) | (present & ~rewrite)
@@ -234,7 +291,8 @@ class Stretch:
         values = np.where(present & ~rewrite, original, rounded(wanted, digits))
         add = np.zeros_like(present)
         if not present.all():
-            add = _missing(frame.program(position.copy()), values, present, wanted, half, clear)
+            stays = ~present & bulk.layouts.nameless(program, block)
+            add = _missing(frame.program(position.copy()), values, present, wanted, half, clear, stays)
             clear[further & ~add.any(axis=1)] = False
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
@@ -276,6 +334,7 @@ class Stretch:
     def _added(self) -> Splices:
         """The words that are missing, and those of further pieces, in the order in which programs write them."""
         program, layouts = self.bulk.program, self.bulk.layouts
+        manner = layouts.manner
         rows, columns = np.nonzero(self.add[:, layouts.by_letter])
         columns = layouts.by_letter[columns]
         blocks, further = self.block[rows], self.further[rows]
@@ -283,17 +342,30 @@ class Stretch:
         heads = np.zeros((len(rows), 4), dtype=np.uint8)
         heads[:, 2:] = layouts.heads[program.template[blocks], columns]
         begins = further & (np.diff(rows, prepend=-1) != 0)
-        heads[begins, :3] = np.frombuffer(line_end(program.source).rjust(2, b"\0") + b"\0", dtype=np.uint8)
-        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads)
-        return Splices(at, at, texts.length, texts.data)
+        if not manner.lined:
+            heads[begins, :3] = np.frombuffer(line_end(program.source).rjust(2, b"\0") + b"\0", dtype=np.uint8)
+        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads, signed=manner.signed)
+        words = Splices(at, at, texts.length, texts.data)
+        if not (manner.lined and begins.any()):
+            return words
+        first, last = np.flatnonzero(begins), np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
+        return with_lines(words, *lines_of(program, layouts, blocks[first], line_end(program.source)), (first, last))
 
 
 def _missing(
-    start: FloatArray, values: FloatArray, present: Mask, wanted: FloatArray, half: FloatArray, clear: Mask
+    start: FloatArray,
+    values: FloatArray,
+    present: Mask,
+    wanted: FloatArray,
+    half: FloatArray,
+    clear: Mask,
+    stays: Mask,
 ) -> Mask:
     """Axes without a word that must stand elsewhere by half an output step; marks in `clear` where that is clear.
 
     start  (n_axes,) program numbers of where the control stands before the stretch
+    stays  (k, n_axes) axes that get no word; where one must stand elsewhere by more than what rounding does to it, that
+           is not clear
 
     After its last word an axis is left there until it is off by half a step; from then on it is on the digits, and gets
     a word whenever the nearest digits change.
@@ -307,6 +379,9 @@ def _missing(
     before = np.where(held, left_at, np.vstack((start, values[:-1])))
     add: Mask = ~present & ~(np.abs(wanted - before) < half)
     clear |= ~present & held & ~away
+    if stays.any():
+        add &= ~stays
+        clear[stays] = (np.abs(wanted - left_at) <= ROUNDED * half)[stays]
     return add
 
 

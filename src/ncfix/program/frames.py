@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.moves import Frame
+from ncfix.program.number_style import decimals_for
 
 FloatArray = NDArray[np.float64]
 
@@ -30,6 +31,10 @@ class FrameMap:
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
         return values / self.scale
+
+    def decimals(self, steps: FloatArray) -> NDArray[np.int64]:
+        """(n_axes,) digits behind the point that numbers need for what the control can resolve, mm and rad."""
+        return np.array([decimals_for(step) for step in steps / self.scale], dtype=np.int64)
 
     def still(self, unmoved: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Axes that stand exactly where they stood, free of the rounding of these maps.

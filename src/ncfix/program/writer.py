@@ -68,11 +68,14 @@ class Splices:
     @classmethod
     def joined(cls, parts: Sequence[Splices]) -> Splices:
         """Several, sorted by place; at one place in the order given."""
-        start, stop, length = (
-            np.concatenate([getattr(part, name) for part in parts] or [np.empty(0, np.int64)])
-            for name in ("start", "stop", "length")
-        )
-        data = b"".join(part.data for part in parts)
+        if len(parts) == 1:
+            start, stop, length, data = parts[0].start, parts[0].stop, parts[0].length, parts[0].data
+        else:
+            start, stop, length = (
+                np.concatenate([getattr(part, name) for part in parts] or [np.empty(0, np.int64)])
+                for name in ("start", "stop", "length")
+            )
+            data = b"".join(part.data for part in parts)
         if not (np.diff(2 * start + (stop > start)) < 0).any():
             return cls(start, stop, length, data)
         order = np.argsort(2 * start + (stop > start), kind="stable")

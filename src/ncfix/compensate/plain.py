@@ -1,0 +1,206 @@
+"""Parts of nothing but plain straight motions, which is what long programs are made of: planned in few passes.
+
+The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no arcs, cycles
+or dwells in it, no tool-centre-point control, no axes without words, nothing that is left as it is, and every motion
+begins where the one before ended. Whatever turns out to need more than that, or comes near to a limit, is for the long
+way. Both ways write the same bytes; a test holds them together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ncfix.compensate.budget import Budget, Closure
+from ncfix.compensate.digits import on_digits
+from ncfix.compensate.direction import REST, matters
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.grids import Split
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.judge import SURE, looked_at, straight_bounds
+from ncfix.compensate.limits import FUZZ, JUMP
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.path import Demands, in_pieces
+from ncfix.compensate.ragged import offsets, owners, places
+from ncfix.compensate.rows import lengths, some
+from ncfix.compensate.sampling import passed
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.settle import rounding
+from ncfix.compensate.strategies import Strategy, get_strategy
+from ncfix.compensate.units import Part, Unit
+from ncfix.machine import Machine, State
+from ncfix.program.moves import FeedMode, Kind, Moves, Rule
+from ncfix.program.pieces import Pieces
+
+NEARLY = 1 - 1e-6
+"""Of a limit; what comes so close to one is for the long way to judge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The plan of a part of plain motions.
+
+    part    its text and motions
+    intent  the motions on the machine
+    real    where they really start and end, before rounding
+    pieces  what is to be written; none is an arc, none is kept
+    first   (n + 1,) the first piece of each motion, and how many there are
+    wanted  (n, n_axes) commands at which the tip is where it should be, to 1 nm
+    before  (n,) mm: how far off it is there without a correction
+    """
+
+    part: Part
+    intent: Intent
+    real: Segments
+    pieces: Pieces
+    first: Index
+    wanted: Array
+    before: Array
+
+    @property
+    def single(self) -> bool:
+        """Whether every motion is one piece."""
+        return len(self.pieces) == len(self.first) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Planner:
+    """Plans parts of plain motions.
+
+    machine  with the workpiece in its place
+    """
+
+    machine: Machine
+    strategy: Strategy
+    demands: Demands
+
+    @classmethod
+    def of(cls, machine: Machine, options: FixOptions) -> Planner | None:
+        """For a machine and options; None if these need the long way."""
+        strategy = get_strategy(options.strategy)
+        budget = Budget(options.tolerance_mm, rounding(machine))
+        able = strategy.follows_path and not strategy.corrects_orientation and budget.met
+        if not able or matters(machine) or machine.inputs or machine.bow is None or machine.linear_ways is None:
+            return None
+        demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
+        return cls(machine, strategy, demands)
+
+    def plan(self, unit: Unit) -> Course | None:
+        """The plan of a part behind the last motion of the one before; None if it needs the long way."""
+        part, moves = unit.part, unit.part.moves
+        if unit.head is None or not follow_plainly(unit.head.moves, moves):
+            return None
+        q = np.concatenate([unit.head.moves.end, moves.end])
+        found = self.strategy.solve(self.machine, q, State(float(moves.tool_length[0])))
+        if found.before is None or not found.converged.all():
+            return None
+        shift = found.q - q
+        if not self._fine(moves, shift):
+            return None
+        intent = Intent(self.machine, moves, State())
+        ends = moves.start + shift[:-1], moves.end + shift[1:]
+        real = replace(intent.segments, start=ends[0], end=ends[1])
+        over, parts = self._split(intent, real, shift)
+        pieces, first = pieces_of(real, over, parts)
+        inner = np.flatnonzero(pieces.fraction < 1)
+        if inner.size:
+            pieces = on_digits(self.machine, moves, pieces, inner)
+            if not self._fine_inside(intent, pieces, inner, shift):
+                return None
+        return Course(part, intent, real, pieces, first, found.q[1:], found.before[1:])
+
+    def followed(self, moves: Moves) -> Mask:
+        """(n,) motions that are looked at along their way."""
+        moving = some(np.abs(moves.end - moves.start) >= REST)
+        return moving if self.demands.split_rapids else moving & (moves.kind == Kind.FEED)
+
+    def _split(self, intent: Intent, real: Segments, shift: Array) -> tuple[Index, Split | None]:
+        """The motions that must be split, and their pieces."""
+        moves, limit = intent.moves, self.demands.budget.path
+        bow, linear = self.machine.bow, ~self.machine.rotary
+        assert bow is not None
+        shifts = shift[:-1, linear], shift[1:, linear]
+        bound = straight_bounds(bow, real.start, real.end, shifts, intent.lengths(np.arange(len(moves))), linear)
+        bound[passed(intent, real.start, real.end)[0]] = np.inf
+        rows = np.flatnonzero(~(bound <= SURE * limit) & self.followed(moves))
+        if not rows.size:
+            return rows, None
+        worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
+        over = worst > limit
+        rows = rows[over]
+        return rows, in_pieces(intent, real, rows, worst[over], self.strategy, self.demands) if rows.size else None
+
+    def _fine(self, moves: Moves, shift: Array) -> bool:
+        """Whether the ends of all motions stay well within the limits: as `limits`, from the safe side."""
+        low, high = self.machine.ranges.T
+        ends = (moves.end, moves.end + shift[1:])
+        within = all(
+            bool((low - end.min(axis=0) <= FUZZ).all() and (end.max(axis=0) - high <= FUZZ).all()) for end in ends
+        )
+        return within and self._small(shift) and self._steady(np.diff(shift, axis=0))
+
+    def _fine_inside(self, intent: Intent, pieces: Pieces, inner: Index, shift: Array) -> bool:
+        """The same of pieces that end inside of motions (k,)."""
+        near = np.unique(np.concatenate([inner, inner + 1]))
+        own, ends = pieces.move[near], pieces.end[near]
+        change = ends - intent.segments.at(own, pieces.fraction[near])
+        at_start = pieces.move[np.maximum(near - 1, 0)] != own
+        at_start[:1] |= near[:1] == 0
+        before = np.concatenate([np.zeros_like(change[:1]), change[:-1]])
+        before[at_start] = shift[own[at_start]]
+        low, high = self.machine.ranges.T
+        within = bool((low - ends <= FUZZ).all() and (ends - high <= FUZZ).all())
+        return within and self._small(change) and self._steady(change - before)
+
+    def _small(self, shift: Array) -> bool:
+        """Whether corrections (k, n_axes) are smaller than the machine allows."""
+        linear, rotary = self.machine.max_correction
+        turns = np.abs(shift[:, self.machine.rotary]).max(initial=0.0) <= NEARLY * rotary
+        return bool(turns and lengths(shift[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * linear)
+
+    def _steady(self, change: Array) -> bool:
+        """Whether corrections change by no more than they may at one place."""
+        return bool(lengths(change[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * JUMP)
+
+
+def follow_plainly(head: Moves, moves: Moves) -> bool:
+    """Whether motions are plain, go on from the last one before them, and from each other."""
+    if not (_is_plain(head) and _is_plain(moves)) or head.tool_length[0] != moves.tool_length[0]:
+        return False
+    joined = (head.end[0] == moves.start[0]).all() and (moves.start[1:] == moves.end[:-1]).all()
+    rising = (moves.block[1:] > moves.block[:-1]).all()
+    turning = (moves.kind == Kind.FEED) & ~some((moves.start != moves.end)[:, ~moves.rotary])
+    return bool(joined and rising and not turning.any())
+
+
+def _is_plain(moves: Moves) -> bool:
+    """Straight motions of one frame and one tool that may be corrected, all words of which say where to go."""
+    rapid, cut = (moves.kind == Kind.RAPID) & (moves.modal == 0), (moves.kind == Kind.FEED) & (moves.modal == 10)
+    special = moves.incremental | moves.tcp | moves.compensated | (moves.rule != Rule.CORRECT) | ~(rapid | cut)
+    columns = moves.approach, moves.counted, moves.held
+    if special.any() or not all(each is None or not np.any(each) for each in columns):
+        return False
+    timed = (moves.feed_mode == FeedMode.INVERSE_TIME).any()
+    alike = (moves.frame == moves.frame[0]).all() and (moves.tool_length == moves.tool_length[0]).all()
+    return bool(not timed and alike and (moves.placed is None or moves.placed.all()))
+
+
+def pieces_of(real: Segments, over: Index, parts: Split | None) -> tuple[Pieces, Index]:
+    """The pieces of motions done as `real` has them, but for motions `over`, which are done in `parts`.
+
+    Also the first piece of each motion, and how many there are, (n + 1,).
+    """
+    n = len(real)
+    counts = np.ones(n, dtype=np.intp)
+    if parts is not None:
+        counts[over] = parts.counts
+    first = offsets(counts)
+    m = int(first[-1])
+    move = np.arange(n) if m == n else owners(counts)
+    fraction, end = np.ones(m), real.end if m == n else real.end[move]
+    if parts is not None:
+        at = np.repeat(first[:-1][over], parts.counts) + places(parts.counts)
+        fraction[at], end[at] = parts.fraction, parts.end
+    none = np.broadcast_to(False, m)
+    return Pieces(move, fraction, end, none, np.broadcast_to(np.nan, (m, 3)), none), first
