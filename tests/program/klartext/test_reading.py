@@ -89,6 +89,8 @@ def test_the_beginning_shows_the_language(path: str) -> None:
         ("Z0.0 B0.0 C15.", {"Z": 0.0, "B": 0.0, "C": 15.0}),
         ("CP IPA-180 IZ-0.1 DR-", {"IPA": -180.0, "IZ": -0.1}),
         ("CR X+1 Y+2 R-20,5 DR+", {"X": 1.0, "Y": 2.0, "R": -20.5}),
+        ("CR X1 Y2 R24.8 DR+", {"X": 1.0, "Y": 2.0, "R": 24.8}),
+        ("TOOL CALL 2 Z DR2.5 DR2+0.1", {"DR": 2.5, "DR2": 0.1}),
         ("LN X1 Y2 Z3 NX0.1 NY0 NZ1 F500", {"X": 1.0, "Y": 2.0, "Z": 3.0, "NX": 0.1, "NY": 0.0, "NZ": 1.0, "F": 500.0}),
         ("APPR LCT X+3 Y+4 R10 RL F100", {"X": 3.0, "Y": 4.0, "R": 10.0, "F": 100.0}),
         ("TOOL CALL 5 Z S 1500,000 DL+0,1", {"S": 1500.0, "DL": 0.1}),

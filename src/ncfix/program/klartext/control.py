@@ -27,9 +27,14 @@ START = "PRESET"
 BY_DEPTH, FROM_START = 2000, 1000
 """Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
 
-TILTED, DOUBTFUL, TOOL, PRESET = "tilt", "doubt", "tool", "preset"
+TILTED, DOUBTFUL, TOOL, PRESET, TURNED_DATUM = "tilt", "doubt", "tool", "preset", "turned datum"
 """The keys under which motions are suspended."""
 
+
+WHICH_WAY = (
+    "the axis {} counts from a datum of its own while the tip leads (M128, PLANE): whether X and Y turn with that "
+    "datum is for a parameter of the machine (presetToAlignAxis)"
+)
 
 RETRACTED = "where the axis {} stands after M140 is not followed"
 MOVED_ALONG = "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed"
@@ -134,6 +139,7 @@ class Control(base.Control):
         self.offsets.shift = trans.whole_shift
         self.offsets.rotation = trans.rotation
         self.modal.unit = self.unit * trans.scale
+        self.doubt_turned_datum()
         if trans.doubtful:
             self.suspended[DOUBTFUL] = trans.doubtful
         else:
@@ -143,12 +149,21 @@ class Control(base.Control):
     def switch_tip(self) -> None:
         """Whether X Y Z are tool-tip coordinates may have changed."""
         on = self.m128 or self.transformations.tilted
+        self.doubt_turned_datum()
         if on != self.tcp:
             self.ask_for_tool()
             why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else tcp.TURNED
             tcp.switch(self, self.offsets.tool, on)
             self.unknown = {i: why if reason is tcp.TURNED else reason for i, reason in self.unknown.items()}
         self.refresh()
+
+    def doubt_turned_datum(self) -> None:
+        """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
+        self.suspended.pop(TURNED_DATUM, None)
+        datum = [a + b for a, b in zip(self.transformations.preset, self.transformations.shift, strict=True)]
+        turned = next((i for i in self.machine if self.rotary[i] and datum[i]), None)
+        if turned is not None and (self.m128 or self.transformations.tilted):
+            self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
 
     def anchors(self) -> list[Hashable]:
         """As for the RS274 family, but shift, rotation, mirror and scale are stated by the program in numbers."""

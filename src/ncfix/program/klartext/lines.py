@@ -23,7 +23,7 @@ from ncfix.program.klartext.transformations import unit
 from ncfix.program.moves import Kind
 from ncfix.program.rs274 import tcp
 from ncfix.program.rs274.control import Unknown
-from ncfix.program.rs274.coordinates import Vector, dot
+from ncfix.program.rs274.coordinates import LETTERS, Vector, dot
 from ncfix.program.rs274.places import mask_of
 
 MACHINE_COORDINATES = "machine coordinates ({})"
@@ -32,6 +32,7 @@ NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine co
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
 TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
+FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
 OFF = "a rapid from where the control itself has led the tool"
 FLAT = 1e-9
 
@@ -86,13 +87,12 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     if turned and control.transformations.tilted and not control.m128:
         turn_under_tilt(control, step, target, unknown, axes)
         return
-    if control.shortest:
-        take_short_way(control, target, axes)
+    way = take_short_way(control, step, target, axes) if control.shortest else ""
     before = control.position, control.unknown
     off = step.kind == Kind.RAPID and control.is_led(unknown)
     with_increments(control, follows or step.words.incremental)
     code = 0 if step.kind == Kind.RAPID else 10
-    refusal = check_normal(control) or derived(control, step.words, axes)
+    refusal = way or check_normal(control) or derived(control, step.words, axes)
     control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else "")
     with_increments(control, False)
     keep_tangent(control, *before)
@@ -109,12 +109,19 @@ def keep_tangent(control: Control, start: Vector, unknown: Unknown) -> None:
         control.path.tangent = (way[0] / length, way[1] / length, way[2] / length)
 
 
-def take_short_way(control: Control, target: Vector, axes: int) -> None:
-    """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so."""
+def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> str:
+    """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so.
+
+    Returns why the motion is refused: of increments of more than half a turn the manuals do not say what it makes.
+    """
     for index in control.machine:
-        if control.rotary[index] and axes >> index & 1 and index not in control.unknown:
-            turns = round((target[index] - control.position[index]) / (2 * math.pi))
-            control.position[index] += 2 * math.pi * turns
+        if not (control.rotary[index] and axes >> index & 1) or index in control.unknown:
+            continue
+        if "I" + LETTERS[index] in step.words.values and abs(target[index] - control.position[index]) > math.pi:
+            return FAR_INCREMENT
+        turns = round((target[index] - control.position[index]) / (2 * math.pi))
+        control.position[index] += 2 * math.pi * turns
+    return ""
 
 
 def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int) -> None:
