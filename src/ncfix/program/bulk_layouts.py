@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,31 @@ from ncfix.program.moves import Moves
 from ncfix.program.tree import START, Program
 
 IntArray = NDArray[np.int64]
+
+OPENING, CLOSING = 4, 8
+"""Bytes that stand at most before and behind the axis words of a further piece."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a program writes its numbers, and lines of further pieces.
+
+    signed  with a sign
+    comma   with a decimal comma
+    lined   such lines begin with more than axis words
+    """
+
+    signed: bool = False
+    comma: bool = False
+    lined: bool = False
+
+    @classmethod
+    def of(cls, layout: BulkLayout) -> Manner:
+        """That of a shape, and so of all shapes of the program."""
+        return cls(layout.signed, layout.comma, layout.lead is not None)
+
+
+NOTHING_SPECIAL = Manner()
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +50,12 @@ class Layouts:
     by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
     by_letter  (n_axes,) the axes in the order in which programs write them
     anchors    (s, 2) slot and offset of the place where missing words go
-    heads      (s, n_axes, 2) what stands before the number of a missing word: a blank, or 0 for nothing, and the letter
+    heads      (s, n_axes, 2) what stands before the number of a missing word: a blank, or 0 for nothing, and the
+               letter; 0 for it: such an axis gets no word
+    leads      (s, 2) slot and offset of the place up to which lines of further pieces repeat the beginning of the block
+    openings   (s, k) what stands on them before their words, 0 for nothing
+    closings   (s, k) what stands on them behind these
+    manner     how numbers and lines are written
     """
 
     known: NDArray[np.bool_]
@@ -35,6 +65,10 @@ class Layouts:
     by_letter: IntArray
     anchors: IntArray
     heads: NDArray[np.uint8]
+    leads: IntArray
+    openings: NDArray[np.uint8]
+    closings: NDArray[np.uint8]
+    manner: Manner = NOTHING_SPECIAL
 
     @classmethod
     def of(cls, language: Language, program: Program, moves: Moves) -> Layouts:
@@ -49,17 +83,22 @@ class Layouts:
             by_letter,
             np.zeros((n, 2), np.int64),
             np.zeros((n, len(axes), 2), np.uint8),
+            np.full((n, 2), (START, 0)),
+            np.zeros((n, OPENING), np.uint8),
+            np.zeros((n, CLOSING), np.uint8),
         )
         if language.bulk is not None and len(moves):
             shapes, at = np.unique(program.template[moves.block], return_index=True)
             for shape, row in zip(shapes.tolist(), at.tolist(), strict=True):
                 layout = language.bulk(program, int(moves.block[row]))
                 if layout is not None:
-                    table.enter(shape, layout, axes)
+                    table.enter(shape, layout, moves)
+                    table = replace(table, manner=Manner.of(layout))
         return table
 
-    def enter(self, shape: int, layout: BulkLayout, axes: tuple[str, ...]) -> None:
+    def enter(self, shape: int, layout: BulkLayout, moves: Moves) -> None:
         """Fill in the row of a shape."""
+        axes = moves.axes
         present = sorted((layout.slots[letter], column) for column, letter in enumerate(axes) if letter in layout.slots)
         self.known[shape], self.further[shape] = True, layout.further
         for place, (slot, column) in enumerate(present):
@@ -67,10 +106,28 @@ class Layouts:
         self.anchors[shape] = layout.words_at
         blank = ord(layout.blank) if layout.blank else 0
         self.heads[shape] = [(blank, ord(letter.lower() if layout.lower else letter)) for letter in axes]
+        if layout.turns_named:
+            self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
+        if layout.lead is not None:
+            self.leads[shape] = layout.lead
+        for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):
+            table[shape, : len(text)] = list(text.encode("latin-1"))
+
+    def nameless(self, program: Program, blocks: IntArray) -> NDArray[np.bool_]:
+        """(k, n_axes) axes that get no word where `blocks` have none."""
+        nameless: NDArray[np.bool_] = self.heads[program.template[blocks], :, 1] == 0
+        return nameless
 
     def places(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes of `blocks` (k,) at which missing words go."""
-        slot, offset = self.anchors[program.template[blocks]].T
+        return self._places(program, blocks, self.anchors)
+
+    def lead_ends(self, program: Program, blocks: IntArray) -> IntArray:
+        """The bytes up to which lines of further pieces repeat `blocks` (k,)."""
+        return self._places(program, blocks, self.leads)
+
+    def _places(self, program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:
+        slot, offset = anchors[program.template[blocks]].T
         edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
         behind = slot >= 0
         edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from ncfix.program.build import Parsed
     from ncfix.program.dialect import Dialect
     from ncfix.program.flatten import Unroll
-    from ncfix.program.moves import Kinematics, Trace
+    from ncfix.program.moves import Kinematics, Moves, Trace
     from ncfix.program.parts import Follower
+    from ncfix.program.pieces import Pieces
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
     from ncfix.program.target import Rendered, Target
@@ -52,6 +53,12 @@ class BulkLayout:
     blank     what stands before them: a blank or nothing
     lower     addresses are in lower case
     further   further pieces of such a motion may follow as lines of nothing but axis words
+    lead      of languages in which such lines begin with more than that: what of the block's own beginning they repeat
+    opening   what stands on such lines before the axis words
+    closing   what stands on them behind these
+    signed    numbers are written with their sign
+    comma     numbers are written with a decimal comma
+    turns_named  a rotary axis that has no word gets none
     """
 
     slots: Mapping[str, int]
@@ -59,6 +66,12 @@ class BulkLayout:
     blank: str
     lower: bool
     further: bool = False
+    lead: Anchor | None = None
+    opening: str = ""
+    closing: str = ""
+    signed: bool = False
+    comma: bool = False
+    turns_named: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +102,8 @@ class Language:
     arc_pieces  `render` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
               for blocks that it has to write one by one
+    one_by_one  (program, moves, pieces, first piece of each motion) -> (n,) motions that `render` has to write one by
+              one for what else there is about them; None: none
     renumber  a text with its blocks numbered anew; None where blocks need no numbers
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
     follower  as `follow`, but for a program that comes in parts, of a dialect
@@ -105,6 +120,7 @@ class Language:
     lenient: bool = False
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None
+    one_by_one: Callable[[Program, Moves, Pieces, NDArray[np.int64]], NDArray[np.bool_]] | None = None
     renumber: Callable[[bytes], bytes] | None = None
     unroll: Unroll | None = None
     follower: Callable[[Dialect, Run], Follower] | None = None

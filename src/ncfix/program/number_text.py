@@ -46,8 +46,8 @@ class Styles:
         return Styles(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
-def styles_of(text: NDArray[np.uint8], spans: IntArray) -> Styles:
-    """The styles of the numbers at `spans` (m, 2)."""
+def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False) -> Styles:
+    """The styles of the numbers at `spans` (m, 2); `signed`: what had a sign keeps one, whichever."""
     low, high = (int(spans[:, 0].min()), int(spans[:, 1].max())) if len(spans) else (0, 0)
     text, spans = text[low:high], spans - low
     starts, stops = spans[:, 0], spans[:, 1]
@@ -58,7 +58,7 @@ def styles_of(text: NDArray[np.uint8], spans: IntArray) -> Styles:
     return Styles(
         decimals=found.decimals,
         point=found.points > 0,
-        plus=signs == PLUS,
+        plus=(signs == PLUS) | (signs == MINUS) if signed else signs == PLUS,
         leading_zero=whole > 0,
         width=np.where((whole > 1) & (text[first] == ZERO), whole, 0),
         clear=found.pure & (found.points < 2) & (stops - first <= LONGEST) & (found.decimals <= MOST_DECIMALS),
@@ -111,13 +111,16 @@ def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> Texts:
     return _laid_out(steps, kept, sign, styles.width, styles.leading_zero, styles.point, value)
 
 
-def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8]) -> Texts:
+def plain(values: FloatArray, decimals: IntArray, heads: NDArray[np.uint8], *, signed: bool = False) -> Texts:
     """Values with exactly so many decimals, as `f"{value:.{decimals}f}"` does it; all `is_plain`.
 
-    heads  (m, 2) bytes to put before each, 0 for none
+    heads   (m, 2) bytes to put before each, 0 for none
+    signed  with a plus sign, too, which zero has as well
     """
     steps = np.rint(np.abs(values) * POWERS[decimals]).astype(np.int64)
     sign = np.where(np.signbit(values), MINUS, 0)
+    if signed:
+        sign = np.where((values < 0) & (steps != 0), MINUS, PLUS)
     everywhere = np.ones(len(values), dtype=np.bool_)
     value = np.copysign(steps / POWERS[decimals], values)
     return _laid_out(steps, decimals, sign, np.zeros_like(steps), everywhere, ~everywhere, value, heads)

@@ -23,7 +23,15 @@ Changes = tuple[Ints, Ints, Ints]
 Axes = tuple[Floats, Floats, Mask]
 """By axis, (axes,): numbers at the end of a piece and where it stands now, and whether it was told to move."""
 
+Digits = tuple[Ints, Floats, int]
+"""By axis, (axes,): decimals that the least increment needs, half output steps; and whether numbers carry signs."""
+Lines = tuple[Bytes, Ints, Bytes, Bytes]
+"""Of further pieces: the end of a line, and `leads`, `openings`, `closings` of `Layouts`."""
+
 LIBRARY = Library(__file__)
+
+ROUNDED = 1.01
+"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
@@ -40,8 +48,11 @@ def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
 
 
 @LIBRARY.helper
-def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, bool]:
-    """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that."""
+def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool, bool, int, bool]:
+    """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that.
+
+    `signed`: a minus sign counts as one, too: what had a sign keeps one.
+    """
     first = start + (text[start] == PLUS or text[start] == MINUS)
     point = -1
     for place in range(first, stop):
@@ -52,7 +63,8 @@ def style_of(text: Bytes, start: int, stop: int) -> tuple[int, bool, bool, int, 
             return 0, False, False, 0, False
     decimals = stop - point - 1 if point >= 0 else 0
     clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
-    return decimals, point >= 0, text[start] == PLUS, stop - first - decimals - (point >= 0), clear
+    plus = text[start] == PLUS or (signed != 0 and text[start] == MINUS)
+    return decimals, point >= 0, plus, stop - first - decimals - (point >= 0), clear
 
 
 @LIBRARY.helper
@@ -91,13 +103,13 @@ def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, 
 
 @LIBRARY.helper
 def put_in_style(
-    data: Bytes, at: int, text: Bytes, start: int, stop: int, value: float, decimals: int
+    data: Bytes, at: int, text: Bytes, start: int, stop: int, value: float, decimals: int, signed: int
 ) -> tuple[int, float]:
     """Write a value in the style of the number at a span, as `NumberStyle.write`; -1 where that is not clear.
 
     Returns where the next byte goes, and what a reader makes of the number.
     """
-    own, point, plus, whole, clear = style_of(text, start, stop)
+    own, point, plus, whole, clear = style_of(text, start, stop, signed)
     if not clear:
         return -1, 0.0
     most = max(own, decimals)
@@ -115,38 +127,64 @@ def put_in_style(
 
 
 @LIBRARY.helper
-def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int) -> tuple[int, float]:
+def put_all(data: Bytes, at: int, characters: Bytes) -> int:
+    """Write all of some bytes that are not 0; where the next byte goes."""
+    for character in characters:
+        if character:
+            data[at] = character
+            at += 1
+    return at
+
+
+@LIBRARY.helper
+def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int, signed: int) -> tuple[int, float]:
     """Write a missing word: what stands before its number, and the number with all decimals; -1 if not clear."""
     steps = steps_of(value, decimals)
     if steps < 0:
         return -1, 0.0
-    for character in head:
-        if character:
-            data[at] = character
-            at += 1
+    at = put_all(data, at, head)
     sign = MINUS if np.signbit(value) else 0
+    if signed != 0:
+        sign = MINUS if value < 0 and steps != 0 else PLUS
     return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
 
 
 @LIBRARY.helper
 def put_line(
-    data: Bytes, at: int, end_of_line: Bytes, by_letter: Ints, heads: Bytes, axes: Axes, digits: tuple[Ints, Floats]
+    data: Bytes,
+    at: int,
+    text: Bytes,
+    lead: tuple[int, int],
+    lines: Lines,
+    shape: int,
+    by_letter: Ints,
+    heads: Bytes,
+    axes: Axes,
+    digits: Digits,
 ) -> int:
     """Write a further piece of a motion on a line of its own, and take the axes there; -1 where that is not clear.
 
-    A piece that moves nothing is not: it is for the renderer to say. `heads` (axes, 2) are those of the shape.
+    A piece that moves nothing is not: it is for the renderer to say. `heads` (axes, 2) are those of the shape, `lead`
+    the bytes of `text` that the line repeats.
     """
-    (wanted, now, told), (decimals, half) = axes, digits
+    (wanted, now, told), (decimals, half, signed), (end_of_line, _, openings, closings) = axes, digits, lines
     at = copied(data, at, end_of_line, 0, len(end_of_line))
-    begun = 1
+    at = copied(data, at, text, lead[0], lead[1])
+    at = put_all(data, at, openings[shape])
+    begun, moved = 0 if openings[shape, 0] else 1, False
     for axis in by_letter:
-        if not abs(wanted[axis] - now[axis]) >= half[axis]:
+        off = abs(wanted[axis] - now[axis])
+        if not off >= half[axis]:
             continue
-        at, now[axis] = put_new(data, at, heads[axis, begun:], wanted[axis], decimals[axis])
+        if heads[axis, 1] == 0:
+            if not off <= ROUNDED * half[axis]:
+                return -1
+            continue
+        at, now[axis] = put_new(data, at, heads[axis, begun:], wanted[axis], decimals[axis], signed)
         if at < 0:
-            break
-        told[axis], begun = True, 0
-    return at if begun == 0 else -1
+            return -1
+        told[axis], begun, moved = True, 0, True
+    return put_all(data, at, closings[shape]) if moved else -1
 
 
 @LIBRARY.helper
@@ -167,7 +205,7 @@ def rewrite_words(
     places: tuple[Ints, Ints],
     axes: Axes,
     several: bool,
-    digits: tuple[Ints, Floats],
+    digits: Digits,
 ) -> tuple[int, int]:
     """Write the words of a block anew whose values change, all of them if `several` pieces follow.
 
@@ -177,7 +215,7 @@ def rewrite_words(
 
     Returns how many edits there are, and their bytes; -1 if it is not clear.
     """
-    (data, changes), (values, spans), (slots, by_place), (decimals, half) = pen, numbers, places, digits
+    (data, changes), (values, spans), (slots, by_place), (decimals, half, signed) = pen, numbers, places, digits
     wanted, now, told = axes
     for axis in by_place:
         if axis < 0:
@@ -186,7 +224,7 @@ def rewrite_words(
         now[axis], told[axis] = values[word], True
         if abs(wanted[axis] - now[axis]) >= half[axis] or several:
             begin, end = spans[word, 0], spans[word, 1]
-            at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis])
+            at, now[axis] = put_in_style(data, size, text, begin, end, wanted[axis], decimals[axis], signed)
             if at < 0:
                 return edits, -1
             edits, size = note(changes, edits, begin, end, at - size), at
@@ -202,19 +240,32 @@ def add_words(
     by_letter: Ints,
     heads: Bytes,
     axes: Axes,
-    digits: tuple[Ints, Floats],
+    digits: Digits,
 ) -> tuple[int, int]:
     """Add words at `place` for axes that must move and have none; as `rewrite_words`."""
-    (data, changes), (wanted, now, told), (decimals, half) = pen, axes, digits
+    (data, changes), (wanted, now, told), (decimals, half, signed) = pen, axes, digits
     for axis in by_letter:
-        if told[axis] or abs(wanted[axis] - now[axis]) < half[axis]:
+        off = abs(wanted[axis] - now[axis])
+        if told[axis] or off < half[axis]:
             continue
-        at, now[axis] = put_new(data, size, heads[axis], wanted[axis], decimals[axis])
+        if heads[axis, 1] == 0:
+            if not off <= ROUNDED * half[axis]:
+                return edits, -1
+            continue
+        at, now[axis] = put_new(data, size, heads[axis], wanted[axis], decimals[axis], signed)
         if at < 0:
             return edits, -1
         told[axis] = True
         edits, size = note(changes, edits, place, place, at - size), at
     return edits, size
+
+
+@LIBRARY.helper
+def place_of(anchor: Ints, edges: Ints, spans: Ints, number: int) -> int:
+    """The byte that an anchor stands for; `edges` of the block, `number` is its first one."""
+    slot = anchor[0]
+    place: int = anchor[1] + (spans[number + slot, 1] if slot >= 0 else edges[-1 - slot])
+    return place
 
 
 @LIBRARY.helper
@@ -242,8 +293,8 @@ def to_commands(now: Floats, told: Mask, here: Floats, frame: tuple[Floats, Floa
     "i8[:]",
     "f8[:]",
     ("f8[:]", "f8[:]"),
-    ("i8[:]", "f8[:]"),
-    "u1[:]",
+    ("i8[:]", "f8[:]", "i8"),
+    ("u1[:]", "i8[:,:]", "u1[:,:]", "u1[:,:]"),
     ("f8[:,:]", "i8[:]", "i8[:]", "i8[:]", "u1[:]"),
     ("f8[:]", "f8[:]", "b1[:]", "i8[:]"),
 )
@@ -256,8 +307,8 @@ def write(
     pieces: Ints,
     here: Floats,
     frame: tuple[Floats, Floats],
-    digits: tuple[Ints, Floats],
-    end_of_line: Bytes,
+    digits: Digits,
+    lines: Lines,
     found: tuple[Floats, Ints, Ints, Ints, Bytes],
     room: tuple[Floats, Floats, Mask, Ints],
 ) -> int:
@@ -270,15 +321,16 @@ def write(
     pieces    (k + 1,) the first piece of each motion, and m
     here      (axes,) where the control stands before; afterwards where it stands then
     frame     offset and scale (axes,): a command is `offset + scale * number`
-    digits    decimals that the least increment needs, and half output steps (axes,)
+    digits    decimals that the least increment needs, half output steps (axes,), and whether numbers carry signs
+    lines     the end of a line, and leads, openings, closings of `Layouts`
     found     room for the commands at the ends of the pieces written, and what changes in the source, as in `Splices`
     room      for three rows (axes,), and for counts: edits, bytes, and lines that were added
     """
     (edges, rows, first, shapes), (_, spans) = blocks, numbers
     slots, by_place, by_letter, anchors, heads = layouts
     (commands, start, stop, length, data), (now, wanted, told, counts) = found, room
-    pen, by_axis = (data, (start, stop, length)), (wanted, now, told)
-    edits, size, done, lines = 0, 0, 0, 0
+    pen, by_axis, leads = (data, (start, stop, length)), (wanted, now, told), lines[1]
+    edits, size, done, added = 0, 0, 0, 0
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
         shape, number, several = shapes[block], first[block], first_piece < last_piece
@@ -288,28 +340,28 @@ def write(
         places = slots[shape], by_place[shape]
         edits, size = rewrite_words(pen, edits, size, text, number, numbers, places, by_axis, several, digits)
         if size >= 0:
-            slot = anchors[shape, 0]
-            place = spans[number + slot, 1] if slot >= 0 else edges[block, -1 - slot]
-            place += anchors[shape, 1]
+            place = place_of(anchors[shape], edges[block], spans, number)
             edits, size = add_words(pen, edits, size, place, by_letter, heads[shape], by_axis, digits)
         to_commands(now, told, here, frame, commands[first_piece])
-        lines_from = size
+        lines_from, lead = size, (edges[block, 0], edges[block, 0])
+        if several:
+            lead = edges[block, 0], place_of(leads[shape], edges[block], spans, number)
         for piece in range(first_piece + 1, last_piece + 1):
             if size < 0:
                 break
             to_numbers(ends[piece], frame, wanted)
-            size = put_line(data, size, end_of_line, by_letter, heads[shape], by_axis, digits)
+            size = put_line(data, size, text, lead, lines, shape, by_letter, heads[shape], by_axis, digits)
             to_commands(now, told, here, frame, commands[piece])
         if size < 0:
             edits, size = before, was
             break
         if several:
             edits = note(pen[1], edits, edges[block, 1], edges[block, 1], size - lines_from)
-            lines += last_piece - first_piece
+            added += last_piece - first_piece
         done = last_piece + 1
         for axis in range(len(here)):
             here[axis] = commands[last_piece, axis]
-    counts[0], counts[1], counts[2] = edits, size, lines
+    counts[0], counts[1], counts[2] = edits, size, added
     return done
 
 

@@ -13,7 +13,8 @@ from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
-from ncfix.program.klartext.lane import CORNERS, run_lane
+from ncfix.program.klartext.lane import run_lane
+from ncfix.program.klartext.layout import CORNERS
 from ncfix.program.klartext.paths import PATHS
 from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.statements import statement

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
 from ncfix.program.klartext.blocks import parse_block
+from ncfix.program.klartext.bulk import in_bulk, one_by_one
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.interpreter import Interpreter
 from ncfix.program.klartext.layout import layout_of, uses_comma
@@ -50,6 +51,8 @@ KLARTEXT = Language(
     layout=layout_of,
     render=render,
     arc_pieces=True,
+    bulk=in_bulk,
+    one_by_one=one_by_one,
     renumber=renumbered,
     unroll=unroll,
 )

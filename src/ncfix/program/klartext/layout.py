@@ -11,6 +11,9 @@ from ncfix.program.klartext.plans import FUNCTIONS, OPENING, owners
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.tree import Anchor, Command, Comment, Constant, Item, Literal, Opaque, Program, Skip, Span, Word
 
+CORNERS = frozenset({"rnd", "chf"})
+"""Corners that the control makes of the end of one motion and the beginning of the next."""
+
 POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
 LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
 """M codes that act at the end of their block: they belong on its last piece."""
@@ -113,7 +116,7 @@ def is_corner(program: Program, block: int, way: int) -> bool:
         items = [item for item in program.items_of(block) if not is_remark(item)]
         if items:
             names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
-            return any(name.lower() in ("rnd", "chf") for name in names)
+            return any(name.lower() in CORNERS for name in names)
         block += way
     return False
 
@@ -144,6 +147,8 @@ def separator(program: Program, block: int, word: Word | None) -> str:
 @lru_cache(maxsize=4)
 def uses_comma(source: bytes) -> bool:
     """Whether a program writes decimal commas and no points in its motion blocks."""
+    if b"," not in source:
+        return False
     commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source))
     return commas > len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source))
 

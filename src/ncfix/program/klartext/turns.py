@@ -11,6 +11,8 @@ import re
 from functools import lru_cache
 
 FULL = 360.0
+UNCORRECTED = 1e-9
+"""Degrees: what an angle is off for nothing but the rounding of doubles."""
 
 
 def _plain(number: bytes) -> bytes:
@@ -28,6 +30,8 @@ def extremes(source: bytes, letter: str) -> tuple[float, float]:
 
 def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: float) -> float:
     """A corrected angle, degrees; not below zero or past a full turn where the program never is. `step`: one digit."""
+    if abs(angle - nominal) < UNCORRECTED:
+        return angle
     lowest, highest = extremes(source, letter)
     if nominal >= 0.0 > angle and lowest >= 0.0:
         return 0.0

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from ncfix.program.block_words import BlockWriter
 from ncfix.program.klartext.layout import Layout, tilts
 from ncfix.program.klartext.number_text import Style, value_of
-from ncfix.program.klartext.turns import on_its_side
+from ncfix.program.klartext.turns import UNCORRECTED, on_its_side
 from ncfix.program.target import Target
 from ncfix.program.tree import Literal, Program, Span, Word
 
 FloatArray = NDArray[np.float64]
+
+ROUNDED = 1.01
+"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 VECTOR_DIGITS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees; the control takes eight."""
@@ -56,6 +59,8 @@ class WordWriter(BlockWriter[Layout]):
 
         One of which the program has not said where it stands.
 
+        A rotary axis that is not corrected and stands where it should, but for the digits of its last word.
+
         A rotary axis in a program with tilted planes: the control would not keep the tip where it is; and on paths that
         are made in a plane, or lead to or away from one. The tool axis beside a corner that the control makes, which
         lies in the working plane, and in a departure.
@@ -64,10 +69,19 @@ class WordWriter(BlockWriter[Layout]):
         if not target.may_name(column):
             return True
         if target.rotary and target.rotary[column]:
+            if self._stands(column):
+                return True
             turned = any(letter in layout.axes for letter in "ABC")
             bare = layout.corner or layout.name not in ("", "l", "ln", "lp")
             return not turned and (bare or tilts(self.program.source))
         return (layout.corner or layout.name.startswith("dep")) and column == target.spatial[2]
+
+    def _stands(self, column: int) -> bool:
+        """A rotary axis stands where it should in all pieces, but for rounding."""
+        target = self.target
+        off = np.abs(target.ends[:, column] - target.nominal[column])
+        here = abs(target.ends[0, column] - target.start[column])
+        return bool((off < UNCORRECTED).all() and here <= ROUNDED * self.half[column])
 
     def _turned(self, column: int, end: float, piece: int = 0) -> float:
         """The end of a piece, of a rotary axis on its side of zero and of a full turn."""
