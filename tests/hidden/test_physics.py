@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -161,3 +162,68 @@ def test_growth_pushes_the_tip_along_the_tool() -> None:
     grown[:, s.machine.frames.index("S"), 2] = -0.010  # the spindle's nose moves down, towards the tip
     along = s.machine.nominal(s.q, s.length)[1][:, :, 2]
     assert np.einsum("ni,ni->n", along, first_order(sensitivities(s), grown)) == pytest.approx(-0.010, abs=1e-12)
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES)
+def test_what_is_warm_is_longer(topology: str) -> None:
+    """The spindle pushes the tip away from itself; a longer scale carries its slide further, the way it goes."""
+    s = situation(topology)
+    warm = np.linspace(-1.0, 1.0, len(s.climate.grid))
+    s = replace(s, climate=replace(s.climate, bodies=dict.fromkeys(BODIES, warm)))
+    hot = s.time > np.quantile(s.time, 0.8)
+    away = -np.asarray(s.machine.tool_direction)
+    grown = own(s.machine, "spindle growth").draw(np.random.default_rng(1))(s)[:, s.machine.frames.index("S"), :3]  # type: ignore[attr-defined]
+    assert np.mean((grown @ away)[hot]) > np.mean((grown @ away)[~hot])
+    for joint in s.machine.joints:
+        if not joint.rotary:
+            twists = own(s.machine, f"thermal scale {joint.name}").draw(np.random.default_rng(1))(s)  # type: ignore[attr-defined]
+            gone = twists[:, s.machine.frames.index(joint.name), :3] @ np.asarray(joint.direction)
+            slope = np.polyfit(s.column(joint.name)[hot], gone[hot], 1)[0]
+            assert slope > np.polyfit(s.column(joint.name)[~hot], gone[~hot], 1)[0]
+
+
+@pytest.mark.parametrize("topology", TOPOLOGIES)
+def test_most_drives_lag_behind_when_they_reverse(topology: str) -> None:
+    s = situation(topology)
+    for joint in s.machine.joints:
+        entry = own(s.machine, f"backlash {joint.name}")
+        late = 0
+        for seed in range(40):
+            twists = entry.draw(np.random.default_rng(seed))(s)[:, s.machine.frames.index(joint.name)]  # type: ignore[attr-defined]
+            along = twists[:, 3:] if joint.rotary else twists[:, :3]
+            gone = along @ np.asarray(joint.triad) @ np.asarray(joint.direction)
+            late += float(np.mean(gone * s.moving(joint.name))) < 0
+        assert 20 <= late < 40
+
+
+def test_a_carried_centre_drifts_across_both_axes() -> None:
+    """Along the carrier's own line it would be a drift of the frame, which turns with nothing."""
+    for topology in TOPOLOGIES[:3]:
+        s = situation(topology)
+        entry = next(e for e in catalogue(s.machine) if e.kind == "rotary centre drift")
+        shift = entry.draw(np.random.default_rng(0))(s)[:, s.machine.frames.index(entry.axis), :3]
+        for joint in s.machine.joints:
+            if joint.rotary:
+                triad = np.asarray(s.machine.joint(entry.axis).triad)
+                assert np.max(np.abs(shift @ triad @ np.asarray(joint.direction))) < 1e-12
+
+
+def test_a_trunnion_twists_by_how_far_out_the_tip_is_along_it() -> None:
+    """Two poses that differ by the table's turn and the linear axes alone have the same lever where X is the same."""
+    s = situation("wCAYFXZSt")
+    q = np.repeat(s.q[:1], 3, axis=0)
+    q[1, s.machine.axes.index("C")] += 1.0
+    q[2, s.machine.axes.index("X")] += 100.0
+    three = replace(s.rows(np.zeros(3, dtype=int)), q=q)
+    entry = own(s.machine, "trunnion twist A")
+    turn = entry.draw(np.random.default_rng(3))(three)[:, s.machine.frames.index("A"), 3]  # type: ignore[attr-defined]
+    assert turn[0] == pytest.approx(turn[1], rel=1e-12)
+    assert abs(turn[2] - turn[0]) > 1e-3 * abs(turn[0])
+
+
+def test_a_head_does_not_carry_the_workpiece() -> None:
+    s = situation("wXFYZCBSt")
+    entry = own(s.machine, "gravity sag B")
+    light, heavy = (replace(s, load=np.full(len(s), load)) for load in (10.0, 300.0))
+    draws = [entry.draw(np.random.default_rng(2))(x) for x in (light, heavy)]  # type: ignore[attr-defined]
+    assert np.array_equal(*draws)
