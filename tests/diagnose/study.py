@@ -1,27 +1,41 @@
 """How often the diagnosis is right on worlds of its own: `python tests/diagnose/study.py single=20 deleted=20 ...`.
 
-`--set MISSHAPEN=0.1` tries another value of a constant of `ncfix.diagnose.weighing`. Prints a row of the table of
-docs/diagnose.md for every family.
+`--set weighing.MISSHAPEN=0.1` tries another value of a constant, `--from 40` other worlds, `--log FILE` keeps a line
+of JSON for every scene. Prints a row of the table of docs/diagnose.md for every family.
 """
 
 from __future__ import annotations
 
+import argparse
+import importlib
+import json
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.random import Generator
 
-from diagnose.worlds import FOREIGN, World
-from ncfix.diagnose import weighing
+from diagnose.worlds import FOREIGN, THERMAL, World
 from ncfix.diagnose.diagnosis import Diagnosis, diagnose
 from ncfix.diagnose.verdict import NOTHING, UNKNOWN
 from ncfix.measure.measurement import Array
 
-MACHINES = ("wCBXFZYSt", "wCAYFXZSt", "three_axis")
+WORLDS = (
+    ("wCBXFZYSt", "tcp"),
+    ("wCAYFXZSt", "probe"),
+    ("three_axis", "tcp"),
+    ("wCBXFZYSt", "probe"),
+    ("wCAYFXZSt", "tcp"),
+    ("dmu50", "tcp"),
+    ("angle_head", "tcp"),
+)
+"""Machine and kind of measurement, in turn."""
+EACH = 12
+"""Worlds of each."""
 SIZES_UM = (5.0, 10.0, 20.0)
-USUAL_UM = 10.0
+USUAL_UM, WEAK_UM = 10.0, 2.5
 
 
 @dataclass(frozen=True)
@@ -43,12 +57,12 @@ def clutter(world: World, random: Generator) -> Scene:
 
 def foreign(world: World, random: Generator) -> Scene:
     kind = str(random.choice(FOREIGN))
-    return Scene(world.clutter(random) + world.foreign(kind, float(random.choice(SIZES_UM)), random))
+    return Scene(world.clutter(random) + world.foreign(kind, float(random.choice(SIZES_UM)), random), (kind,))
 
 
-def hidden(world: World, random: Generator, count: int, size_um: float) -> Scene:
+def hidden(world: World, random: Generator, count: int, size_um: float, of: Sequence[str] | None = None) -> Scene:
     """So many effects of one size beside a little of everything."""
-    names = tuple(str(name) for name in random.choice(world.names, count, replace=False))
+    names = tuple(str(name) for name in random.choice(world.names if of is None else of, count, replace=False))
     whole = world.clutter(random)
     for name in names:
         whole = whole + world.effect(name, size_um, random)
@@ -57,6 +71,19 @@ def hidden(world: World, random: Generator, count: int, size_um: float) -> Scene
 
 def single(world: World, random: Generator) -> Scene:
     return hidden(world, random, 1, float(random.choice(SIZES_UM)))
+
+
+def weak(world: World, random: Generator) -> Scene:
+    return hidden(world, random, 1, WEAK_UM)
+
+
+def thermal(world: World, random: Generator) -> Scene:
+    of = [name for name in world.names if world.candidate(name).family in THERMAL]
+    return hidden(world, random, 1, float(random.choice(SIZES_UM)), of)
+
+
+def curves(world: World, random: Generator) -> Scene:
+    return hidden(world, random, 1, float(random.choice(SIZES_UM)), [name for name in world.names if len(name) == 3])
 
 
 def two(world: World, random: Generator) -> Scene:
@@ -87,49 +114,115 @@ def kin(found: Diagnosis, scene: Scene, world: World) -> bool:
     return found.verdict in (UNKNOWN, NOTHING) or bool(families & named)
 
 
+def first(found: Diagnosis, scene: Scene, world: World) -> bool:
+    """The first name is the one that was hidden."""
+    return bool(found.findings) and found.findings[0].candidate.name in scene.names
+
+
 def exact(found: Diagnosis, scene: Scene, world: World) -> bool:
     """All names, or their aliases where the data are ambiguous, and no others."""
     said = [{finding.candidate.name, *finding.aliases} for finding in found.findings]
     return len(said) == len(scene.names) and all(any(name in each for each in said) for name in scene.names)
 
 
+def inside(found: Diagnosis, scene: Scene) -> bool:
+    """All hidden names are among those reported."""
+    said = {name for finding in found.findings for name in (finding.candidate.name, *finding.aliases)}
+    return set(scene.names) <= said
+
+
 Family = tuple[Callable[[World, Generator], Scene], Callable[[Diagnosis, Scene, World], bool], str]
 FAMILIES: dict[str, Family] = {
     "clean": (clean, silent, "noise alone: no name"),
     "clutter": (clutter, silent, "noise and 1 um of everything: no name"),
-    "single": (single, exact, "one effect of 5 to 20 um: its name (or alias) and no other"),
-    "two": (two, exact, "two effects of 10 um: both and no other"),
-    "three": (three, exact, "three effects of 10 um: all and no other"),
+    "single": (single, first, "one effect of 5 to 20 um: first name right"),
+    "thermal": (thermal, first, "one thermal effect of 5 to 20 um: first name right"),
+    "curves": (curves, first, "one curve of 5 to 20 um: first name right"),
+    "weak": (weak, first, "one effect of 2.5 um: first name right"),
+    "two": (two, exact, "two effects of 10 um: both (or aliases) and no other"),
+    "three": (three, exact, "three effects of 10 um: all (or aliases) and no other"),
     "deleted": (deleted, kin, "the name taken out: unknown, nothing, or of its family"),
     "foreign": (foreign, unknown, "an effect of no catalogue: unknown"),
 }
 
 
-def outcomes(family: str, count: int) -> Iterator[bool]:
-    """Whether each of so many scenes came out right; what came out goes to the standard error."""
+@dataclass(frozen=True)
+class Outcome:
+    """What was hidden, what was said, and whether that is right.
+
+    sets  the names with their aliases; `inside` whether all that is hidden is among them, `exact` and nothing else
+    """
+
+    family: str
+    index: int
+    world: str
+    hidden: tuple[str, ...]
+    verdict: str
+    sets: tuple[tuple[str, ...], ...]
+    unnamed: str
+    right: bool
+    inside: bool
+    exact: bool
+    seconds: float
+
+
+def outcome(family: str, index: int) -> Outcome:
+    """One scene."""
     drawn, right, _ = FAMILIES[family]
-    for index in range(count):
-        world = World.of(MACHINES[index % len(MACHINES)], index // len(MACHINES) % 8)
-        random = np.random.default_rng([index, *family.encode()])
-        scene = drawn(world, random)
-        found = diagnose([world.measured(scene.shown, random, bool(index % 2))], world.machine, scene.refused)
-        names = [finding.candidate.name for finding in found.findings]
-        good = right(found, scene, world)
-        print(family, index, scene.names, "->", found.verdict, names, good, file=sys.stderr)
-        yield good
+    name, kind = WORLDS[index % len(WORLDS)]
+    world = World.of(name, index // len(WORLDS) % EACH, kind=kind)
+    random = np.random.default_rng([index, *family.encode()])
+    scene = drawn(world, random)
+    measured, started = world.measured(scene.shown, random, bool(index % 2)), time.process_time()
+    found = diagnose([measured], world.machine, scene.refused)
+    seconds = time.process_time() - started
+    sets = tuple((each.candidate.name, *each.aliases) for each in found.findings)
+    unnamed = f"{found.unknown_um:.1f} um {found.rest.kind}" if found.unknown_um else ""
+    good = right(found, scene, world), inside(found, scene), exact(found, scene, world)
+    return Outcome(family, index, f"{name} {kind}", scene.names, found.verdict, sets, unnamed, *good, round(seconds, 2))
 
 
-def main(arguments: list[str]) -> None:
-    if "--set" in arguments:
-        at = arguments.index("--set")
-        name, value = arguments[at + 1].split("=")
-        setattr(weighing, name, float(value))
-        arguments = [*arguments[:at], *arguments[at + 2 :]]
-    for argument in arguments:
+def row(family: str, found: Sequence[Outcome]) -> str:
+    """A row of the table: right, in the set, alone; how many names a set has; processor seconds, median and longest."""
+    count, said = len(found), [len(each.sets[0]) for each in found if each.sets]
+    named = family in ("single", "thermal", "curves", "weak", "two", "three")
+    sets = (
+        f"{sum(e.inside for e in found)} | {sum(e.exact for e in found)} | {np.mean(said or [0]):.2f}"
+        if named
+        else "| |"
+    )
+    times = np.array([each.seconds for each in found])
+    right = f"{sum(each.right for each in found)} of {count}"
+    return f"| {FAMILIES[family][2]} | {right} | {sets} | {np.median(times):.1f} | {times.max():.1f} |"
+
+
+def outcomes(family: str, indices: Sequence[int], log: str | None) -> Iterator[Outcome]:
+    """The scenes one after another; each goes to the log and to the standard error."""
+    for index in indices:
+        found = outcome(family, index)
+        print(family, index, found.world, found.hidden, "->", found.verdict, found.sets, found.unnamed, file=sys.stderr)
+        if log:
+            with open(log, "a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(found)) + "\n")
+        yield found
+
+
+def main() -> None:
+    wanted = argparse.ArgumentParser(description=__doc__)
+    wanted.add_argument("families", nargs="+", help="family=count")
+    wanted.add_argument("--set", action="append", default=[], help="module.NAME=value")
+    wanted.add_argument("--from", dest="start", type=int, default=0)
+    wanted.add_argument("--log")
+    given = wanted.parse_args()
+    for each in given.set:
+        place, value = each.split("=")
+        module, name = place.rsplit(".", 1)
+        setattr(importlib.import_module(f"ncfix.diagnose.{module}"), name, float(value))
+    for argument in given.families:
         family, count = argument.split("=")
-        good = list(outcomes(family, int(count)))
-        print(f"| {FAMILIES[family][2]} | {sum(good)} of {len(good)} |")
+        indices = range(given.start, given.start + int(count))
+        print(row(family, list(outcomes(family, indices, given.log))), flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -17,9 +17,8 @@ def test_log_odds_are_those_of_two_normal_distributions() -> None:
     """With the noise all but known the odds are the ratio of densities of the data with and without the effect."""
     random = np.random.default_rng(3)
     columns, y = random.normal(size=(40, 3)), random.normal(size=40) * 1.3
-    squares, vectors = np.linalg.eigh(columns.T @ columns)
     known = 1e9
-    found = log_odds(squares, (vectors.T @ columns.T @ y) ** 2, y @ y + known, 40 + known)
+    found = log_odds(columns.T @ columns, columns.T @ y, y @ y + known, 40 + known)
     none = multivariate_normal(np.zeros(40), np.eye(40)).logpdf(y)
     for size, odds in zip(SIZES, found, strict=True):
         there = multivariate_normal(np.zeros(40), np.eye(40) + size**2 * columns @ columns.T).logpdf(y)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,14 +109,14 @@ def test_warmth_far_from_twenty_degrees_hides_nothing(world: World) -> None:
     warm = world.plain.with_columns(
         {name: values + 15 for name, values in world.plain.columns.items() if name.startswith("temp_")}
     )
-    hidden = {candidate.name for candidate, _ in World(world.machine, warm).gathered.invisible}
+    hidden = {candidate.name for candidate, _ in replace(world, plain=warm).gathered.invisible}
     assert not hidden & {"spindle growth", "drift X", "thermal scale X", "artefact growth"}
 
 
 def test_an_artefact_that_grows_is_named(world: World) -> None:
-    """About a point away from the middle of what was measured: 25 um/m K, with the bed's temperature."""
+    """About a point away from the middle of what was measured: 25 um/m K, with the temperature of the column."""
     seen = world.view
-    warm = world.plain.columns["temp_bed"] - world.plain.columns["temp_bed"].mean()
+    warm = world.plain.columns["temp_column"] - world.plain.columns["temp_column"].mean()
     tip = world.machine.nominal(seen.q, world.plain.columns["tool_length"])[:, :3, 3]
     grown = -25e-3 * warm[:, None] * (tip - tip.mean(axis=0) - [60.0, -40.0, -90.0])
     random = np.random.default_rng(7)

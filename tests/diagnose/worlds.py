@@ -1,23 +1,27 @@
 """Measurements of machines that lack something, to see how often the diagnosis is right and to set its constants.
 
 The machine's own Jacobian carries the effects, but not their shapes: curves are drawn from random waves or are a local
-bump, harmonics and plays are drawn anew, and every effect swells and shrinks along some axis by a quarter. Noise has
-long tails, outliers and memory; a little of every other effect (1 um rms together) is there in "clutter".
+bump, harmonics and plays are drawn anew, and every effect swells and shrinks along some axis by a quarter. What is
+thermal follows the warmth of a body that no sensor sees well (warmth.py). Noise has long tails, outliers and memory; a
+little of every other effect (1 um rms together) is there in "clutter".
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
+from diagnose.warmth import Warmth
 from measure.poses import machine
 from ncfix.diagnose.catalogue import Candidate, catalogue
 from ncfix.diagnose.groups import Gathered, gather
 from ncfix.diagnose.view import View, view
 from ncfix.machine import Effect, Machine
+from ncfix.machine.smooth import Constant
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.synthetic import Faults, simulate
@@ -29,8 +33,14 @@ SWELLS = 0.25
 """How much an effect swells and shrinks along some axis, a share of its size."""
 BUMPS = 0.2
 """Share of the curves that are a local bump."""
-TEMPERATURES = {"spindle": (12.0, 1500.0), "column": (6.0, 6000.0), "bed": (3.6, 9000.0)}
-"""Sensor -> (K at full speed, time constant in s)."""
+PAUSES_S = (50.0, 150.0)
+"""Mean time between poses, from world to world."""
+THERMAL = ("heat", "spindle")
+"""Families of what warms."""
+STILL: dict[str, Any] = {
+    "basis": Constant(), "coefficients": (0.0,), "input": None, "time_constant_s": None, "center": 0.0, "scale": 1.0,
+}  # fmt: skip
+"""An effect without what drives it."""
 FOREIGN = ("field", "drag", "slips", "walk", "triple", "history")
 
 
@@ -38,21 +48,24 @@ FOREIGN = ("field", "drag", "slips", "walk", "triple", "history")
 class World:
     """A machine that is known but for what will be hidden, and poses at which it is measured.
 
-    plain  the measurement without any error
+    plain   the measurement without any error
+    warmth  what warmed meanwhile
     """
 
     machine: Machine
     plain: Measurement
+    warmth: Warmth
 
     @classmethod
-    def of(cls, name: str, seed: int, poses: int = 180) -> World:
-        """One of the test machines with location errors of its own."""
+    def of(cls, name: str, seed: int, poses: int = 180, kind: str = "tcp") -> World:
+        """One of the test machines with location errors of its own: poses all over, or styluses in balls (probe)."""
         random = np.random.default_rng(10_000 + seed)
         known = machine(name)
         located = [effect for effect in known.effects if effect.location]
         own = [replace(each, coefficients=_constants(each, random)) for each in located]
         known = known.replace(effects=tuple(own))
-        return cls(known, simulate(_plan(known, poses, random), known, Faults(0.0), seed))
+        plan, warmth = _plan(known, poses, kind, random)
+        return cls(known, simulate(plan, known, Faults(0.0), seed), warmth)
 
     @cached_property
     def view(self) -> View:
@@ -96,6 +109,8 @@ class World:
         if len(kind) == 3 and kind.startswith("E"):
             unit = self.view.design([Effect(kind, (0.0,))])[:, 0]
             return unit * self._curve(self.u[kind[2]], random)[self.view.row]
+        if candidate.family in THERMAL and candidate.name != "tool droop":
+            return self._warmed(candidate, random)
         loading = candidate.loadings[random.integers(len(candidate.loadings))]
         numbers = random.normal(size=loading.shape[1])
         if kind in ("backlash", "lateral", "angular"):
@@ -105,6 +120,16 @@ class World:
             numbers = numbers * np.tile(np.repeat([1.0, 0.35, 0.1, 0.0], 2), len(candidate.effects))
             loading = np.eye(len(candidate.effects) * lead.basis.size)
         return self.view.design(candidate.effects) @ (loading @ numbers)
+
+    def _warmed(self, candidate: Candidate, random: Generator) -> Array:
+        """The pattern of a thermal effect in space, with a course in time that is not the catalogue's."""
+        still = {(e.name, e.times, e.times_center): replace(e, **STILL) for e in candidate.effects}
+        places = {key[2] for key in still}
+        place = sorted(places, key=str)[random.integers(len(places))]
+        parts = [each for key, each in still.items() if key[2] == place]
+        pattern = self.view.design(parts) @ random.normal(size=len(parts))
+        course = self.warmth.course(candidate.name, self.view.column("time_s"), random)
+        return pattern * (course - course.mean())[self.view.row]
 
     @staticmethod
     def _curve(u: Array, random: Generator) -> Array:
@@ -154,7 +179,7 @@ class World:
     def measured(self, shown_um: Array, random: Generator, stated: bool = False) -> Measurement:
         """The measurement with this error and noise; the noise stated, or to be told from repeats."""
         every = (shown_um + self._noise(random)).reshape(-1, 3) / 1e3
-        names = ("dx", "dy", "dz")
+        names = self.view.problem.observations[0].components
         data = self.plain.with_columns({n: self.plain.columns[n] + every[:, k] for k, n in enumerate(names)})
         silent = replace(data, headers=tuple(pair for pair in data.headers if pair[0] != "noise_um"))
         return silent.with_header("noise_um", f"{SIGMA_UM:g}") if stated else silent
@@ -195,31 +220,22 @@ def _constants(effect: Effect, random: Generator) -> tuple[float, ...]:
     return tuple(float(size * random.uniform(-1, 1)) for _ in effect.coefficients)
 
 
-def _plan(known: Machine, poses: int, random: Generator) -> Measurement:
+def _plan(known: Machine, poses: int, kind: str, random: Generator) -> tuple[Measurement, Warmth]:
     """Poses in random order and from random sides, some repeated, with clock, temperatures, tools and loads."""
-    drawn = candidates(known, "tcp", poses, Room(tool_lengths=(110.0, 230.0)), int(random.integers(1000)))
+    drawn = candidates(known, kind, poses, Room(tool_lengths=(110.0, 230.0)), int(random.integers(1000)))
+    poses = len(drawn)
     order = np.sort(np.concatenate([np.arange(poses), np.repeat(np.arange(REPEATED) * poses // REPEATED, TIMES - 1)]))
     shuffled = random.permutation(poses)[order]
     columns = {name: values[shuffled] for name, values in drawn.columns.items()}
+    labels = {name: tuple(values[k] for k in shuffled) for name, values in drawn.labels.items()}
     for axis in known.axes:
         columns[f"dir_{axis.name}"] = random.choice([-1.0, 1.0], poses)[order]
-    sets = random.integers(0, SETS, poses)[order]
-    columns["load_kg"] = np.array([20.0, 150.0, 20.0, 150.0])[sets]
-    again = np.diff(order, prepend=-1) == 0
-    time = np.cumsum(np.where(again, 15.0, 20.0 + random.exponential(75.0, len(order))))
-    columns["time_s"] = time
-    speed = np.repeat(random.uniform(0, 1, len(order) // 12 + 1), 12)[: len(order)]
-    for name, (warm, constant) in TEMPERATURES.items():
-        columns[f"temp_{name}"] = 22 + _lagged(warm * speed, time, constant) + random.normal(0, 0.03, len(order))
-    day = 1.5 * np.sin(2 * np.pi * time / 86400 + random.uniform(0, 6))
-    columns["temp_ambient"] = 22 + day + random.normal(0, 0.03, len(order))
-    return Measurement("tcp", (), columns, {"set": tuple(str(number + 1) for number in sets)})
-
-
-def _lagged(values: Array, time: Array, constant: float) -> Array:
-    """First-order lag from zero."""
-    found = np.zeros_like(values)
-    share = 1 - np.exp(-np.diff(time, prepend=time[0]) / constant)
-    for row in range(1, len(values)):
-        found[row] = found[row - 1] + share[row] * (values[row] - found[row - 1])
-    return found
+    if kind == "tcp":
+        sets = random.integers(0, SETS, poses)[order]
+        columns["load_kg"] = np.array([20.0, 150.0, 20.0, 150.0])[sets]
+        labels["set"] = tuple(str(number + 1) for number in sets)
+    again, pause = np.diff(order, prepend=-1) == 0, random.uniform(*PAUSES_S)
+    time = np.cumsum(np.where(again, 15.0, 20.0 + random.exponential(pause, len(order))))
+    warmth = Warmth.drawn(float(time[-1]), random)
+    columns |= {"time_s": time, **{name: warmth.at(time, values) for name, values in warmth.sensors.items()}}
+    return Measurement(kind, (), columns, labels), warmth

@@ -119,9 +119,7 @@ class Court:
         odds = np.empty((len(self.groups), len(SIZES)))
         for groups, places, blocks in inner.blocks:
             lost = np.moveaxis(taken[:, places], 0, 1)
-            eigen, vectors = np.linalg.eigh(blocks - np.swapaxes(lost, 1, 2) @ lost)
-            a = np.einsum("gpk,gp->gk", vectors, projected[places])
-            odds[groups] = log_odds(np.maximum(eigen, 0.0), a**2, total, count)
+            odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count)
         return Heard(odds)
 
     def likelihood(self, members: Sequence[Member], beside: Array | None = None) -> float:
@@ -196,11 +194,24 @@ class Court:
         return widths
 
 
-def log_odds(eigen: Array, squares: Array, total: float | Array, count: float) -> Array:
-    """Log odds per size, (..., p) -> (..., sizes); `total` sum of squares of the data, `count` its freedom."""
-    size = np.asarray(SIZES)[:, None] ** 2
-    shrunk = 1 + size * eigen[..., None, :]
-    occam = 0.5 * np.log(shrunk).sum(axis=-1)
-    gain = (squares[..., None, :] * size / shrunk).sum(axis=-1)
-    odds: Array = -occam - 0.5 * count * np.log1p(-np.minimum(gain / np.asarray(total)[..., None], 1 - 1e-12))
+def log_odds(inner: Array, projected: Array, total: float, count: float) -> Array:
+    """Log odds per size, (..., p, p) inner products of columns and (..., p) with the data -> (..., sizes).
+
+    `total` is the sum of squares of the data, `count` its freedom. One Cholesky factor of [[I/s^2 + B, a], [a', total]]
+    has the determinant in its diagonal and what the columns gain in its last row.
+    """
+    width = inner.shape[-1]
+    bordered = np.empty((*inner.shape[:-2], width + 1, width + 1))
+    bordered[..., :width, :width] = inner
+    bordered[..., width, :width] = bordered[..., :width, width] = projected
+    bordered[..., width, width] = total
+    places = np.arange(width)
+    odds = np.empty((*inner.shape[:-2], len(SIZES)))
+    for k, size in enumerate(SIZES):
+        own = bordered.copy()
+        own[..., places, places] += size**-2
+        factor = np.linalg.cholesky(own)
+        occam = width * np.log(size) + np.log(factor[..., places, places]).sum(axis=-1)
+        gain = (factor[..., width, :width] ** 2).sum(axis=-1)
+        odds[..., k] = -occam - 0.5 * count * np.log1p(-np.minimum(gain / total, 1 - 1e-12))
     return odds

@@ -43,8 +43,8 @@ def of_joints(view: View) -> Iterator[Group | None]:
         own = [np.concatenate([next(shown) for _ in component], axis=1) for component in components]
         yield together(view, _something(axis, f"something of {axis.name}", what), own)
         for component, part in zip(components, own, strict=True):
-            name = component[0][0]
-            yield together(view, replace(_something(axis, name, what), effects=(Effect(name, (0.0,)),)), [part])
+            effects = zero([Effect(name, (), **options) for name, options, _ in component])
+            yield together(view, replace(_something(axis, component[0][0], what), effects=effects), [part])
 
 
 def _designs(view: View, effects: Sequence[Effect]) -> list[Array]:
@@ -73,11 +73,11 @@ def _sorts(reach: Reach, axis: Axis) -> Iterator[tuple[str, list[list[Part]]]]:
     others = [other for other in _moved(reach) if other is not axis]
     for other in others:
         yield f"its position and {other.name}", [[(name, options | reach.factor(other), loading)] for name in names]
-    driven = _driven(reach)
-    if driven:
-        product: tuple[dict[str, Any], ...] = (reach.factor(axis), {})
-        parts = [[(name, each | more, size) for each, size in driven for more in product] for name in names]
-        yield "time, heat or load", parts
+    for what, driven in (("time or heat", _warm(reach)), ("load", _loaded(reach))):
+        if driven:
+            yield what, [[(name, *each) for each in driven] for name in names]
+            product = [(options | reach.factor(axis), loading) for options, loading in driven]
+            yield f"its position and {what}", [[(name, *each) for each in product] for name in names]
 
 
 def _curve(reach: Reach, axis: Axis) -> tuple[dict[str, Any], Array]:
@@ -86,15 +86,20 @@ def _curve(reach: Reach, axis: Axis) -> tuple[dict[str, Any], Array]:
     return {"basis": shapes.spline(), **reach.scaled(axis)}, shapes.smooth(BEND)
 
 
-def _driven(reach: Reach) -> list[tuple[dict[str, Any], Array]]:
-    """Time, temperatures and load as options of effects."""
+def _warm(reach: Reach) -> list[tuple[dict[str, Any], Array]]:
+    """Time and temperatures as options of effects."""
     found: list[tuple[dict[str, Any], Array]] = []
     if "time_s" in reach.columns:
         first, last = reach.clock
         middle = {"center": (first + last) / 2, "scale": (last - first) / 2}
         found.append(({"basis": shapes.spline(), "input": "time_s", **middle}, shapes.smooth(SLOW)))
-    for name in (*reach.sensors, *(["load_kg"] if "load_kg" in reach.columns else [])):
-        origin, unit = (reach.warmth[name][0], 5.0) if name in reach.warmth else (0.0, 100.0)
-        options = {"basis": Polynomial(degree=(1,)), "input": name, "center": origin, "scale": unit}
+    for name in reach.sensors:
+        options = {"basis": Polynomial(degree=(1,)), "input": name, "center": reach.warmth[name][0], "scale": 5.0}
         found.append((options, np.eye(1)))
     return found
+
+
+def _loaded(reach: Reach) -> list[tuple[dict[str, Any], Array]]:
+    """The same of the load."""
+    options = {"basis": Polynomial(degree=(1,)), "input": "load_kg", "center": 0.0, "scale": 100.0}
+    return [(options, np.eye(1))] if "load_kg" in reach.columns else []

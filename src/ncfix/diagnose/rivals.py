@@ -38,18 +38,28 @@ def rivals(view: View, named: Sequence[Group]) -> tuple[Group, ...]:
 
 
 def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]) -> list[Group]:
-    """Without the single errors that a name holds already: those are that name with another shape."""
+    """Without the single errors that a name holds already: those are that name with another shape, or course."""
     basis = orthonormal(view.base / view.relative[:, None])
     own: dict[str, list[Array]] = {}
     for group in named:
         left = without(basis, group.columns / view.relative[:, None])
         span = orthonormal(left)
-        for name in {effect.name for effect in group.owner.effects}:
-            own.setdefault(name, []).append(span)
+        for key in _errors(group):
+            own.setdefault(key, []).append(span)
     return [group for group in found if not _held(without(basis, group.columns / view.relative[:, None]), group, own)]
 
 
+def _errors(group: Group) -> set[str]:
+    """The errors it consists of; and the course of time if it is nothing but one, wherever it acts."""
+    effects = group.owner.effects
+    slow = bool(effects) and all(_slow(effect.input or "") for effect in effects)
+    return {effect.name for effect in effects} | ({"slow"} if slow else set())
+
+
+def _slow(signal: str) -> bool:
+    return signal == "time_s" or signal.startswith("temp_")
+
+
 def _held(left: Array, group: Group, spans: Mapping[str, Sequence[Array]]) -> bool:
-    names = [effect.name for effect in group.owner.effects]
-    held = [((span.T @ left) ** 2).sum() for name in names for span in spans.get(name, ())]
+    held = [((span.T @ left) ** 2).sum() for key in _errors(group) for span in spans.get(key, ())]
     return bool(max(held, default=0.0) > HELD * (left**2).sum())

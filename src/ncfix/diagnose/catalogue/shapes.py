@@ -30,13 +30,30 @@ def spline(low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Spline
 @lru_cache(maxsize=64)
 def smooth(length: float, low: float = -1.0, high: float = 1.0, pieces: int = PIECES) -> Array:
     """The loading of a spline that is a Gaussian process of this length, (k, k)."""
+    places = _places(low, high, pieces)
+    return _rooted(np.exp(-0.5 * ((places[:, None] - places) / length) ** 2))
+
+
+def _places(low: float, high: float, pieces: int) -> Array:
+    """Where the pieces have their middles."""
     knots = np.asarray(spline(low, high, pieces).knots)
-    places = np.array([knots[i + 1 : i + 4].mean() for i in range(pieces + 3)])
-    apart = (places[:, None] - places) / length
-    values, vectors = np.linalg.eigh(np.exp(-0.5 * apart**2))
+    return np.array([knots[i + 1 : i + 4].mean() for i in range(pieces + 3)])
+
+
+def _rooted(covariance: Array) -> Array:
+    """Columns whose inner products are nearly this covariance."""
+    values, vectors = np.linalg.eigh(covariance)
     kept = values > 1e-5 * values[-1]
     loading: Array = vectors[:, kept] * np.sqrt(values[kept])
     return loading
+
+
+@lru_cache(maxsize=64)
+def wandering(length: float, pieces: int) -> Array:
+    """The loading of a spline that bends over this length, with kinks where a cause sets in (Matern 3/2), (k, p)."""
+    places = _places(-1.0, 1.0, pieces)
+    apart = np.sqrt(3) * np.abs(places[:, None] - places) / length
+    return _rooted((1 + apart) * np.exp(-apart))
 
 
 @lru_cache(maxsize=64)
@@ -53,8 +70,7 @@ def turned(length: float) -> Array:
 
 def _straight(length: float, powers: int) -> Array:
     """Mean, and slope if `powers` is 2, of what `smooth` loads."""
-    knots = np.asarray(spline().knots)
-    places = np.array([knots[i + 1 : i + 4].mean() for i in range(PIECES + 3)])
+    places = _places(-1.0, 1.0, PIECES)
     straight = np.linalg.qr(places[:, None] ** np.arange(powers))[0]
     found: Array = straight @ (straight.T @ smooth(length))
     return found

@@ -1,12 +1,15 @@
 """What warms, and what happens in the course of time. Rows 39 to 44, 47 and 49 of the catalogue.
 
-What drives a thermal effect is rarely what is measured: a sensor may be late or sit on another body. So each effect may
-follow any logged temperature, at once or with a lag, and a smooth course of time besides.
+A name says where an effect acts: along the tool, on an axis line, in proportion to a position. Its course in time is no
+part of the name: what drives it is rarely what is measured, for a sensor may be late or sit on another body. So each
+effect may follow any logged temperature, at once or with a lag, and has a course of its own besides, or nothing but
+that; the bodies differ only in which sensors are likely theirs, and in how slow they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,21 +25,46 @@ from ncfix.measure.measurement import Array
 
 LAGS = (None, 600.0, 1800.0, 5400.0)
 """s: at once, a spindle, a slide, a frame; what lies between is a mixture."""
-COURSE = 8
-"""Pieces of a smooth course of time."""
-SLOW = 0.5
-"""Length of its bends, of half the time."""
+PIECES = 24
+"""Pieces of a course of time."""
 FREE = 0.4
 """Variance of the course of time beside that of the temperatures."""
-AMBIENT = ("ambient", "air", "hall", "room")
+BADLY = 0.25
+"""Variance of the temperatures beside that of the course of time, where they say little."""
+FOREIGN = 0.3
+"""Variance of a sensor that is likely of another body."""
+AIR = ("ambient", "air", "hall", "room")
+HOT = ("spindle", "head", "motor", "bearing")
 SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
 WARMER = 5.0
 """K: unit of temperature."""
 WARM_UP = "warm up before measuring and cutting"
 Parts = Sequence[tuple[str, Mapping[str, Any]]]
-Drive = tuple[list[dict[str, Any]], Array]
-"""What drives an effect, as options, and the loading of its coefficients."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """What becomes warm.
+
+    slow, quick  s: over which times its course bends where it follows its sensors, and where it does not
+    """
+
+    slow: float
+    quick: float
+
+
+SPINDLES, FRAMES, OUTSIDE = Body(3600.0, 1200.0), Body(7200.0, 2400.0), Body(14400.0, 7200.0)
+PLATE = Body(28800.0, 28800.0)
+"""One that is held at a point nobody knows: all ways at once with courses of their own would be anything."""
+
+
+@dataclass(frozen=True, repr=False)
+class Drive:
+    """What drives a thermal effect: options of effects, and the loadings of their coefficients, one for each form."""
+
+    options: tuple[dict[str, Any], ...]
+    forms: tuple[Array, ...]
 
 
 def candidates(reach: Reach) -> Iterator[Candidate]:
@@ -44,9 +72,9 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
     clocked = "time_s" in reach.columns and reach.clock[1] > reach.clock[0]
     if not clocked and not reach.sensors:
         return
-    inside = [name for name in reach.sensors if not _of_air(name)]
-    driven = _drive(reach, inside, clocked)
-    yield _growth(reach, driven)
+    inside = {name: FOREIGN if _of(name, HOT) else 1.0 for name in reach.sensors if not _of(name, AIR)}
+    driven = _drive(reach, inside, FRAMES, clocked)
+    yield _growth(reach, inside, clocked)
     yield from _drifts(reach, driven, clocked)
     for axis in reach.linear:
         own = along(axis)
@@ -58,75 +86,64 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
                 [(name, linear | {"times_center": place})]
                 for place in (*reach.spans[axis.name], linear["times_center"])
             ]
-            yield _of(reach, f"thermal scale {axis.name}", title, axis.name, fixed, driven)
+            yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven)
         for turn in TURNS:
             title = f"thermal bend: {axis.name} tilts about {LETTERS[TURNS.index(turn)]} with temperature"
             name = f"E{turn}{axis.name}"
-            yield _of(reach, f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
+            yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
     for axis in reach.rotary:
         lines: Parts = [(f"E{LETTERS[k]}0{axis.name}", {}) for k in across(axis)]
         title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
-        yield _of(reach, f"rotary centre drift {axis.name}", title, axis.name, [lines], driven)
-    if reach.sensors or clocked:
-        yield _artefact(reach, reach.sensors, clocked)
+        yield _driven(f"rotary centre drift {axis.name}", title, axis.name, [lines], driven)
+    yield _artefact(reach, clocked)
     if clocked:
         yield from _slip(reach)
 
 
-def _of_air(sensor: str) -> bool:
-    return sensor.removeprefix("temp_").startswith(AMBIENT)
+def _of(sensor: str, words: Sequence[str]) -> bool:
+    """Whether a sensor's name says that it is one of these."""
+    return any(word in sensor.removeprefix("temp_").split("_") for word in words)
 
 
-def _growth(reach: Reach, driven: Drive) -> Candidate:
+def _growth(reach: Reach, inside: Mapping[str, float], clocked: bool) -> Candidate:
     along_tool = int(np.abs(np.asarray(reach.machine.tool.direction)).argmax())
     title = "spindle growth: the spindle lengthens as it warms"
+    own = {name: 1.0 if _of(name, HOT) or min(inside.values()) == 1.0 else FOREIGN for name in inside}
+    driven = _drive(reach, own, SPINDLES, clocked)
     parts: list[Parts] = [[(f"E{LETTERS[along_tool]}{SPINDLE}", {})]]
-    return _of(reach, "spindle growth", title, "", parts, driven, "spindle")
+    return _driven("spindle growth", title, "", parts, driven, "spindle")
 
 
 def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
     """The frame moves along a base axis: with the machine's own heat, or with the hall's day."""
     held = by_foundation(reach)
-    air = [name for name in reach.sensors if _of_air(name)]
-    outside = _drive(reach, air, clocked, _swing(reach, air))
+    air = [name for name in reach.sensors if _of(name, AIR)]
+    outside = _drive(reach, dict.fromkeys(air, 1.0), OUTSIDE, clocked, _swing(reach, air))
     for letter in LETTERS:
         parts: list[Parts] = [[(f"E{letter}0{held.name}", {"carried": True})]]
         title = f"drift of the frame along {letter} as the machine warms"
-        yield _of(reach, f"drift {letter}", title, letter, parts, driven)
+        yield _driven(f"drift {letter}", title, letter, parts, driven)
         if air:
             title = f"ambient swing along {letter}: the frame follows the air"
-            yield _of(reach, f"ambient swing {letter}", title, letter, parts, outside)
+            yield _driven(f"ambient swing {letter}", title, letter, parts, outside)
 
 
-def _of(
-    reach: Reach,
-    name: str,
-    title: str,
-    axis: str,
-    forms: Sequence[Parts],
-    driven: Drive,
-    family: str = "heat",
-) -> Candidate:
-    """Components that follow temperatures, lagged and not, and a course of time; in one of several forms."""
-    drive, size = driven
-    effects = [
-        Effect(component, (), **each, **options) for form in forms for component, options in form for each in drive
-    ]
-    loadings, rows = [], 0
-    for form in forms:
-        block = stacked(*[size] * len(form))
-        whole = np.zeros((len(forms) * len(block), block.shape[1]))
-        whole[rows : rows + len(block)] = block
-        loadings.append(whole)
-        rows += len(block)
-    needs = tuple(dict.fromkeys(each["input"] for each in drive))
-    return Candidate(name, title, axis, family, zero(effects), _cut(loadings, effects), needs, WARM_UP)
-
-
-def _cut(loadings: Sequence[Array], effects: Sequence[Effect]) -> tuple[Array, ...]:
-    """The loadings over all coefficients there are."""
-    count = sum(each.basis.size for each in zero(effects))
-    return tuple(loading[:count] for loading in loadings)
+def _driven(name: str, title: str, axis: str, places: Sequence[Parts], drive: Drive, family: str = "heat") -> Candidate:
+    """Components that follow temperatures, lagged and not, and a course of time; at one of several places."""
+    effects = zero(
+        [Effect(part, (), **each, **options) for place in places for part, options in place for each in drive.options]
+    )
+    count, loadings = sum(effect.basis.size for effect in effects), []
+    for form in drive.forms:
+        rows = 0
+        for place in places:
+            block = stacked(*[form] * len(place))
+            whole = np.zeros((count, block.shape[1]))
+            whole[rows : rows + len(block)] = block
+            loadings.append(whole)
+            rows += len(block)
+    needs = tuple(dict.fromkeys(each["input"] for each in drive.options))
+    return Candidate(name, title, axis, family, effects, tuple(loadings), needs, WARM_UP)
 
 
 def _swing(reach: Reach, air: Sequence[str]) -> float:
@@ -134,20 +151,24 @@ def _swing(reach: Reach, air: Sequence[str]) -> float:
     return max((reach.warmth[sensor][1] for sensor in air), default=0.0) / WARMER
 
 
-def _drive(reach: Reach, sensors: Sequence[str], clocked: bool, course: float = 1.0) -> Drive:
-    """What drives a thermal effect, as options of effects, and its loading; a course of time of such a size besides."""
-    drive: list[dict[str, Any]] = []
+def _drive(reach: Reach, sensors: Mapping[str, float], body: Body, clocked: bool, course: float = 1.0) -> Drive:
+    """Sensors with these variances, and courses of time of such a size besides: that of a body."""
+    options: list[dict[str, Any]] = []
     lags = LAGS if "time_s" in reach.columns else LAGS[:1]
     for sensor in sensors:
         each = {"basis": DEGREE, "input": sensor, "center": round(reach.warmth[sensor][0], 1), "scale": WARMER}
-        drive += [each | ({"time_constant_s": lag} if lag else {}) for lag in lags]
-    size = [weighed((1.0,) * len(drive))]
-    if clocked:
-        first, last = reach.clock
-        middle = {"center": (first + last) / 2, "scale": (last - first) / 2, "input": "time_s"}
-        drive.append({"basis": shapes.spline(pieces=COURSE), **middle})
-        size.append(course * np.sqrt(FREE) * shapes.smooth(SLOW, pieces=COURSE))
-    return drive, stacked(*size)
+        options += [each | ({"time_constant_s": lag} if lag else {}) for lag in lags]
+    warm = weighed([variance for variance in sensors.values() for _ in lags])
+    if not clocked:
+        return Drive(tuple(options), (warm,))
+    first, last = reach.clock
+    half = (last - first) / 2
+    options.append(
+        {"basis": shapes.spline(pieces=PIECES), "input": "time_s", "center": (first + last) / 2, "scale": half}
+    )
+    slow, quick = (course * shapes.wandering(length / half, PIECES) for length in (body.slow, body.quick))
+    late = stacked(warm, np.sqrt(FREE) * slow)
+    return Drive(tuple(options), (late, stacked(np.sqrt(BADLY) * warm, quick)))
 
 
 def _slip(reach: Reach) -> Iterator[Candidate]:
@@ -172,11 +193,10 @@ def _slip(reach: Reach) -> Iterator[Candidate]:
     )
 
 
-def _artefact(reach: Reach, sensors: Sequence[str], clocked: bool) -> Candidate:
+def _artefact(reach: Reach, clocked: bool) -> Candidate:
     """The balls on the table move apart as their plate warms: no error of the machine, and none in its file."""
-    drive, size = _drive(reach, sensors, clocked)
-    effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive])
+    drive = _drive(reach, dict.fromkeys(reach.sensors, 1.0), PLATE, clocked)
+    effects = zero([Effect(f"EX{SPINDLE}", (), **each) for each in drive.options])
     title = "artefact growth: the artefact or workpiece expands with temperature"
-    return Candidate(
-        "artefact growth", title, "", "heat", effects, (size,), (*sensors,), "log the artefact's own temperature", True
-    )
+    remedy, needs = "log the artefact's own temperature", reach.sensors
+    return Candidate("artefact growth", title, "", "heat", effects, drive.forms[:1], needs, remedy, True)
