@@ -8,6 +8,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.ragged import distinct
 from ncfix.compensate.rows import finite, lengths
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
@@ -55,7 +56,7 @@ def not_a_number(written: Written) -> Finding:
     pieces = written.pieces
     bad = ~finite(pieces.end)
     bad[pieces.arc] |= ~finite(pieces.centre[pieces.arc])
-    rows = np.unique(pieces.move[bad & ~pieces.kept])
+    rows = distinct(pieces.move[bad & ~pieces.kept])
     return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
 
 

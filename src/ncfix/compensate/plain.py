@@ -22,7 +22,7 @@ from ncfix.compensate.judge import SURE, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import Demands, in_pieces
-from ncfix.compensate.ragged import offsets, owners, places
+from ncfix.compensate.ragged import distinct, offsets, owners, places
 from ncfix.compensate.rows import lengths, some
 from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
@@ -142,7 +142,7 @@ class Planner:
 
     def _fine_inside(self, intent: Intent, pieces: Pieces, inner: Index, shift: Array) -> bool:
         """The same of pieces that end inside of motions (k,)."""
-        near = np.unique(np.concatenate([inner, inner + 1]))
+        near = distinct(np.concatenate([inner, inner + 1]))
         own, ends = pieces.move[near], pieces.end[near]
         change = ends - intent.segments.at(own, pieces.fraction[near])
         at_start = pieces.move[np.maximum(near - 1, 0)] != own

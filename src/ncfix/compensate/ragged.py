@@ -51,8 +51,13 @@ def batches(sizes: Index, most: int) -> list[NDArray[np.intp]]:
         return []
     ends = np.cumsum(sizes)
     marks = np.searchsorted(ends, np.arange(most, int(ends[-1]) + most, most), side="right")
-    cuts = np.unique(np.concatenate([[0], np.maximum(marks, 1), [len(sizes)]]))
+    cuts = distinct(np.concatenate([[0], np.maximum(marks, 1), [len(sizes)]]))
     return [np.arange(a, b) for a, b in pairwise(cuts.tolist())]
+
+
+def distinct(places: Index) -> Index:
+    """The different whole numbers among some that are not negative, ascending."""
+    return np.flatnonzero(np.bincount(places))
 
 
 def slices(n: int, most: int) -> list[slice]:

@@ -6,9 +6,13 @@ out before the parser sees the text (`squeeze`), and every position is put back 
 
 from __future__ import annotations
 
+import os
 import re
+import sys
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,13 +66,31 @@ def find_grammar(name: str) -> Path:
     raise FileNotFoundError(f"no grammar {name!r} in {', '.join(map(str, FOLDERS))}")
 
 
+def place_of_tables(grammar: Path) -> str | None:
+    """Where the tables of a grammar's parser are kept: beside what Python keeps of this module, or in the user's cache.
+
+    None if nothing can be kept. Lark takes them only for the same grammar, with all that it imports, in the same Python
+    and version of Lark.
+    """
+    name = f"{grammar.stem}.{sha256(str(grammar).encode()).hexdigest()[:12]}.{sys.implementation.cache_tag}.tables"
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    for folder in (Path(__file__).parent / "__pycache__", caches / "ncfix"):
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            if (folder / name).exists() or os.access(folder, os.W_OK):
+                return str(folder / name)
+    return None
+
+
 @lru_cache(maxsize=32)
 def parser(name: str) -> Lark:
-    """The LALR parser of a grammar, made when it is first asked for (about 0.05 s) and kept."""
+    """The LALR parser of a grammar; its tables are worked out once (0.1 s), and kept on the disk."""
     from lark import Lark
 
+    path = find_grammar(name)
     return Lark.open(
-        str(find_grammar(name)),
+        str(path),
+        cache=place_of_tables(path) or False,
         parser="lalr",
         start="block",
         propagate_positions=True,

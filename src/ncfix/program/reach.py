@@ -38,8 +38,8 @@ def tape_end(source: bytes, blocks: NDArray[np.int64]) -> int:
     """
     leader = LEADER.match(source, int(blocks[0, 0]))
     assert leader is not None, "it matches nothing, too"
-    text = np.frombuffer(source, dtype=np.uint8)
-    for block in np.unique(np.searchsorted(blocks[:, 0], np.flatnonzero(text == ord("%")), side="right") - 1):
+    marks = np.flatnonzero(np.frombuffer(source, dtype=np.uint8) == ord("%"))
+    for block in dict.fromkeys((np.searchsorted(blocks[:, 0], marks, side="right") - 1).tolist()):
         start, stop = blocks[block]
         if start > leader.end() and source[start:stop].strip() == b"%":
             return int(block)
