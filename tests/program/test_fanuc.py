@@ -14,7 +14,6 @@ from ncfix.compensate.following import kinematics_of
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine import load, loads
 from ncfix.program import dialects
-from ncfix.program.language import language_of
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
@@ -349,11 +348,6 @@ def test_programs_of_the_world(shared: Callable[[str], Path], figures: Callable[
 def test_it_is_said_when_a_program_does_not_say_its_unit() -> None:
     assert [m.code for m in follow("G0X1.", dialect="fanuc").messages] == ["NCF215"]
     assert not follow("G21G0X1.", dialect="fanuc").messages
-
-
-def test_long_programs_are_followed_as_fanuc_programs() -> None:
-    """Programs of RS274 are followed in parts when they are long; in parts a Fanuc program would be one of RS274."""
-    assert language_of(dialects.get("fanuc")).follower is None
 
 
 def test_tools_named_by_h() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -125,17 +126,23 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
     return dialects.detect(head, path, (machine and machine.control) or "")
 
 
-def subprograms(path: str) -> Callable[[str], bytes | None]:
-    """Finds the files of subprograms: beside the program, by their name with or without a suffix."""
-    folder = "." if path == STREAM else os.path.dirname(path) or "."
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """Finds the files of subprograms in a folder, by their name with or without a suffix."""
 
-    def find(name: str) -> bytes | None:
+    folder: str
+
+    def __call__(self, name: str) -> bytes | None:
+        """The text of a subprogram; None if there is none."""
         if os.path.basename(name) != name:
             return None
         for suffix in SUBPROGRAM_SUFFIXES:
-            candidate = os.path.join(folder, name + suffix)
+            candidate = os.path.join(self.folder, name + suffix)
             if os.path.isfile(candidate):
                 return read(candidate)
         return None
 
-    return find
+
+def subprograms(path: str) -> Callable[[str], bytes | None]:
+    """Finds the files of subprograms: beside the program."""
+    return Beside("." if path == STREAM else os.path.dirname(path) or ".")

@@ -13,7 +13,7 @@ Several processes can work on a program (see `crew`): each reads and follows all
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 from ncfix.compensate.account import FixReport
@@ -71,7 +71,7 @@ class Stream:
         task = self.task
         task.check()
         task.follower()
-        with crew(self.jobs, partial(Corrector, replace(task, resolve=None))) as others:
+        with crew(self.jobs, partial(Corrector, task)) as others:
             own = self.corrector = Corrector(task, others.spread(self.read))
             for number, done in own.work(others.share):
                 others.put(number, done)

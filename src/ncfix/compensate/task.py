@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
 from ncfix.compensate.options import FixOptions
@@ -33,6 +33,10 @@ class Task:
     dialect: Dialect
     size: int = PART_BYTES
 
+    def __post_init__(self) -> None:
+        numbered = replace(self.dialect, block_numbers=self.options.block_numbers)
+        object.__setattr__(self, "dialect", numbered)
+
     def follower(self) -> Follower:
         """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
         make = language_of(self.dialect).follower
@@ -48,3 +52,5 @@ class Task:
         strategy = get_strategy(self.options.strategy)
         if strategy.corrects_orientation or not strategy.follows_path or self.machine.is_perfect:
             raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
+        if self.options.block_numbers == "renumber" and language_of(self.dialect).renumber is not None:
+            raise NotInPartsError("all blocks get new numbers")

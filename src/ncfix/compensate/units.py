@@ -113,7 +113,7 @@ class Units:
         pending: list[tuple[Program, Moves]] = []
         for program, last in self._texts():
             refuse_stamped(program, self.options)
-            self.reader.first_line += len(program)
+            self.reader.first_line += program.lines_ended
             self.blocks += len(program)
             pending.append((program, self.follower.follow(program, last)))
             last |= self.follower.ended
@@ -123,10 +123,11 @@ class Units:
                 continue
             programs = [each for each, _ in pending]
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
+            if last:
+                self._check_rest()
             yield Part(joined(programs), moves, last)
             pending = []
             if last:
-                self._check_rest()
                 return
 
     def _check_rest(self) -> None:

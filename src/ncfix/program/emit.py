@@ -20,7 +20,7 @@ from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
-from ncfix.program.standstill import renamed
+from ncfix.program.standstill import passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
@@ -121,7 +121,7 @@ class _Emitter:
         self.reading = reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
-        self.decimals = [decimals_of(frame, least_increment) for frame in self.frames]
+        self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
         self.wordless, self.increments = moves.wordless, moves.increments
@@ -197,12 +197,11 @@ class _Emitter:
     def _resync(self, row: int) -> None:
         """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
         jump = self.jumps[row]
-        if not jump.any():
-            return
-        began = self.reading.start
-        read = self.moves.start if began is None else began
-        still = renamed(self.moves, row, self.position, self.kinematics) if began is None else None
-        self.position = np.where(jump, read[row], self.position) if still is None else still
+        if jump.any():
+            began = self.reading.start
+            read = self.moves.start[row] if began is None else began[row]
+            still = renamed(self.moves, row, self.position, self.kinematics) if began is None else None
+            self.position = np.where(jump, read, self.position) if still is None else still
 
     def _retract(self, row: int) -> None:
         """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
@@ -222,7 +221,8 @@ class _Emitter:
         moved, began, ended = self.moved[row], self.reading.start, self.reading.end
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
             moved = moved | (np.abs(ended[row] - began[row]) > 0)
-        self.position = np.where(moved, self._kept_end(row), self.position)
+        passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
+        self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
         self.end[self.first_piece[row]] = self.position
         if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
             return
@@ -377,8 +377,7 @@ def _plane(normal: FloatArray) -> tuple[int, int, int]:
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
 
 
-def decimals_of(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
-    """(n_axes,) digits behind the point that numbers of a frame need for what the control can resolve, mm and rad."""
+def _decimals(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
     return np.array([decimals_for(step) for step in least_increment / frame.scale], dtype=np.int64)
 
 

@@ -1,6 +1,7 @@
-"""Where the control believes its axes to stand when tool-centre-point control goes on or off: the machine stands still.
+"""Where the control believes its axes to stand after what moves axes of the machine, or none, but its tip.
 
-X Y Z have other numbers then, also those that a correction has put beside their places.
+When tool-centre-point control (TCP) goes on or off the machine stands still, and X Y Z have other numbers; in machine
+coordinates some axes move and others do not. That holds also for axes that a correction has put beside their places.
 """
 
 from __future__ import annotations
@@ -8,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.moves import Kinematics, Moves, TcpState
+from ncfix.program.moves import Kinematics, Moves, Rule, TcpState
 
 FloatArray = NDArray[np.float64]
 
 ALIKE = 1e-7
 """mm and rad; positions that are the same but for rounding."""
+
+MACHINE = TcpState(False, 0.0)
 
 
 def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
@@ -31,6 +34,23 @@ def renamed(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics
     if np.abs(meant - moves.start[row]).max() > ALIKE:
         return None
     return np.array(kinematics(position.tolist(), before, after))
+
+
+def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kinematics | None) -> FloatArray | None:
+    """The command (n_axes,) at the end of a motion in machine coordinates that is left as it is, under TCP.
+
+    Axes of the machine that it moves go where they do anyway, the others stand where `position` (n_axes,) has them: the
+    turn of a tilted plane, or the retreat in machine coordinates. None for other motions.
+    """
+    state = _state(moves, row)
+    if kinematics is None or not state.on or moves.rule[row] != Rule.PASS:
+        return None
+    if not np.isfinite([position, moves.start[row], moves.end[row]]).all():
+        return None
+    start, end, now = (
+        np.array(kinematics(each.tolist(), state, MACHINE)) for each in (moves.start[row], moves.end[row], position)
+    )
+    return np.array(kinematics(np.where(np.abs(end - start) > ALIKE, end, now).tolist(), MACHINE, state))
 
 
 def _state(moves: Moves, row: int) -> TcpState:

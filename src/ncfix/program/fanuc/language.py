@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ncfix.program.fanuc.blocks import parse_block
 from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.corners import axes_of_corner, has_corners
+from ncfix.program.fanuc.following import MacroFollower, runs_straight_on
 from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.fanuc.render import render
 from ncfix.program.finish import finished
@@ -78,6 +79,6 @@ FANUC: Language = replace(
     render=render,
     bulk=in_bulk,
     unroll=unroll,
-    follower=None,
+    follower=MacroFollower,
+    straight=runs_straight_on,
 )
-"""Not followed part by part: jumps and calls may lead anywhere in the text."""

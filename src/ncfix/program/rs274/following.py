@@ -74,12 +74,7 @@ class Walk(Protocol):
 
 
 class PartFollower(ABC):
-    """What the followers of all languages do alike; see `parts.Follower`.
-
-    to_the_last  see there
-    """
-
-    to_the_last = False
+    """What the followers of all languages do alike; see `parts.Follower`."""
 
     def __init__(self, control: Control, run: Run) -> None:
         self.control = control
@@ -90,6 +85,11 @@ class PartFollower(ABC):
     @abstractmethod
     def begin(self, program: Program) -> Walk:
         """What goes through the program, of which this is the first part."""
+
+    @property
+    def to_the_last(self) -> bool:
+        """What stands behind the end of the program matters."""
+        return False
 
     @property
     def ended(self) -> bool:

@@ -83,13 +83,17 @@ def begins_a_program(unit: Unit) -> bool:
 
 
 class SinumerikFollower(PartFollower):
-    """See `parts.Follower`. A name may be that of a subprogram behind the end of the program."""
+    """See `parts.Follower`."""
 
     control: Sinumerik
-    to_the_last = True
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
         super().__init__(Sinumerik(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+
+    @property
+    def to_the_last(self) -> bool:
+        """A name may be that of a subprogram behind the end of the program."""
+        return True
 
     def begin(self, program: Program) -> PartInterpreter:
         """What goes through the program, of which this is the first part."""
