@@ -20,6 +20,7 @@ import numpy as np
 from differential.errors import LETTERS, Machine
 from differential.sinumerik_frames import PLANES, Floats, Frame, about, projected
 from differential.sinumerik_motions import Path, Standing
+from differential.sinumerik_walk import Walk
 
 WORD = re.compile(
     r"(?P<name>[A-Z_$][A-Z_]+|[A-Z]\d(?==)|[A-Z])(?:=(?P<value>(?:[^\s()]|\((?:[^()]|\([^()]*\))*\))+)"
@@ -36,41 +37,7 @@ class Control(Standing):
 
     def run(self, text: str) -> list[Path]:
         """Follow a program to its end."""
-        lines = text.splitlines()
-        at, loops = 0, []
-        while at < len(lines):
-            line = lines[at]
-            if mark := re.search(r";#(\d+)", line):
-                self.mark = int(mark[1]), self.mark[1] + 1
-            body = re.sub(r'"([^"]*)"', r"0", line.split(";")[0].upper()).strip()
-            body = re.sub(r"^(?:/\d?\s*)?(?:N\d+\s*)?", "", body)
-            self.line = at + 1
-            at += 1
-            if found := re.fullmatch(r"FOR (\w+)=(.+) TO (.+)", body):
-                self.assign(found[1], self.value(found[2]))
-                loops.append((at, found[1], self.value(found[3])))
-            elif body == "ENDFOR":
-                back, name, last = loops[-1]
-                self.assign(name, self.value(name) + 1)
-                at = back if self.value(name) <= last else at
-                loops = loops if self.value(name) <= last else loops[:-1]
-            elif body.startswith("IF "):
-                depth = 0 if self.value(body[3:]) else 1
-                while depth:
-                    inner = lines[at].strip().upper()
-                    depth += inner.startswith("IF ") - inner.startswith("ENDIF")
-                    at += 1
-                    if depth == 1 and inner.startswith("ELSE"):
-                        break
-            elif body.startswith("ELSE"):
-                while not lines[at].strip().upper().startswith("ENDIF"):
-                    at += 1
-            elif found := re.fullmatch(r"(R\d+)\s*=\s*([^=].*)", body):
-                self.assign(found[1], self.value(found[2]))
-            elif body in ("M30", "M2", "M17"):
-                break
-            elif body and not body.startswith(("ENDIF", "%")):
-                self.block(body)
+        Walk(self, text).run()
         return self.paths
 
     def assign(self, name: str, value: float) -> None:
@@ -127,6 +94,8 @@ class Control(Standing):
             if code <= 3:
                 self.modes["g"] = code
             elif code in PLANES:
+                if code != self.modes["plane"]:
+                    self.modes["pole"] = np.full(2, np.nan)
                 self.modes["plane"] = code
             elif code in (90, 91):
                 self.modes["inc"] = code == 91

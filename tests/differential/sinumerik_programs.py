@@ -7,6 +7,9 @@ import random
 from collections.abc import Callable
 
 HEAD = ["G17 G40 G90 G94 G710", "T1 D1 M6", "G54", "G0 X0 Y0 Z40 A0 C0 F1000"]
+PLANES = {17: "XYIJZ", 18: "ZXKIY", 19: "YZJKX"}
+"""The two axes of a plane, their centre words, and the axis across."""
+
 SWIVEL_MODES = (57, 54, 27, 39, 30, 45, 64 + 57, 128 + 57, 128 + 54)
 
 
@@ -16,13 +19,15 @@ class Author:
     def __init__(self, seed: int) -> None:
         self.chance = random.Random(seed)
         self.lines = list(HEAD)
+        self.subprograms: list[str] = []
+        self.plane = 17
         self.transformed = self.swivelled = self.incremental = False
 
     def program(self) -> str:
         """A program of some length."""
         for _ in range(self.chance.randint(5, 14)):
             self.part()
-        return "\n".join(self.lines) + "\nM30\n"
+        return "\n".join([*self.lines, "M30", *self.subprograms]) + "\n"
 
     def part(self) -> None:
         """A few blocks of one kind."""
@@ -41,6 +46,10 @@ class Author:
             (1, self.contour),
             (1, self.tool),
             (1, self.increments),
+            (2, self.other_plane),
+            (1, self.subprogram),
+            (1, self.loop),
+            (1, self.machine_position),
         ]
         weights = [weight for weight, _ in kinds]
         self.chance.choices([kind for _, kind in kinds], weights)[0]()
@@ -67,10 +76,10 @@ class Author:
     def word(self, letter: str) -> str:
         """An axis word in one of its forms."""
         value = self.number(5, 45) if letter == "Z" else self.number()
-        plain = [f"{letter}{value}", f"{letter}={value}"]
-        return self.chance.choice(
-            [f"{letter}=AC({value})", f"{letter}=IC({self.number(-8, 8)})"] + plain * (not self.incremental)
-        )
+        step = self.number(-8, 8)
+        plain = step if self.incremental else value
+        forms = [f"{letter}=AC({value})", f"{letter}=IC({step})", f"{letter}{plain}", f"{letter}={plain}"]
+        return self.chance.choice(forms)
 
     def turn(self) -> list[str]:
         """Rotary words, or the direction of the tool."""
@@ -91,9 +100,10 @@ class Author:
             place = begin + share * sense
             return radius * (math.cos(place) - math.cos(begin)), radius * (math.sin(place) - math.sin(begin))
 
-        end = "X=IC({:.4f}) Y=IC({:.4f})".format(*at(1.0))
-        height = f" Z=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
-        centre = f"I{-radius * math.cos(begin):.4f} J{-radius * math.sin(begin):.4f}"
+        first, second, i, j, across = PLANES[self.plane]
+        end = f"{first}=IC({at(1.0)[0]:.4f}) {second}=IC({at(1.0)[1]:.4f})"
+        height = f" {across}=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
+        centre = f"{i}{-radius * math.cos(begin):.4f} {j}{-radius * math.sin(begin):.4f}"
         forms = [
             f"G{code} {end}{height} {centre}",
             f"G{code} {end}{height} CR={radius if angle < 180 else -radius}",
@@ -101,23 +111,30 @@ class Author:
             f"G{code}{height} {centre} AR={angle}",
             f"G{code} {centre}",
             f"G{code}{height} {centre} TURN=1",
-            "CIP {} I1=IC({:.4f}) J1=IC({:.4f})".format(end, *at(0.5)),
+            f"CIP {end} {i}1=IC({at(0.5)[0]:.4f}) {j}1=IC({at(0.5)[1]:.4f})",
         ]
         self.lines.append(self.chance.choice(forms))
 
     def tangential(self) -> None:
         """CT, twice perhaps."""
-        self.lines.append(f"G1 X=IC({self.number(3, 9)}) Y=IC({self.number(-6, 6)})")
-        self.lines.append(f"CT X=IC({self.number(2, 8)}) Y=IC({self.number(-8, 8)}) Z=IC({self.chance.choice((0, 2))})")
-        self.lines += [f"X=IC({self.number(2, 8)}) Y=IC({self.number(-8, 8)})"] * self.chance.randint(0, 1)
+        first, second, _, _, across = PLANES[self.plane]
+
+        def step(low: float, high: float) -> str:
+            return f"{first}=IC({self.number(low, 8)}) {second}=IC({self.number(-high, high)})"
+
+        self.lines.append("G1 " + step(3, 6))
+        self.lines.append(f"CT {step(2, 8)} {across}=IC({self.chance.choice((0, 2))})")
+        self.lines += [step(2, 8)] * self.chance.randint(0, 1)
 
     def polar(self) -> None:
         """AP and RP about a pole, lines and arcs; now and then only one of them is written."""
-        self.lines.append(f"G{self.chance.choice((110, 111, 112))} X{self.number(-5, 5)} Y{self.number(-5, 5)}")
+        first, second, _, _, across = PLANES[self.plane]
+        pole = f"{first}{self.number(-5, 5)} {second}{self.number(-5, 5)}"
+        self.lines.append(f"G{self.chance.choice((110, 111, 112))} {pole}")
         self.lines.append(f"G1 AP=AC({self.number(0, 359)}) RP=AC({self.number(5, 25)})")
         radius = self.chance.choice((f" RP=AC({self.number(5, 15)})", "", " RP=IC(1.5)"))
         self.lines.append(f"AP=IC({self.number(-60, 60)}){radius}")
-        height = f" Z=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
+        height = f" {across}=IC({self.number(-3, 3)})" if self.chance.random() < 0.3 else ""
         angles = [self.number(0, 359) for _ in range(self.chance.randint(0, 2))]
         self.lines += [f"G{self.chance.choice((2, 3))} AP=AC({angle}){height}" for angle in angles]
         self.anew()
@@ -132,6 +149,38 @@ class Author:
         self.lines += [f"G0 X=AC({self.number()}) Y=AC({self.number()})" for _ in range(2)]
         self.lines.append("MCALL")
         self.anew()
+
+    def other_plane(self) -> None:
+        """Arcs, polar words and a turn in another plane."""
+        self.plane = self.chance.choice((18, 19))
+        self.lines.append(f"G{self.plane}")
+        if self.chance.random() < 0.4:
+            self.lines.append(f"{self.chance.choice(('ROT', 'AROT'))} RPL={self.number(-40, 40)}")
+            self.anew()
+        for kind in self.chance.choices((self.arc, self.tangential, self.polar), k=2):
+            kind()
+        self.plane = 17
+        self.lines.append("G17")
+        self.anew()
+
+    def subprogram(self) -> None:
+        """A program with parameters, called once, behind the end of this one."""
+        name, main = f"PART_{len(self.subprograms)}", self.lines
+        self.lines = [f"%_N_{name}_SPF", f"PROC {name}(REAL WIDE, REAL HIGH)", "G1 X=IC(WIDE) Y=IC(-HIGH/2)"]
+        for kind in self.chance.choices((self.straight, self.arc, self.tangential), k=2):
+            kind()
+        self.subprograms += [*self.lines, "M17"]
+        self.lines = [*main, f"{name}({self.number(-6, 6)},{self.number(-6, 6)})"]
+
+    def loop(self) -> None:
+        """A loop that is executed once."""
+        self.lines += ["R7=0", "WHILE R7<1", "G1 X=IC(R7+2) Y=AC(R7*3)", "R7=R7+1", "ENDWHILE"]
+
+    def machine_position(self) -> None:
+        """Up, in machine coordinates."""
+        if not self.transformed and not self.swivelled:
+            self.lines.append("SUPA G0 Z=AC(240)")
+            self.anew()
 
     # -- what is in force ---------------------------------------------------------------------------------------------
 

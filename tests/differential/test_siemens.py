@@ -31,6 +31,7 @@ SETUP = Setup(
     work_offsets={f"G{n}": dict(zip("XYZ", shift, strict=True)) for n, shift in OFFSETS.items()} | {"G500": {}},
     tools={number: Tool(length, 3.0) for number, length in LENGTHS.items()},
     initial=START,
+    variables={"$SC_TOOL_LENGTH_CONST": 17.0},
 )
 MACHINE = "examples/machines/wCAYFXZSt.toml"
 AT_ENDS = 0.3e-3

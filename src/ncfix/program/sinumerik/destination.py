@@ -228,7 +228,7 @@ def set_pole(control: Sinumerik, words: Words, code: int) -> None:
         known = known and not (unsteady(control, plane.first) or unsteady(control, plane.second))
         base = (here[plane.first], here[plane.second]) if known else None
     elif code == 1120:
-        base = control.modes.pole or (0.0, 0.0)
+        base = control.modes.pole or ((0.0, 0.0) if control.modes.in_plane else None)
     steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
     if "AP" in words.values or "RP" in words.values:
         angle, radius = math.radians(words.get("AP")), words.get("RP")

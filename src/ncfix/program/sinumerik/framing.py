@@ -148,7 +148,7 @@ def programmed_shift(control: Sinumerik, words: Words, code: int) -> None:
 def plane(control: Sinumerik, code: int) -> None:
     """G17, G18, G19."""
     if PLANES[code] is not control.modal.plane:
-        control.modes.pole, control.modes.polar = None, (None, None)
+        control.modes.pole, control.modes.polar, control.modes.in_plane = None, (None, None), False
     control.modal.plane = PLANES[code]
     set_length(control)
 

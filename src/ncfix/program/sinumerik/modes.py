@@ -45,6 +45,7 @@ class Modes:
 
     diameter     "", "DIAMON" or "DIAM90"
     pole         of polar coordinates in the frame of the program, mm; None until one is programmed
+    in_plane     the plane has not changed since the start: a pole that nobody has set is the zero point
     polar        the last AP and RP
     transformed  TRAORI is on
     swivelled    CYCLE800 has tilted the plane
@@ -56,6 +57,7 @@ class Modes:
 
     diameter: str = ""
     pole: tuple[float, float] | None = None
+    in_plane: bool = True
     polar: tuple[float | None, float | None] = (None, None)
     transformed: bool = False
     swivelled: bool = False

@@ -18,7 +18,7 @@ from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
 from ncfix.program.tree import Constant, Literal, Program, Word
 from ncfix.program.tree import Text as Label
 
-HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*$", re.IGNORECASE)
+HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)
 PROCEDURE = re.compile(r"PROC[ \t]+(?P<name>\w+)[ \t]*(?:\((?P<parameters>.*)\))?(?P<rest>[^()]*)$", re.IGNORECASE)
 PARAMETER = re.compile(
     r"[ \t]*(?P<var>VAR[ \t]+)?(?P<type>INT|REAL|BOOL|CHAR|STRING|AXIS|FRAME)[ \t]*(?:\[[^\]]*\])?[ \t]*"
