@@ -18,6 +18,8 @@ ACTIVE = 250
 RIDGE = 1e-9
 """Information that counts as none, of that of a candidate."""
 PASSES = 8
+FIRST, CHUNK = 32, 32
+"""Targets that an addition looks at first; candidates that it looks at more closely at a time."""
 STARTS, SMALL = 20, 20_000
 """Random starts besides the first choice, where candidates times predictions are few."""
 EXCHANGED = 1e-3
@@ -94,29 +96,47 @@ def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
     """The candidate that, added to the others, leaves the smallest worst variance, and that variance.
 
     With the rows B of a candidate and the information M without it, a target t gains |L^-1 B M^-1 t|^2, where
-    L L' = 1 + B M^-1 B'.
+    L L' = 1 + B M^-1 B'. What a candidate leaves of the FIRST targets that are worst without it bounds what it leaves
+    of all from below: the others are worked out for the candidates that may still be best, CHUNK at a time.
     """
     n, r, p = pool.blocks.shape
     inverse = np.linalg.inv(information(pool, others))
     projected = inverse @ pool.targets.T
     present = np.einsum("tp,pt->t", pool.targets, projected)
+    order = np.argsort(-present, kind="stable")
+    first, rest = order[:FIRST], order[FIRST:]
     small = (pool.blocks.reshape(n * r, p) @ inverse).reshape(n, r, p) @ np.swapaxes(pool.blocks, 1, 2)
-    white = _whitened(small, pool.blocks)
-    cross = white.reshape(n * r, p) @ projected
-    gain = np.square(cross, out=cross).reshape(n, r, -1).sum(axis=1)
-    worst = (present - gain).max(axis=1)
-    worst[others] = np.inf
-    best = int(worst.argmin())
-    return best, float(worst[best])
+    white = _whitening(small)
+    bound = _left(pool.blocks, white, projected[:, first], present[first])
+    bound[others] = np.inf
+    best, worst = int(bound.argmin()), np.inf
+    for chunk in np.split(np.argsort(bound, kind="stable"), range(CHUNK, n, CHUNK)):
+        if bound[chunk[0]] >= worst:
+            break
+        left = bound[chunk]
+        if len(rest):
+            left = np.maximum(left, _left(pool.blocks[chunk], white[chunk], projected[:, rest], present[rest]))
+        if left.min() < worst:
+            best, worst = int(chunk[left.argmin()]), float(left.min())
+    return best, worst
 
 
-def _whitened(small: Array, blocks: Array) -> Array:
-    """L^-1 B, where L L' = 1 + `small`; where poses leave much open, rounding spoils that `small` is not negative."""
+def _left(blocks: Array, white: Array, projected: Array, present: Array) -> Array:
+    """The largest variance of some targets (p, t) once each of the blocks (n, r, p) is there, (n,)."""
+    n, r, p = blocks.shape
+    cross = white @ (blocks.reshape(n * r, p) @ projected).reshape(n, r, -1)
+    gain = np.square(cross, out=cross).sum(axis=1)
+    result: Array = (present - gain).max(axis=1)
+    return result
+
+
+def _whitening(small: Array) -> Array:
+    """L^-1, where L L' = 1 + `small`; where poses leave much open, rounding spoils that `small` is not negative."""
     try:
-        found: Array = np.linalg.solve(np.linalg.cholesky(small + np.eye(small.shape[1])), blocks)
+        found: Array = np.linalg.inv(np.linalg.cholesky(small + np.eye(small.shape[1])))
     except np.linalg.LinAlgError:
         values, ways = np.linalg.eigh(small)
-        found = np.swapaxes(ways, 1, 2) @ blocks / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
+        found = np.swapaxes(ways, 1, 2) / np.sqrt(1 + np.maximum(values, 0.0))[:, :, None]
     return found
 
 
