@@ -230,6 +230,7 @@ def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str)
         ("G68X0Y0R90.\nG0X1.Y0.\nG69\nX2.Y1.", [[0, 1, 0], [2, 1, 0]]),
         ("G17G16\nG0X10.Y90.\nY180.\nX20.\nG15\nX1.", [[0, 10, 0], [-10, 0, 0], [-20, 0, 0], [1, 0, 0]]),
         ("G0X10.\nG16Y90.\nG15", [[10, 0, 0], [0, 10, 0]]),
+        ("G0G18G16Z10.X90.\nG15X1.", [[10, 0, 0], [1, 0, 0]]),
         ("G5.1Q1\nG8P1\nG0X1.\nG5.1Q0", [[1, 0, 0]]),
     ],
 )

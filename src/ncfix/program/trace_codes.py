@@ -242,6 +242,12 @@ TRACE_CODES: dict[str, Code] = {
         "of a macro are set by its caller: what stands in them is known only at run time.",
         'Give the value in the setup file (`variables."#500" = 5.0`), or correct the program that calls the macro.',
     ),
+    "NCF245": Code(
+        "Scaling is taken to act on X, Y and Z alike",
+        "G51 with one factor magnifies the axes that a parameter of the control names, usually X, Y and Z. The program "
+        "does not show it.",
+        "Check the parameter (Fanuc: 5401 SCL).",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

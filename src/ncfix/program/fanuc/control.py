@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.rules import RULES
+from ncfix.program.fanuc.scaling import Scaling
 from ncfix.program.fanuc.variables import Variables
 from ncfix.program.moves import Kinematics
 from ncfix.program.pointing import Pointing
@@ -23,6 +24,7 @@ class MacroControl(Control):
     """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
 
     polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    scaling        what G51 does to words; None without it
     mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
     length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
     length_number  the last H; None if the program has named none
@@ -45,6 +47,7 @@ class MacroControl(Control):
         super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
+        self.scaling: Scaling | None = None
         self.mirrored: dict[int, float] = {}
         self.length_code = 0
         self.length_number: int | None = None

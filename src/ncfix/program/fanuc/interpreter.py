@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from ncfix.program.fanuc import dynamic, polar, system, vectors
+from ncfix.program.fanuc import dynamic, polar, scaling, system, vectors
 from ncfix.program.fanuc.arithmetic import variable_number
 from ncfix.program.fanuc.calls import LENGTHS, local_variables
 from ncfix.program.fanuc.control import MacroControl
@@ -18,7 +18,7 @@ from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.coordinates import INCH, LETTERS, Z
+from ncfix.program.rs274.coordinates import INCH, LETTERS, PLANES, Z
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import NON_MODAL, ROTATION
@@ -29,7 +29,7 @@ from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 
-G15, G16, G20, G21 = 150, 160, 200, 210
+G15, G16, G20, G21, G90, G91 = 150, 160, 200, 210, 900, 910
 G65, G66, G66_1, G67 = 650, 660, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
 ANGLES = frozenset("IJKR")
@@ -101,7 +101,9 @@ class MacroInterpreter(Interpreter):
 
     def takes_stretches(self) -> bool:
         """Not while a macro is called after every motion, words are polar, or a corner is put in."""
-        special = self.modal_calls or self.cornered or self.control.polar is not None
+        special = (
+            self.modal_calls or self.cornered or self.control.polar is not None or self.control.scaling is not None
+        )
         return super().takes_stretches() and not special
 
     def position_read(self, number: int) -> None:
@@ -183,10 +185,7 @@ class MacroInterpreter(Interpreter):
         if plan.assignments:
             block.runtime |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
         codes = set() if plan.codes is None else set(plan.codes.g.values())
-        if codes & {G20, G21}:
-            self.unit_said = True
-            self.control.modal.unit = INCH if G20 in codes else 1.0
-            self.control.refresh()
+        self.at_once(codes)
         for letter in plan.pointless:
             if self.is_scaled(letter, plan.codes):
                 self.span = next(word.span for word in plan.template.words if word.address == letter)
@@ -197,7 +196,21 @@ class MacroInterpreter(Interpreter):
             polar.switch(self.control, block, G16)
         if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
             block = polar.cartesian(self.control, block)
-        return block
+        if scaling.ON in codes and "P" in plan.pointless:
+            block.runtime |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
+        return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
+
+    def at_once(self, codes: set[int]) -> None:
+        """Unit, plane, G90 and G91 of a block already say what its own numbers mean."""
+        modal = self.control.modal
+        if codes & {G20, G21}:
+            self.unit_said = True
+            modal.unit = INCH if G20 in codes else 1.0
+            self.control.refresh()
+        if codes & {G90, G91}:
+            modal.incremental = G91 in codes
+        for code in codes & PLANES.keys():
+            modal.plane = PLANES[code]
 
     def settings(self, codes: Codes, block: Block) -> None:
         """What a block sets before its motion; H alone sets something, too."""

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ncfix.program.fanuc import data, dynamic, lengths, mirror, polar, references, tilt
+from ncfix.program.fanuc import data, dynamic, lengths, mirror, polar, references, scaling, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
 from ncfix.program.fanuc.variables import is_system
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.groups import ISO_G, Rules, grouped
-from ncfix.program.rs274.settings import unfollowed
 
 MACRO = "macro call"
 
@@ -72,7 +71,8 @@ FANUC = Rules(
         290: data.made,
         300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
-        500: unfollowed,
+        500: scaling.switch,
+        510: scaling.switch,
         501: mirror.mirror,
         511: mirror.mirror,
         531: tilt.align,
@@ -122,6 +122,7 @@ MITSUBISHI = replace(
     g_groups=FANUC_G | dict.fromkeys(MITSUBISHI_MADE, groups.NON_MODAL),
     steps={**FANUC.steps, **dict.fromkeys(MITSUBISHI_MADE, data.made)},
     takes=FANUC.takes | set(MITSUBISHI_MADE),
+    scales_named=True,
 )
 """Mitsubishi mills circles by itself, too."""
 

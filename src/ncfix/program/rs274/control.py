@@ -95,6 +95,8 @@ class Control:
     tilted     a tilted plane is in force: X Y Z are those of the tip, whether `tip_control` (G43.4) is on or not
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
     handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
+    left_out   the block just followed has no place in a flat program
+    unwritten  why a flat program cannot say what the program means; empty if it can
     whole      the motions of the block must not be split, as under cutter compensation
     saved      the modal states that M70 saved, one place for each call level
     places     which axes the program itself has brought to where they stand
@@ -133,6 +135,8 @@ class Control:
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
         self.whole = False
+        self.left_out = False
+        self.unwritten = ""
         self.handedness = 1.0
         self.ends: list[Vector] | None = None
         self.external = ""
@@ -272,11 +276,15 @@ class Control:
         """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed.
 
         settles  the axes whose words say where they stand afterwards; those of absolute words if not given
+
+        A cut by which the program first brings an axis to its place is not split: places on its way would rest on
+        where tables or people say that the axis stood.
         """
         if not passing:
             self._ask_for_start(kind, unknown)
         if settles is None:
             settles = 0 if passing or self.modal.incremental else axes
+        placing = kind == Kind.FEED and settles & self.places.adrift != 0
         adrift = self._adrift(settles)
         if not passing and settles & axes != (0 if self.modal.incremental else axes):
             self.builder.counted(axes & ~settles)
@@ -288,7 +296,9 @@ class Control:
         self.places.lose(mask_of(unknown))
         self.places.begun = True
         rule, reason = self._verdict(kind, unknown, refusal, passing)
+        whole, self.whole = self.whole, self.whole or placing
         style = self._style(kind, rule, reason, code)
+        self.whole = whole
         if arc is not None:
             self.builder.arc(arc)
         start, end = self.position, target

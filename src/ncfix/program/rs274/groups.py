@@ -104,6 +104,7 @@ class Rules:
     repeats     addresses that say how often a canned cycle drills
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
     adds_rotations  in G91 the angle of G68 is added to that in force
+    scales_named  scaling (G51) acts on the axes only that its block names
     system      whether a numbered parameter is one of the control's own, so that setting it does something
     compiled    (expression, the address it stands behind) -> the function that computes it
     """
@@ -117,6 +118,7 @@ class Rules:
     repeats: str = "LK"
     takes: frozenset[int] = frozenset()
     adds_rotations: bool = False
+    scales_named: bool = False
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
 

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 DROPPED_CODES = {"G": frozenset({150, 160, 670}), "M": frozenset({970, 980, 990, 1980})}
 """Codes, in tenths, that a flat program has no use for."""
 
+SCALING = frozenset({500, 510})
+"""Those whose other words it has no use for, either."""
+
 CALL_WORDS = frozenset("PLQ")
 KEPT = frozenset({"program name", "control character", "command"})
 """Opaque text that a flat program keeps."""
@@ -94,6 +97,11 @@ class Recorder:
         """A block of words that has been executed."""
         self.line = unit.program.line(index) if not unit.name else self.line
         self.check(plan, block)
+        if self.control.left_out:
+            words = [word for word in unit.program.templates[unit.template[index]].words if not is_setting(word)]
+            self.put(unit, index, [self.removal(unit, index, word) for word in words])
+            self.control.left_out = False
+            return
         holes, self.control.ends = self.control.ends or [], []
         changes = [self.of_item(unit, index, item, codes, block) for item in unit.program.items_of(index)]
         made = [change for change in changes if change is not None]
@@ -138,6 +146,8 @@ class Recorder:
         if block.runtime or self.control.refusal == RUNTIME_BRANCH:
             what = f"the word {min(block.runtime)}" if block.runtime else "which blocks are executed"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
+        if self.control.unwritten:
+            raise Fault(RUNTIME, f"{self.control.unwritten}, so the program cannot be written out flat")
 
     # -- items --------------------------------------------------------------------------------------------------------
 
@@ -313,6 +323,12 @@ def end_of_words(unit: Unit, index: int) -> int:
     items = unit.program.items_of(index)
     words = [unit.program.span(index, item.span)[1] for item in items if not isinstance(item, Comment)]
     return max(words, default=int(unit.program.blocks[index, 0]))
+
+
+def is_setting(word: Word) -> bool:
+    """Whether a word stays though its block has no place in a flat program: another code, F, S or T."""
+    scaling = isinstance(word.value, Constant) and round(10 * word.value.value) in SCALING
+    return word.address in "GMFST" and not (word.address == "G" and scaling)
 
 
 def is_distance(word: Word) -> bool:
