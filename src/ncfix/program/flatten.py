@@ -15,7 +15,7 @@ import numpy as np
 
 from ncfix.diagnostics import RefusedError, SourceError
 from ncfix.program.language import Resolve, Run, language_of
-from ncfix.program.moves import Kind, Kinematics, Moves
+from ncfix.program.moves import Kind, Kinematics, Moves, Rule
 from ncfix.program.reader import read
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
@@ -105,7 +105,10 @@ def flatten(
 
 
 def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
-    """What is different between the motions of a program and those of its flat form; empty if nothing is."""
+    """What is different between the motions of a program and those of its flat form; empty if nothing is.
+
+    A refused arc without an angle stands in for a curve of any kind that is not followed.
+    """
     rows, flat = (np.flatnonzero(moves.kind != Kind.DWELL) for moves in (before, after))
     if len(rows) != len(flat):
         return f"it has {len(rows)} motions, and would have {len(flat)}"
@@ -114,7 +117,8 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     ends, flat_ends = before.end[rows], after.end[flat]
     other = (np.abs(ends - flat_ends) > ROUNDINGS * size).any(axis=1)
     other |= (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
-    other |= (before.kind[rows] != after.kind[flat]) | (before.tcp[rows] != after.tcp[flat])
+    stands_in = (before.kind == Kind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
+    other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])
     return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be another" if other.any() else ""
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.klartext.layout import CORNERS, Layout, is_remark, layout_of
+from ncfix.program.klartext.layout import CORNERS, Layout, is_between, layout_of
 from ncfix.program.klartext.turns import FULL
 from ncfix.program.language import BulkLayout
 from ncfix.program.moves import Moves
@@ -95,11 +95,11 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
 
 
 def beside_corners(program: Program) -> Mask:
-    """(n,) blocks next to RND or CHF, remarks left out: as `Layout.corner`."""
+    """(n,) blocks next to RND or CHF, remarks and poles left out: as `Layout.corner`."""
     found = np.zeros(len(program), dtype=np.bool_)
     corner = np.array([is_corner(each) for each in program.templates], dtype=np.bool_)
     if corner.any():
-        said = np.array([not all(map(is_remark, each.items)) for each in program.templates], dtype=np.bool_)
+        said = np.array([not is_between(each.items) for each in program.templates], dtype=np.bool_)
         blocks = np.flatnonzero(said[program.template])
         corners = corner[program.template[blocks]]
         found[blocks[:-1]] |= corners[1:]

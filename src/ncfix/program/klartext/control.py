@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.klartext.calculate import Parameters, Scope
+from ncfix.program.klartext.free import Leg
 from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.moves import Kind, Kinematics, Rule
@@ -61,6 +62,7 @@ class Path:
     spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
     said     what words of a turned frame have said of where the tool stands (`targets.Said`)
     by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
+    free     elements of the free contour (FK) that is being made: program and block -> what it is, None: not certain
     """
 
     pole: tuple[float, float] | None = None
@@ -72,6 +74,7 @@ class Path:
     by_vector: bool = False
     spatial: bool = False
     said: object = None
+    free: dict[tuple[str, int], Leg | None] = field(default_factory=dict)
 
 
 @dataclass(slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -110,15 +111,20 @@ def layout_of(program: Program, block: int) -> Layout | None:
 
 
 def is_corner(program: Program, block: int, way: int) -> bool:
-    """Whether the next block that is more than a remark is RND or CHF; `way`: 1 after this one, -1 before it."""
+    """Whether the next element of the path is RND or CHF; `way`: 1 after this block, -1 before it."""
     block += way
     while 0 <= block < len(program):
-        items = [item for item in program.items_of(block) if not is_remark(item)]
-        if items:
+        items = program.items_of(block)
+        if not is_between(items):
             names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
             return any(name.lower() in CORNERS for name in names)
         block += way
     return False
+
+
+def is_between(items: Sequence[Item]) -> bool:
+    """Remarks only, or a pole (CC): elements before and after it follow each other."""
+    return all(map(is_remark, items)) or any(isinstance(item, Command) and item.name == "cc" for item in items)
 
 
 def is_remark(item: Item) -> bool:

@@ -6,13 +6,11 @@ import re
 from collections.abc import Callable
 
 from ncfix.program.klartext.codes import tip_control
-from ncfix.program.klartext.control import AFTER_PROBING, FREELY, PRESET, Control
+from ncfix.program.klartext.contours import follow_free
+from ncfix.program.klartext.control import AFTER_PROBING, PRESET, Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.patterns import pattern_of
-from ncfix.program.klartext.step import IN_PLANE, somewhere
-from ncfix.program.klartext.targets import command_of, here
 from ncfix.program.klartext.trans import transform
-from ncfix.program.rs274.coordinates import X, Y
 from ncfix.program.rs274.faults import Fault
 
 PROBING = "probing"
@@ -20,7 +18,6 @@ MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kin
 SETTING = frozenset({*range(400, 406), *range(408, 420), 451, 452, 453, *range(1400, 1430)})
 """Probing cycles that do not only measure."""
 
-FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
 SPATIAL_ANGLES = "FUNCTION TCPM AXIS SPAT: A B C are spatial angles, not positions of axes"
 OTHER_POINT = "FUNCTION TCPM with a reference point other than the tip"
 SELECTED = "PRESET SELECT with words of its own, or while coordinates are transformed, is not followed"
@@ -80,13 +77,8 @@ def not_followed(control: Control, flow: FlowControl, found: re.Match[str]) -> N
 
 
 def free_contour(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
-    """An element of a free contour: as for an arc about a centre of its own, it matters where the one before ends.
-
-    It lies in the working plane: only X and Y of the frame are not known after it.
-    """
-    where = here(control)
-    where.unknown |= {X: FREELY, Y: FREELY}
-    somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
+    """FL, FLT, FC, FCT."""
+    follow_free(control, flow.unit, flow.block - 1)
 
 
 # -- what is measured and read ----------------------------------------------------------------------------------------

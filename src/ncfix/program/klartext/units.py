@@ -61,9 +61,9 @@ class Unit:
         return self._plans[self.template[block]]
 
     def next_plan(self, block: int) -> Plan | None:
-        """What the first block from there on does that does anything."""
+        """What the first block from there on does that does anything but set a pole."""
         plans = map(self.plan, range(block, len(self)))
-        return next((plan for plan in plans if not plan.empty), None)
+        return next((plan for plan in plans if not plan.empty and plan.name != "cc"), None)
 
     # -- the fast lane ------------------------------------------------------------------------------------------------
 

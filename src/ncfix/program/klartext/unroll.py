@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from ncfix.program.flatten import TOO_LONG, FlatLine
 from ncfix.program.klartext.calculate import Scope, compiled
+from ncfix.program.klartext.contours import written_out
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.cycles import DRILLING, MILLING
 from ncfix.program.klartext.interpreter import Interpreter
@@ -60,7 +61,7 @@ class Recorder:
         plan = unit.plan(block)
         if plan.flow is not None or (plan.statement is not None and self.is_left_out(unit, block)):
             return
-        holes = self.holes(plan, control)
+        holes = self.holes(plan, control) or written_out(control, unit, block, self.point)
         text = "\n".join(holes) if holes else self.flat_text(unit.program, block, control.scope)
         line = unit.program.line(block) if not unit.name else self.line_of_call(row)
         for offset, part in enumerate(text.splitlines()):
@@ -89,9 +90,13 @@ class Recorder:
         set_anew = [f"FN 0: {name} = {self.short(parameters.get(name))}" for name in shared]
         return [*set_anew, *(f"L {self.place(place)} R0 FMAX M99" for place in places)] if places else []
 
+    def point(self, place: complex) -> str:
+        """A point of the working plane as words."""
+        return f"X{self.written(place.real, 'X')} Y{self.written(place.imag, 'Y')}"
+
     def place(self, place: Place) -> str:
         """Where a hole is, as words."""
-        return f"X{self.written(place.x, 'X')} Y{self.written(place.y, 'Y')}"
+        return self.point(complex(place.x, place.y))
 
     def written(self, value: float, address: str) -> str:
         """A number of a word."""

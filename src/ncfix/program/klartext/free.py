@@ -1,0 +1,289 @@
+"""Free contours (FK): lines and arcs of which the program says as much as a drawing does, worked out one after another.
+
+Points are complex numbers in the working plane, in program units. Only what has one solution is worked out: where the
+data of an element leave two, or contradict each other, there is none. An arc of a known circle may end where the next
+element touches it.
+
+Source: TNC 640, "FK free contour programming".
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+FLAT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """What the program says of one element.
+
+    arc         FC and FCT, else FL and FLT
+    tangential  FLT and FCT: it goes on in the direction of the one before
+    x, y        its end
+    angle       AN: the direction of a line, rad
+    length      LEN of a line
+    centre      CCX and CCY
+    radius      R
+    sense       1 for DR+, -1 for DR-
+    turn        CCA: the angle of an arc, rad
+    opens       CLSD+: a closed contour begins with it
+    closes      CLSD-: it ends where that began
+    """
+
+    arc: bool
+    tangential: bool
+    x: float | None = None
+    y: float | None = None
+    angle: float | None = None
+    length: float | None = None
+    centre: complex | None = None
+    radius: float | None = None
+    sense: int = 0
+    turn: float | None = None
+    opens: bool = False
+    closes: bool = False
+
+    @property
+    def end(self) -> complex | None:
+        """Its end, if all of it is said."""
+        return None if self.x is None or self.y is None else complex(self.x, self.y)
+
+    @property
+    def circle(self) -> Circle | None:
+        """Its circle, if all of it is said."""
+        if self.centre is None or self.radius is None or not self.sense:
+            return None
+        return Circle(self.centre, self.radius, self.sense)
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """A circle with the sense in which it is gone round."""
+
+    centre: complex
+    radius: float
+    sense: int
+
+    def heading(self, at: complex) -> complex:
+        """The direction at one of its points."""
+        spoke = at - self.centre
+        return self.sense * 1j * spoke / abs(spoke)
+
+    def touched(self, heading: complex) -> complex:
+        """Its point with that direction."""
+        return self.centre - self.sense * 1j * self.radius * heading
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """An element that is worked out: its end, the direction there, and its circle if it is an arc."""
+
+    end: complex
+    heading: complex
+    circle: Circle | None = None
+
+
+class NoSolutionError(Exception):
+    """There is none, or more than one."""
+
+
+def solved(elements: Sequence[Element], start: complex, heading: complex | None, near: float) -> list[Leg] | None:
+    """The legs of a contour from where it starts; None if they are not all certain.
+
+    heading  the direction in which the element before ends, if there is one
+    near     by how much data may contradict each other
+    """
+    chain = _Chain(start, heading, near)
+    try:
+        for element, following in zip(elements, [*elements[1:], None], strict=True):
+            chain.add(element, following)
+    except NoSolutionError:
+        return None
+    return None if chain.open else chain.legs
+
+
+class _Chain:
+    """The contour as far as it is worked out; `open` is the circle of a last arc whose end is not yet known."""
+
+    def __init__(self, start: complex, heading: complex | None, near: float) -> None:
+        self.at = start
+        self.heading = heading
+        self.near = near
+        self.legs: list[Leg] = []
+        self.open: Circle | None = None
+        self.home: complex | None = None
+
+    def add(self, element: Element, following: Element | None) -> None:
+        """One more element; raises `NoSolutionError`."""
+        if element.opens:
+            self.home = self.at
+        if element.closes:
+            element = self._closing(element)
+        if element.arc:
+            self._arc(element)
+        else:
+            self._line(element, following)
+
+    def _closing(self, element: Element) -> Element:
+        if self.home is None or element.x is not None or element.y is not None:
+            raise NoSolutionError
+        return replace(element, x=self.home.real, y=self.home.imag)
+
+    # -- lines --------------------------------------------------------------------------------------------------------
+
+    def _line(self, element: Element, following: Element | None) -> None:
+        target = following.circle if following is not None and following.tangential else None
+        reached = None if self.open is None else self._leave(self.open, element, target)
+        direction = self._direction(element)
+        end = element.end if reached is None else reached
+        if end is None and direction is not None:
+            end = self._along(element, direction)
+        elif end is None and element == Element(arc=False, tangential=False) and target is not None:
+            end = self._towards(target)
+        if end is None or abs(end - self.at) < self.near:
+            raise NoSolutionError
+        if element.length is not None:
+            self._agree(abs(end - self.at), element.length)
+        if direction is not None:
+            self._agree(end, self.at + abs(end - self.at) * direction)
+        self._append(Leg(end, (end - self.at) / abs(end - self.at)))
+
+    def _direction(self, element: Element) -> complex | None:
+        """In which direction a line goes, if that is said."""
+        said = None if element.angle is None else cmath.rect(1.0, element.angle)
+        if not element.tangential:
+            return said
+        if self.heading is None:
+            raise NoSolutionError
+        if said is not None:
+            self._agree(said, self.heading)
+        return self.heading
+
+    def _along(self, element: Element, direction: complex) -> complex | None:
+        """Where a line of known direction ends."""
+        if element.length is not None:
+            return self.at + element.length * direction
+        for value, part, begin in (
+            (element.x, direction.real, self.at.real),
+            (element.y, direction.imag, self.at.imag),
+        ):
+            if value is not None and abs(part) > math.sin(math.radians(1)) and (value - begin) / part > 0:
+                return self.at + (value - begin) / part * direction
+        return None
+
+    def _towards(self, target: Circle) -> complex:
+        """Where a line from here touches a circle that is gone round next."""
+        direction = touching(target.centre - self.at, target.sense * target.radius)
+        return target.touched(direction)
+
+    def _leave(self, circle: Circle, element: Element, target: Circle | None) -> complex | None:
+        """End an arc where a line leaves it: of a known direction, to a known end, or to the next circle.
+
+        Returns where the line touches that.
+        """
+        reached = None
+        if not element.tangential:
+            raise NoSolutionError
+        if element.angle is not None:
+            direction = cmath.rect(1.0, element.angle)
+        elif element.end is not None:
+            direction = touching(element.end - circle.centre, -circle.sense * circle.radius)
+        elif element == Element(arc=False, tangential=True) and target is not None:
+            across = target.sense * target.radius - circle.sense * circle.radius
+            direction = touching(target.centre - circle.centre, across)
+            reached = target.touched(direction)
+        else:
+            raise NoSolutionError
+        self._end_arc(circle, circle.touched(direction))
+        return reached
+
+    # -- arcs ---------------------------------------------------------------------------------------------------------
+
+    def _arc(self, element: Element) -> None:
+        if self.open is not None:
+            self._touch(self.open, element)
+        circle = self._circle(element)
+        self._agree(abs(self.at - circle.centre), circle.radius)
+        if element.tangential:
+            if self.heading is None:
+                raise NoSolutionError
+            self._agree(circle.heading(self.at), self.heading)
+        end = element.end
+        if end is None and element.turn is not None:
+            end = circle.centre + (self.at - circle.centre) * cmath.exp(1j * circle.sense * abs(element.turn))
+        if end is None and (element.x is not None or element.y is not None):
+            raise NoSolutionError
+        if end is None:
+            self.open = circle
+            return
+        self._agree(abs(end - circle.centre), circle.radius)
+        if abs(end - self.at) < self.near:
+            raise NoSolutionError
+        self._append(Leg(end, circle.heading(end), circle))
+
+    def _circle(self, element: Element) -> Circle:
+        """The circle of an arc that begins here."""
+        if element.centre is not None and element.sense:
+            size = abs(self.at - element.centre) if element.radius is None else element.radius
+            return Circle(element.centre, size, element.sense)
+        if self.heading is None or not element.tangential or element.centre is not None:
+            raise NoSolutionError
+        if element.end is not None:
+            return self._through(element, element.end, self.heading)
+        if element.radius is None or not element.sense:
+            raise NoSolutionError
+        return Circle(self.at + element.sense * 1j * element.radius * self.heading, element.radius, element.sense)
+
+    def _through(self, element: Element, end: complex, heading: complex) -> Circle:
+        """The circle that goes on in a direction and leads to an end."""
+        side = ((end - self.at) * heading.conjugate()).imag
+        if abs(side) < self.near:
+            raise NoSolutionError
+        radius = abs(end - self.at) ** 2 / (2 * side)
+        sense = 1 if radius > 0 else -1
+        if element.sense not in (0, sense):
+            raise NoSolutionError
+        if element.radius is not None:
+            self._agree(abs(radius), element.radius)
+        return Circle(self.at + 1j * radius * heading, abs(radius), sense)
+
+    def _touch(self, circle: Circle, element: Element) -> None:
+        """End an arc where the next one, of a known circle, touches its own."""
+        other = element.circle
+        if other is None or not element.tangential:
+            raise NoSolutionError
+        way = other.centre - circle.centre
+        inside = circle.sense == other.sense
+        self._agree(abs(way), abs(circle.radius - other.radius) if inside else circle.radius + other.radius)
+        if abs(way) < self.near:
+            raise NoSolutionError
+        outward = -1 if inside and other.radius > circle.radius else 1
+        self._end_arc(circle, circle.centre + outward * circle.radius * way / abs(way))
+
+    # -- what is worked out -------------------------------------------------------------------------------------------
+
+    def _end_arc(self, circle: Circle, end: complex) -> None:
+        if abs(end - self.at) < self.near:
+            raise NoSolutionError
+        self.open = None
+        self._append(Leg(end, circle.heading(end), circle))
+
+    def _append(self, leg: Leg) -> None:
+        self.legs.append(leg)
+        self.at, self.heading = leg.end, leg.heading
+
+    def _agree(self, one: complex, other: complex) -> None:
+        if abs(one - other) > self.near:
+            raise NoSolutionError
+
+
+def touching(way: complex, across: float) -> complex:
+    """The direction in which one goes `way` if of it so much is to the left of that direction, `across`."""
+    along = abs(way) ** 2 - across**2
+    if along <= FLAT:
+        raise NoSolutionError
+    return way / complex(math.sqrt(along), across)
