@@ -154,7 +154,17 @@ def test_the_pole_is_put_back() -> None:
 
 
 @pytest.mark.parametrize(
-    "element", ["FL X+5", "FL PR+5 PA+3", "FC DR+ R5", "FLT X+Q9 Y+1", "FL X+5 Y+6 RX 3", "FL DR+"]
+    "element",
+    [
+        "FL X+5",
+        "FL PR+5 PA+3",
+        "FC DR+ R5",
+        "FLT X+Q9 Y+1",
+        "FL X+5 Y+6 RX 3",
+        "FL DR+",
+        "FL X+5 Y+6 M30",
+        "/FL X+5 Y+6",
+    ],
 )
 def test_what_is_not_understood_ends_nobody_knows_where(element: str) -> None:
     moves = follow(f"L X+0 Y+0 Z+0 FMAX\n{element}\nL X+1 F100\nL X+2 Y+2 Z+0").moves

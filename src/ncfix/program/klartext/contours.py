@@ -26,8 +26,10 @@ FUNCTION = re.compile(r"F(?P<arc>C|L)(?P<tangential>T?)(?=\s|$)", re.IGNORECASE)
 VALUE = r"[+-]?\s*(?:Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)"
 WORD = re.compile(rf"(?<![A-Z0-9])(X|Y|AN|LEN|CCX|CCY|CCA|R)\s*({VALUE})(?![\w.,])", re.IGNORECASE)
 SENSE = re.compile(r"(DR|CLSD)\s*([+-])(?!\s*[\d.,Q])", re.IGNORECASE)
-REST = re.compile(rf"\b(R0(?![\d.,])|R[LR]\b|F\s*MAX|F\s*AUTO|F\s*{VALUE}|M\s*\d+)", re.IGNORECASE)
-"""What stands in a block besides geometry, and is kept when it is written anew."""
+REST = re.compile(
+    rf"\b(R0(?![\d.,])|R[LR]\b|F\s*MAX|F\s*AUTO|F\s*{VALUE}|M\s*(?:[0134578]|9|13|14)(?!\d))", re.IGNORECASE
+)
+"""What may stand in a block besides geometry, and is kept when it is written anew: spindle, coolant, a stop."""
 
 LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
 OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CCX", "CCY", "CCA", "R"})
@@ -69,7 +71,8 @@ def worked_out(control: Control, unit: Unit, first: int) -> dict[tuple[str, int]
     blocks = list(blocks_of_contour(unit, first))
     keys = [(unit.name, block) for block in blocks]
     control.settle((X, Y))
-    if X in control.unknown or Y in control.unknown or changes_pole(control):
+    lost = X in control.unknown or Y in control.unknown or changes_pole(control)
+    if lost or control.cycle.modal or any(unit.plan(block).skip for block in blocks):
         return dict.fromkeys(keys)
     elements = [element_of(control, statement_text(unit, block)) for block in blocks]
     known = [element for element in elements if element is not None]
