@@ -74,7 +74,7 @@ class Corrector:
         for number, unit in enumerate(self.units):
             if not share.has(number):
                 foreign = True
-                self.again.first_line += len(unit.part.program)
+                self.again.first_line += unit.part.program.lines_ended
                 self.proof.follow(unit.part.program, unit.part.last)
                 continue
             yield number, self._corrected(unit, number, share, foreign)
@@ -176,7 +176,7 @@ class Corrector:
             again = self.proof.follow(program, last)
         except NcfixError as error:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
-        self.again.first_line += len(program)
+        self.again.first_line += program.lines_ended
         return again
 
     def _look(self, part: Part, settled: Settled, own: Mask, unit: Unit, tally: Tally) -> None:

@@ -107,6 +107,8 @@ class Bulk:
         several = np.flatnonzero(np.diff(first_piece) > 1)
         if not (_is_plain(frame) and layouts.known[shapes].all() and layouts.further[shapes[several]].all()):
             return None
+        if language.one_by_one is not None and language.one_by_one(program, moves, pieces, first_piece).any():
+            return None
         return cls(program, moves, pieces, first_piece, layouts, np.full(n + 1, n))
 
     def take_all(self, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:

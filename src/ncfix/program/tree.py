@@ -320,6 +320,11 @@ class Program:
         start, stop = self.span(block, span)
         return self.source[start:stop].decode("latin-1")
 
+    @property
+    def lines_ended(self) -> int:
+        """How many lines of the text have an end; blocks may go over several."""
+        return self.source.count(b"\n")
+
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
         ending = b"\n" if b"\n" in self.source else b"\r"

@@ -20,7 +20,7 @@ from ncfix.program.setup import Setup
 from program.klartext.tnc import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1
-MANY = 60
+MANY = 30
 """Programs of each kind."""
 
 OTHERS = (

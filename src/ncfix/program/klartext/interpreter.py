@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Protocol
 
 from ncfix.diagnostics import Place, SourceError
@@ -84,15 +85,25 @@ class Interpreter:
 
     def run(self) -> None:
         """Follow the program to its end; raises SourceError where the control would stop."""
+        with self.stopping():
+            self.walk(self.begun())
+
+    @contextmanager
+    def stopping(self) -> Iterator[None]:
+        """What the control stops at is a SourceError with its place."""
         try:
-            main = Unit(self.program, self.axes)
-            self.flow = FlowControl(main, self.find, self.control.scope.parameters, main.begin)
-            self.control.unit = main.mm
-            self.control.recompose()
-            self.walk(self.flow)
+            yield
         except Fault as fault:
             self.span = fault.span or self.span
             raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def begun(self) -> FlowControl:
+        """The program before its first block."""
+        main = Unit(self.program, self.axes)
+        self.flow = FlowControl(main, self.find, self.control.scope.parameters, main.begin)
+        self.control.unit = main.mm
+        self.control.recompose()
+        return self.flow
 
     def walk(self, flow: FlowControl) -> None:
         """Block after block."""
@@ -116,7 +127,11 @@ class Interpreter:
                 self.recorder.note(unit, block, control, control.row_block)
             if self.execute(plan, flow):
                 return
-        control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+        self.at_end_of_text()
+
+    def at_end_of_text(self) -> None:
+        """The text is over without END PGM."""
+        self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
 
     def takes_stretch(self, flow: FlowControl) -> bool:
         """Take plain motions many at once; whether any were."""

@@ -10,6 +10,7 @@ from ncfix.program.flatten import FlatLine
 from ncfix.program.klartext.blocks import parse_block
 from ncfix.program.klartext.bulk import in_bulk, one_by_one
 from ncfix.program.klartext.control import Control
+from ncfix.program.klartext.following import KlartextFollower
 from ncfix.program.klartext.interpreter import Interpreter
 from ncfix.program.klartext.layout import layout_of, uses_comma
 from ncfix.program.klartext.numbering import renumbered
@@ -55,4 +56,5 @@ KLARTEXT = Language(
     one_by_one=one_by_one,
     renumber=renumbered,
     unroll=unroll,
+    follower=KlartextFollower,
 )

@@ -150,13 +150,17 @@ def separator(program: Program, block: int, word: Word | None) -> str:
     return blanks or " "
 
 
-@lru_cache(maxsize=4)
 def uses_comma(source: bytes) -> bool:
     """Whether a program writes decimal commas and no points in its motion blocks."""
-    if b"," not in source:
-        return False
-    commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source))
-    return commas > len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source))
+    commas, points = axis_numbers(source)
+    return commas > points
+
+
+@lru_cache(maxsize=4)
+def axis_numbers(source: bytes) -> tuple[int, int]:
+    """How many words of axes have a decimal comma, and how many a point; the latter are not counted if none has."""
+    commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source)) if b"," in source else 0
+    return commas, len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source)) if commas else 0
 
 
 @lru_cache(maxsize=4)
@@ -168,4 +172,4 @@ def tilts(source: bytes) -> bool:
 @lru_cache(maxsize=4)
 def poles_move(source: bytes) -> bool:
     """Whether some pole counts from where the tool stands, and so moves with its correction."""
-    return RELATIVE_POLE.search(source) is not None
+    return b"CC" in source.upper() and RELATIVE_POLE.search(source) is not None

@@ -38,6 +38,12 @@ def is_relied_on(source: bytes, after: int) -> bool:
     return index < len(places) and relying[index]
 
 
+def relies_at_once(source: bytes) -> bool:
+    """Whether a text relies on a pole before it sets one."""
+    _, relying = _events(source)
+    return bool(relying) and relying[0]
+
+
 @lru_cache(maxsize=4)
 def _events(source: bytes) -> tuple[list[int], list[bool]]:
     """Where a pole is set or something may rely on one, and which of the two it is."""
