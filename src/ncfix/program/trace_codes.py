@@ -248,6 +248,13 @@ TRACE_CODES: dict[str, Code] = {
         "does not show it.",
         "Check the parameter (Fanuc: 5401 SCL).",
     ),
+    "NCF246": Code(
+        "Program of the control that is not at hand",
+        "The program calls one of O8000 to O9999 (of a probe's maker, or of the machine's builder), which is in the "
+        "control. It is taken to leave offsets, tool lengths and modal codes as they are. Where the axes stand after "
+        "it, the motion code and the feed are not known until the program names them.",
+        "Put its file beside the program. If it sets a work offset or a tool length, give those that it finds.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ncfix.program.fanuc import builder
 from ncfix.program.fanuc.arithmetic import number
 from ncfix.program.fanuc.outline import Outline
 from ncfix.program.rs274.control import Control
@@ -170,7 +171,14 @@ class MacroFlow:
             return
         if len(self.calls) >= MAX_CALLS:
             raise Fault(TOO_DEEP, f"calls are nested more than {MAX_CALLS} deep at O{label}")
-        self.enter(Call(label, self.unit, self.block, self.entry(label), times - 1, arguments))
+        try:
+            entry = self.entry(label)
+        except Fault as fault:
+            if fault.code != NO_SUBPROGRAM or not builder.is_builders(label):
+                raise
+            builder.ran(self.control, label)
+            return
+        self.enter(Call(label, self.unit, self.block, entry, times - 1, arguments))
 
     def enter(self, call: Call) -> None:
         """Go to where a call leads."""
@@ -199,6 +207,10 @@ class MacroFlow:
         outline = self.outline_of(file)
         first = outline.starts[0] if outline.starts else -1
         return file, outline.programs.get(label, first) + 1
+
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that have not returned, and how often each is still to be made."""
+        return tuple((id(call.unit), call.block, call.remaining) for call in self.calls)
 
     def enter_local(self, target: int, times: int) -> None:
         """M97 of Haas: a subprogram that begins at a block N of this program."""

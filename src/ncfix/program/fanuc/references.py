@@ -30,7 +30,7 @@ def further(control: Control, block: Block, code: int) -> None:
         return
     way, unknown = destination(control, block)
     passing = REFERENCE_POINT.format(f"G30 P{number}")
-    if way != control.position:
+    if way != control.position or (block.axes and not control.modal.incremental):
         control.move(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing)
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)

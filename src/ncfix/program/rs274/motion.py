@@ -82,7 +82,7 @@ def go_to_reference(control: Control, block: Block, code: int) -> None:
     checked, control.offset_checked = control.offset_checked, True
     way, unknown = destination(control, block)
     control.offset_checked = checked
-    if way != control.position:
+    if way != control.position or (block.axes and not control.modal.incremental):
         control.move(Kind.RAPID, block.axes, way, unknown, modal, passing=passing)
     axes = block.axes or sum(1 << index for index in control.machine)
     target, unknown = reference_target(control, name, axes)

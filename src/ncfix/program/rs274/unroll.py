@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from ncfix.diagnostics import SourceError
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.control import Block, Control
@@ -146,8 +147,6 @@ class Recorder:
         if block.runtime or self.control.refusal == RUNTIME_BRANCH:
             what = f"the word {min(block.runtime)}" if block.runtime else "which blocks are executed"
             raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
-        if self.control.unwritten:
-            raise Fault(RUNTIME, f"{self.control.unwritten}, so the program cannot be written out flat")
 
     # -- items --------------------------------------------------------------------------------------------------------
 
@@ -294,10 +293,12 @@ class Recorder:
 
 
 def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
-    """Run an interpreter and write down what it executes."""
+    """Run an interpreter and write down what it executes; raises SourceError where no flat program can say it."""
     recorder = Recorder(interpreter.control, steps, limit)
     interpreter.recorder, interpreter.control.ends = recorder, []
     interpreter.run()
+    if why := interpreter.control.unwritten:
+        raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
     begins, ends = (recorder.lines[at].text.lstrip()[:1] == "%" if recorder.lines else False for at in (0, -1))
     if begins and (not ends or len(recorder.lines) == 1):
         recorder.write("%")
