@@ -256,6 +256,7 @@ class Control(Standing):
     def hole(self, words: dict[str, float]) -> None:
         """A hole: only its bottom is noted."""
         across, unit = PLANES[self.modes["plane"]][2], self.modes["unit"]
+        self.turn_words({k: v for k, v in words.items() if k in "ABC"})
         letter, incremental = "XYZ"[across], self.modes["inc"]
         if "R" in words:
             self.levels["r"] = unit * words["R"] + (self.levels["initial"] if incremental else 0.0)
