@@ -177,3 +177,23 @@ def test_a_datum_of_a_rotary_axis_may_turn_the_coordinates_of_the_tip(on: str) -
     moves = follow(body, "XYZBC").moves
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE, Rule.CORRECT]
     assert "turn with that datum" in moves.reasons[int(moves.reason[2])]
+
+
+@pytest.mark.parametrize(
+    ("block", "refused"),
+    [
+        ("FUNCTION MODE MILL", False),
+        ('FUNCTION MODE MILL "HEAD 2"', True),
+        ("CYCL DEF 1032 GRINDING WHL LENGTH COMPENSATION Q1012=+1", True),
+        ("CYCL DEF 238 MEASURE MACHINE STATUS Q570=+0", True),
+        ("CYCL DEF 239 ASCERTAIN THE LOAD Q570=+0", False),
+    ],
+)
+def test_what_may_change_the_machine_or_the_tool(block: str, refused: bool) -> None:
+    assert bool(reasons(f"L X+0 Y+0 Z+9 FMAX\n{block}\nL X+1 F100")) is refused
+
+
+def test_a_rotary_axis_that_stays_where_it_is_does_not_turn_under_a_plane() -> None:
+    body = "L X+0 Y+0 Z+9 B+0 C+0 FMAX\nPLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY\nL X+1 Y+1 Z+9 C+0 F100\nL X+2 C+1"
+    moves = follow(body, "XYZBC").moves
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]

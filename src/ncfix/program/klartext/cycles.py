@@ -36,10 +36,12 @@ IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 23
 OLD_DRILLING = frozenset({1, 2, 17, 18})
 GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
 DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
-ADJUSTING = frozenset({800, 801, 880})
-ADJUSTED = "cycle {} changes coordinates for turning, which is not followed"
+ADJUSTING = frozenset({800, 801, 880, *range(1000, 1100)})
+ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
 BUILDERS = range(300, 400)
+MEASURING = 238
 OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
+BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
 CALLING = 12
 CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
@@ -76,6 +78,8 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
         control.refusal = control.refusal or ADJUSTED.format(cycle)
     if cycle in BUILDERS:
         control.refuse_here(OF_BUILDER.format(cycle))
+    if cycle == MEASURING:
+        control.refuse_here(BY_ITSELF.format(cycle))
     if cycle in (ON_CIRCLE, ON_LINES):
         pattern(control, pattern_of_cycle(cycle, control.scope.parameters), f"cycle {cycle}")
         return

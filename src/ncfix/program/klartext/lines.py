@@ -4,6 +4,7 @@ Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellane
 """
 
 import math
+from collections.abc import Sequence
 
 from ncfix.program.klartext.control import DEPARTED, Control
 from ncfix.program.klartext.posture import angles_for
@@ -35,6 +36,11 @@ MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
 FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
 OFF = "a rapid from where the control itself has led the tool"
 FLAT = 1e-9
+IN_SPACE = 0b111
+"""The bits of X, Y and Z."""
+
+STILL = 1e-9
+"""rad; an axis that is told to go where it stands does not turn."""
 
 
 def straight(control: Control, step: Step) -> None:
@@ -83,8 +89,9 @@ def name_polar(control: Control, step: Step) -> None:
 
 def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
     """A straight motion to a command."""
-    turned = any(control.rotary[index] and axes >> index & 1 for index in control.machine)
-    if turned and control.transformations.tilted and not control.m128:
+    turned = [index for index in control.machine if control.rotary[index] and axes >> index & 1]
+    positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
+    if positioning and control.transformations.tilted and not control.m128:
         turn_under_tilt(control, step, target, unknown, axes)
         return
     way = take_short_way(control, step, target, axes) if control.shortest else ""
@@ -96,6 +103,12 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else "")
     with_increments(control, False)
     keep_tangent(control, *before)
+
+
+def turns(control: Control, indices: Sequence[int], target: Vector, unknown: Unknown) -> bool:
+    """Whether some of these axes move, or may."""
+    lost = control.unknown.keys() | unknown.keys()
+    return any(index in lost or abs(target[index] - control.position[index]) > STILL for index in indices)
 
 
 def keep_tangent(control: Control, start: Vector, unknown: Unknown) -> None:

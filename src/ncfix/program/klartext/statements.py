@@ -156,9 +156,10 @@ FORMS: tuple[tuple[str, Do], ...] = (
     (r"TRANS\b.*", change_coordinates),
     (r"PRESET\s+SELECT\s+#\s*(?P<row>\d+)(?P<rest>.*)", select_preset),
     (r"FUNCTION\s+(?P<reset>RESET\s+)?TCPM\b(?P<rest>.*)", tcpm),
-    # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections) may not.
+    # FUNCTION statements that leave coordinates as they are; others (turning, parallel axes, corrections, another
+    # kinematic model by MODE MILL) may not.
     (
-        r"FUNCTION\s+(RESET\s+)?(FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL|MODE\s+SET|DRESS\s+END|FLUTES|FILE)",
+        r"FUNCTION\s+(RESET\s+)?(FEED|S-PULSE|DCM|LIFTOFF|COUNT|MODE\s+MILL\s*\Z|DRESS\s+END|FLUTES|FILE)",
         lambda control, flow, found: None,
     ),
     # FN 17 and 25 write into the control's own data: datums, presets, tools.
