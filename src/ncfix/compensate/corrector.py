@@ -27,6 +27,7 @@ from ncfix.program import stamp
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError, PartReader
+from ncfix.program.reread import NotAsWrittenError, reread
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
 
@@ -106,7 +107,7 @@ class Corrector:
             shift = course.real.start[-1] - moves.start[-1]
             share.leave(Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy()))
         text = spliced(part.program.source, plain.splices)
-        again = self._read_again(text, part.last)
+        again = self._read_again(text, part, plain.splices)
         if len(again) != len(plain.end) or differ(again.end, plain.end).any():
             raise NotInPartsError(FRAMES)
         tally = Tally()
@@ -138,7 +139,7 @@ class Corrector:
         text = self._text(part.program, settled, before is None)
         own = np.ones(len(moves), dtype=bool)
         own[:1] = unit.head is None
-        self._prove(text, settled, own, part.last)
+        self._prove(text, settled, own, unit)
         tally = Tally()
         tally.add(part.program, settled, own, increments(self.machine))
         if task.options.verify:
@@ -163,17 +164,22 @@ class Corrector:
             splices = Splices.joined([splices, Splices.of([edit])])
         return spliced(program.source, splices)
 
-    def _prove(self, text: bytes, settled: Settled, own: Mask, last: bool) -> None:
+    def _prove(self, text: bytes, settled: Settled, own: Mask, unit: Unit) -> None:
         """The control must understand what the plan meant."""
-        wrong = differences(settled, self._read_again(text, last), own[settled.plan.pieces.move])
+        head, splices = unit.head, settled.emission.splices
+        edits = None if head is None else splices.moved(-len(head.program.source))
+        wrong = differences(settled, self._read_again(text, unit.part, edits), own[settled.plan.pieces.move])
         if wrong is None or wrong.any():
             raise NotInPartsError(FRAMES)
 
-    def _read_again(self, text: bytes, last: bool) -> Moves:
-        """What a control makes of the text that was written."""
+    def _read_again(self, text: bytes, part: Part, edits: Splices | None) -> Moves:
+        """What a control makes of the text that was written; `edits` make it of that of the part, if known."""
         try:
-            program = self.again.read(text)
-            again = self.proof.follow(program, last)
+            program = None if edits is None else reread(self.again, part.program, edits, text)
+            program = self.again.read(text) if program is None else program
+            again = self.proof.follow(program, part.last)
+        except NotAsWrittenError:
+            raise SelfCheckError("more of the text has changed than was written anew") from None
         except NcfixError as error:
             raise SelfCheckError(f"the corrected program cannot be read: {error}") from error
         self.again.first_line += program.lines_ended

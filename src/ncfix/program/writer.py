@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,10 @@ class Splices:
         edges = zip((ends - length)[order[heads]].tolist(), ends[order[tails]].tolist(), strict=True)
         return cls(start[order], stop[order], length[order], b"".join(data[slice(*each)] for each in edges))
 
+    def moved(self, way: int) -> Splices:
+        """The same so many bytes further on."""
+        return replace(self, start=self.start + way, stop=self.stop + way)
+
     def edits(self) -> Iterator[Edit]:
         """One by one."""
         at = 0
@@ -105,18 +109,19 @@ def spliced(source: bytes, splices: Splices) -> bytes:
 
         text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
         out = np.empty(len(source) + len(data) - int((stop - start).sum()), dtype=np.uint8)
-        writing_kernels.spliced(text, start, stop, splices.length, data, out)
+        columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
+        writing_kernels.spliced(text, *columns, data, out)
         return out.tobytes()
-    kept = ~_cover(len(source), start, stop)
+    kept = ~cover(len(source), start, stop)
     ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
     out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
-    new = _cover(len(out), ends - splices.length, ends)
+    new = cover(len(out), ends - splices.length, ends)
     out[new] = np.frombuffer(splices.data, dtype=np.uint8)
     out[~new] = np.frombuffer(source, dtype=np.uint8)[kept]
     return out.tobytes()
 
 
-def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
+def cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
     """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
     full = stops > starts
     change = np.zeros(size + 1, dtype=np.int8)
