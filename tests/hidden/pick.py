@@ -133,10 +133,11 @@ def _told_later(
     kin: dict[str, float],
     rivals: tuple[Entry, ...],
 ) -> bool:
-    """Whether the closest relative could take its place within the noise, and not once there are more poses."""
-    closest = next(iter(kin))
-    apart = _strength(draft.sight, truth) * (1 - kin[closest])
-    return apart < CONFUSED and _told_by_more(rng, draft, specimen, next(e for e in rivals if e.name == closest))
+    """Whether the closest relative could take its place within the noise, and no relative once there are more poses."""
+    strength = _strength(draft.sight, truth)
+    alike = {name for name, share in kin.items() if strength * (1 - share) < TOLD_APART}
+    confused = strength * (1 - max(kin.values())) < CONFUSED
+    return confused and _told_by_more(rng, draft, specimen, tuple(e for e in rivals if e.name in alike))
 
 
 def _top(kin: dict[str, float]) -> dict[str, float]:
@@ -160,8 +161,8 @@ def _shows(spec: Family, share: float) -> bool:
     return share > (FAINT if spec.extra else VISIBLE)
 
 
-def _told_by_more(rng: Generator, draft: Draft, specimen: Specimen, rival: Entry) -> bool:
-    """Whether 54 more poses with the second tool, anywhere, tell a specimen from its closest relative."""
+def _told_by_more(rng: Generator, draft: Draft, specimen: Specimen, rivals: tuple[Entry, ...]) -> bool:
+    """Whether 54 more poses with the second tool, anywhere, tell a specimen from all of its rivals."""
     s = draft.situation
     design = replace(designs.FREE, count=54, repeated=0, tools=1)
     other = tuple(x for x in s.machine.lengths if x != s.length[0])
@@ -170,5 +171,5 @@ def _told_by_more(rng: Generator, draft: Draft, specimen: Specimen, rival: Entry
     sight = view(both, draft.handed_model, np.ones(len(both), dtype=bool), draft.kind)
     seen_from = sensitivities(both)
     truth = first_order(seen_from, specimen.twists(both))
-    share = relatives(rng, both, sight, seen_from, truth, (rival,))[rival.name]
+    share = max(relatives(rng, both, sight, seen_from, truth, rivals).values())
     return _strength(sight, truth) * (1 - share) > TOLD_APART

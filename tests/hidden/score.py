@@ -178,7 +178,8 @@ def _asked_again(scene: Scenario, candidate: Candidate, base: Path, text: str) -
 
 def _alone(scene: Scenario, answer: Answer) -> bool:
     first = answer.effects[0] if answer.effects else None
-    return bool(first and _is(first, scene.truth.named()[0]) and _size(first) == 1)
+    truth = scene.truth.named()[0]
+    return bool(first and _is(first, truth) and all(matches(truth, alias) for alias in first.aliases))
 
 
 def as_row(record: Record) -> dict[str, Any]:
