@@ -25,6 +25,7 @@ ODDS = (
     "CC X+22 Y+20\nL X+20 Y+20 Z+5\nCP IPA+90 DR+",
     "L X+20 Y+20 Z+5\nCR X+22 Y+22 R+2 DR+\nCT X+23 Y+24",
     "L X+20 Y+20 Z+5 RL\nRND R0.5\nL X+24 Y+21 R0",
+    "L X+20 Y+20 Z+5\nRND R0.5\nCC X+22 Y+20\nC X+24 Y+20 DR+",
     "L IX+0.5 IY-0.25",
     "Q1 = 3.5\nL Z+Q1",
     "LN X+20 Y+20 Z+5 NX+0 NY+0 NZ+1",
@@ -41,6 +42,7 @@ WHOLE = {
     "FN 9: IF +Q1 EQU +1 GOTO LBL 3": "straight",
     "CALL PGM OTHER.H": "calls|pole",
     "SEL PGM OTHER.H": "calls",
+    "FL X+21 Y+20": "free",
     "L X+1,5": "commas",
     "CC IX+1": "pole",
 }

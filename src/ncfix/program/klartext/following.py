@@ -28,8 +28,8 @@ from ncfix.program.parts import NotInPartsError
 from ncfix.program.rs274.following import PartFollower
 from ncfix.program.tree import Program
 
-ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b", re.IGNORECASE)
-"""Statements that lead to other programs."""
+ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
+"""Statements that lead to other programs, or depend on what follows: elements of free contours (FK)."""
 
 
 class PartInterpreter(Interpreter):
@@ -65,7 +65,7 @@ class PartInterpreter(Interpreter):
         """A statement that is not taken apart."""
         assert plan.statement is not None
         if ELSEWHERE.match(flow.unit.program.slice(flow.block - 1, plan.statement[1])):
-            raise NotInPartsError("the program calls others")
+            raise NotInPartsError("the program calls others, or has free contours")
         return super().state(plan, flow)
 
 
