@@ -67,6 +67,7 @@ class Variables(Parameters):
 
     def from_control(self, index: int) -> float:
         """A value that the control computes; a position is not what it will be when the program is corrected."""
+        self.changes += 1
         value = self.live[index]()
         if any(index in positions for positions in POSITIONS):
             self.position(index)
@@ -88,7 +89,9 @@ class Variables(Parameters):
 
     def assign(self, key: Key, value: float, runtime: bool = False) -> None:
         """Set a variable."""
-        self.store_of(key).assign(key, value, runtime)
+        store = self.store_of(key)
+        self.changes += store.values.get(key) != value
+        store.assign(key, value, runtime)
         if isinstance(key, int) and is_system(key):
             setter = self.setters.get(key)
             if setter is not None:

@@ -25,12 +25,14 @@ class Parameters:
     runtime  those of them that were computed from what is known only at run time
     touched  such a value has been read since this was last cleared, or one that was never set
     lacking  the name of the last one that was
+    changes  how often a parameter has got another value
     """
 
     values: dict[str, float] = field(default_factory=dict)
     runtime: set[str] = field(default_factory=set)
     touched: bool = False
     lacking: str = ""
+    changes: int = 0
 
     def get(self, name: str) -> float:
         """The value of a parameter; 0 where it is not known."""
@@ -41,6 +43,7 @@ class Parameters:
 
     def assign(self, name: str, value: float, runtime: bool = False) -> None:
         """Set a parameter."""
+        self.changes += self.values.get(name) != value or runtime
         self.values[name] = value
         (self.runtime.add if runtime else self.runtime.discard)(name)
 

@@ -84,6 +84,10 @@ class FlowControl:
             raise Fault(TOO_DEEP, f"more than {MOST_CALLS} calls are open")
         self.calls.append(Call(self.unit, self.block, outside, self.parameters.enter() if outside else {}))
 
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that are open, and the repeats that have still to be made."""
+        return tuple((id(call.unit), call.block) for call in self.calls), tuple(self.repeats.items())
+
     def end_of_subprogram(self) -> None:
         """LBL 0."""
         if self.calls and not self.calls[-1].outside:

@@ -27,6 +27,7 @@ from ncfix.program.klartext.unread import unread_line
 from ncfix.program.language import Resolve
 from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
@@ -57,6 +58,7 @@ class Interpreter:
         self.control = control
         self.resolve = resolve
         self.budget = max_blocks
+        self.recurrence = Recurrence()
         self.files: dict[str, Unit | None] = {}
         self.program = program
         self.flow: FlowControl | None = None
@@ -127,7 +129,16 @@ class Interpreter:
                 self.recorder.note(unit, block, control, control.row_block)
             if self.execute(plan, flow):
                 return
+            if flow.unit is unit and flow.block <= block:
+                self.look_round(flow, block)
         self.at_end_of_text()
+
+    def look_round(self, flow: FlowControl, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        jump = id(flow.unit), block, flow.block, *flow.under_way()
+        if self.recurrence.seen(jump, flow.parameters.changes):
+            flow.block = block + 1
+            raise Fault(ENDLESS, NEVER_ENDS)
 
     def at_end_of_text(self) -> None:
         """The text is over without END PGM."""

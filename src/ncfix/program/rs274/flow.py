@@ -69,6 +69,9 @@ class Course(Protocol):
     def calls(self) -> Sequence[object]:
         """Calls that have not returned."""
 
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that have not returned, and how often each is still to be made."""
+
     def next_flow(self) -> bool:
         """While skipping: go to the next flow-control line of this text; False if there is none."""
 
@@ -299,6 +302,10 @@ class FlowControl:
         """Go on at a label."""
         self.unit, self.block = label.unit, label.block
 
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that have not returned, and how often each is still to be made."""
+        return tuple((id(call.unit), call.block, call.remaining) for call in self.calls)
+
     # -- branches -----------------------------------------------------------------------------------------------------
 
     def branch(self, flow: FlowLine, name: str) -> None:
@@ -362,6 +369,7 @@ class FlowControl:
             label.repeats = round(self.argument(flow))
         if label.repeats > 0:
             label.repeats -= 1
+            self.control.parameters.changes += 1
         else:
             label.repeats = -1
             self.skip_to(name)

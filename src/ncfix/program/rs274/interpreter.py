@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
 from ncfix.program.reader import read
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
@@ -51,6 +52,7 @@ class Interpreter:
         self.control = control
         self.resolve = resolve
         self.budget = max_blocks
+        self.recurrence = Recurrence()
         self.files: dict[str, Unit | None] = {}
         self.axes = sum(1 << index for index in control.machine)
         self.main = Unit(program, control.rules, self.axes)
@@ -113,11 +115,22 @@ class Interpreter:
                     flow.block += done
                     self.spend(done)
                     continue
+            unit, block = flow.unit, flow.block
             flow.block += 1
             self.span = None
             self.spend(1)
             if self.execute(plan):
                 return
+            if flow.unit is unit and flow.block <= block:
+                self.look_round(block)
+
+    def look_round(self, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        flow = self.flow
+        jump = id(flow.unit), block, flow.block, flow.under_way()
+        if self.recurrence.seen(jump, self.control.parameters.changes):
+            flow.block = block + 1
+            raise Fault(ENDLESS, NEVER_ENDS)
 
     def takes_stretches(self) -> bool:
         """Whether plain motions may be taken many at once: nothing is done between them."""

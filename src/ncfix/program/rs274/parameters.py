@@ -54,6 +54,7 @@ class Parameters:
     persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
     returned    value of the last `return`, and whether it gave one
     touched     a value known only at run time has been read since this was last cleared
+    changes     how often a parameter has got another value, or one has been read that the control computes
     """
 
     numbers: Store = field(default_factory=Store)
@@ -63,6 +64,7 @@ class Parameters:
     persistent: Callable[[int], None] = lambda index: None
     returned: tuple[float, bool] = (0.0, False)
     touched: bool = False
+    changes: int = 0
 
     # -- reading ------------------------------------------------------------------------------------------------------
 
@@ -71,8 +73,10 @@ class Parameters:
         if not 1 <= index < N_PARAMETERS:
             raise Fault(OUT_OF_RANGE, f"there is no parameter #{index}", f"they are #1 to #{N_PARAMETERS - 1}")
         if index in self.live:
+            self.changes += 1
             return self.live[index]()
         if 5161 <= index <= 5390:
+            self.changes += 1
             self.persistent(index)
         if index in self.numbers.runtime:
             self.touched = True
@@ -81,6 +85,7 @@ class Parameters:
     def named(self, name: str) -> float:
         """The value of `#<name>`; raises `Fault`."""
         if name in self.predefined:
+            self.changes += 1
             return self.predefined[name]()
         scope = self.scope_of(name)
         if name not in scope.values:
@@ -113,6 +118,7 @@ class Parameters:
     def assign(self, key: Key, value: float, runtime: bool = False) -> None:
         """Set a parameter, and whether its value is known only at run time."""
         store = self.numbers if isinstance(key, int) else self.scope_of(key)
+        self.changes += store.values.get(key) != value
         store.assign(key, value, runtime)
 
     # -- subprograms --------------------------------------------------------------------------------------------------

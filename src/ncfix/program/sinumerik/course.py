@@ -64,6 +64,12 @@ class Course:
     calls: list[Call] = field(default_factory=list)
     sections: list[Section] = field(default_factory=list)
 
+    def under_way(self) -> tuple[object, ...]:
+        """The calls that have not returned, and what is still to be repeated."""
+        calls = tuple((id(call.unit), call.block, call.left) for call in self.calls)
+        sections = [self.sections, *(call.sections for call in self.calls)]
+        return calls, tuple((each.start, each.left) for level in sections for each in level)
+
     # -- repetitions --------------------------------------------------------------------------------------------------
 
     def turn_back(self) -> None:

@@ -13,6 +13,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.sinumerik.bypass import bypassed
@@ -56,6 +57,7 @@ class Interpreter:
         self.control = control
         self.resolve = resolve
         self.budget = max_blocks
+        self.recurrence = Recurrence()
         self.units = units_of(program)
         self.files: dict[str, Unit | None] = {unit.name: unit for unit in self.units[1:] if unit.name}
         self.course = Course(control, self.units[0], self.units[0].begin)
@@ -131,11 +133,22 @@ class Interpreter:
                     control.head_on()
                     self.spend(done)
                     continue
-            plan = course.unit.plan(course.block)
+            unit, block = course.unit, course.block
+            plan = unit.plan(block)
             course.block += 1
             self.spend(1)
             if self.execute(plan):
                 return True
+            if course.unit is unit and course.block <= block:
+                self.look_round(block)
+
+    def look_round(self, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        course = self.course
+        jump = id(course.unit), block, course.block, *course.under_way()
+        if self.recurrence.seen(jump, self.control.variables.changes):
+            course.block = block + 1
+            raise Fault(ENDLESS, NEVER_ENDS)
 
     def lane_is_open(self) -> bool:
         """Whether plain motions may go many at a time."""

@@ -34,10 +34,12 @@ class Variables:
 
     shared  R parameters and whatever the control has of its own
     scopes  the program's own variables, those of the subprogram being executed last
+    changes how often a variable has got another value
     """
 
     shared: dict[Key, Value] = field(default_factory=dict)
     scopes: list[Local] = field(default_factory=lambda: [Local()])
+    changes: int = 0
 
     @classmethod
     def given(cls, variables: Mapping[str, float]) -> Variables:
@@ -58,12 +60,14 @@ class Variables:
         """Set a variable; whole ones round."""
         name = name_of(key)
         scope = self.scope_of(name)
+        before = self.value(key)
         if scope is None:
             self.shared[key] = value
-            return
-        plain = number(value)
-        whole = plain is not None and scope.kinds[name] in WHOLE
-        scope.values[key] = float(math.floor(plain + 0.5)) if whole and plain is not None else value
+        else:
+            plain = number(value)
+            whole = plain is not None and scope.kinds[name] in WHOLE
+            scope.values[key] = float(math.floor(plain + 0.5)) if whole and plain is not None else value
+        self.changes += self.value(key) != before
 
     def scope_of(self, name: str) -> Local | None:
         """The innermost program that has defined a name, the main program at last."""
@@ -72,6 +76,7 @@ class Variables:
     def define(self, kind: str, name: str, sizes: tuple[int, ...] = ()) -> None:
         """`DEF`: the variable begins anew."""
         scope = self.scopes[-1]
+        self.changes += any(name_of(key) == name for key in scope.values)
         scope.kinds[name], scope.sizes[name] = kind, sizes
         for key in [key for key in scope.values if name_of(key) == name]:
             del scope.values[key]
@@ -94,6 +99,7 @@ class Variables:
     def forget(self, name: str) -> None:
         """All elements of an array are known only at run time from here on."""
         scope = self.scope_of(name)
+        self.changes += 1
         if scope is None:
             self.shared = {key: value for key, value in self.shared.items() if name_of(key) != name}
             return

@@ -1,0 +1,30 @@
+"""Programs that go round for ever: the same jump is made again, and nothing has changed that a jump depends on.
+
+Which way a program goes depends on its variables alone, on the calls that are open, and on how often repetitions are
+still to be made; where the axes stand does not matter unless the program reads it, which counts as a change here. So a
+second jump of that kind shows that there will be a third. A loop that counts something has to be followed instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
+MOST = 100_000
+"""Jumps that are remembered; from different calls, one jump is another."""
+
+
+@dataclass(slots=True)
+class Recurrence:
+    """The jumps back that a program has made: what had changed by then, as a count."""
+
+    made: dict[Hashable, int] = field(default_factory=dict)
+
+    def seen(self, jump: Hashable, changes: int) -> bool:
+        """Note a jump back, and tell whether it was made before and nothing has changed since."""
+        before = self.made.get(jump)
+        if len(self.made) >= MOST:
+            self.made.clear()
+        self.made[jump] = changes
+        return before == changes

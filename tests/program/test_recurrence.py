@@ -1,0 +1,97 @@
+"""Programs that go round for ever are told at once; those that count are followed."""
+
+from __future__ import annotations
+
+import pytest
+
+from ncfix.diagnostics import SourceError
+from ncfix.program.moves import Moves
+from ncfix.program.reader import read
+from ncfix.program.recurrence import MOST, NEVER_ENDS, Recurrence
+from ncfix.program.setup import Setup, Tool
+from ncfix.program.trace import trace
+
+SETUP = Setup(
+    work_offsets={name: dict.fromkeys("XYZ", 0.0) for name in ("G54", "G500", "PRESET")},
+    tools={number: Tool(0.0, 5.0) for number in range(3)},
+    initial=dict.fromkeys("XYZ", 0.0),
+    no_point="calculator",
+)
+
+ENDLESS = {
+    "siemens, a jump": ("siemens", "AA: G0 X1\nR1=3\nGOTOB AA\nM30", 3),
+    "siemens, a loop": ("siemens", "LOOP\nG91 G0 X1\nENDLOOP\nM30", 3),
+    "siemens, in a subprogram": ("siemens", "SUB\nM30\n%_N_SUB_SPF\nWHILE TRUE\nG0 X1\nENDWHILE\nM17", 6),
+    "linuxcnc, do": ("linuxcnc", "o1 do\nG0 X1\no1 while [1]\nM2", 3),
+    "linuxcnc, a loop in a loop that counts": (
+        "linuxcnc",
+        "o1 repeat [3]\no2 while [1]\nG0 X1\no2 endwhile\no1 endrepeat\nM2",
+        4,
+    ),
+    "fanuc, GOTO": ("fanuc", "%\nO1\nN10 G0 X1.\n#1=3.\nGOTO 10\nM30\n%", 5),
+    "fanuc, WHILE": ("fanuc", "%\nO1\nWHILE[1 EQ 1]DO1\nG0 X1.\nEND1\nM30\n%", 5),
+    "klartext": (
+        "heidenhain",
+        "0 BEGIN PGM T MM\n1 LBL 1\n2 L X+1 FMAX\n3 Q1 = 2\n4 FN 9: IF +1 EQU +1 GOTO LBL 1\n5 END PGM T MM",
+        5,
+    ),
+}
+"""Dialect, program, and the line that jumps back."""
+
+COUNTING = {
+    "siemens": ("siemens", "R1=0\nAA: R1=R1+1\nG0 X=R1\nIF R1<500 GOTOB AA\nM30", 500),
+    "siemens, sections": ("siemens", "AA: G0 X1\nBB: G0 X2\nREPEAT AA BB P=99\nM30", 200),
+    "siemens, calls": ("siemens", "SUB P50\nSUB\nM30\n%_N_SUB_SPF\nGOTOF BB\nAA: G0 X1\nM17\nBB: GOTOB AA", 51),
+    "linuxcnc": ("linuxcnc", "o1 repeat [70]\nG0 X1\no1 endrepeat\nM2", 70),
+    "linuxcnc, where the axes stand": ("linuxcnc", "G91\no1 while [#5420 LT 40]\nG0 X1\no1 endwhile\nM2", 40),
+    "fanuc": ("fanuc", "%\nO1\n#1=0\nWHILE[#1 LT 300]DO1\nG0 X1.\n#1=#1+1\nEND1\nM30\n%", 300),
+    "fanuc, calls": ("fanuc", "%\nO1\nM98 P2 L30\nM98 P2\nM30\nO2\nGOTO 3\nN2 G0 X1.\nM99\nN3 GOTO 2\n%", 31),
+    "klartext": (
+        "heidenhain",
+        "0 BEGIN PGM T MM\n1 LBL 1\n2 L X+1 FMAX\n3 CALL LBL 1 REP 60\n4 L X+2 FMAX\n5 END PGM T MM",
+        62,
+    ),
+}
+"""Dialect, program, and how many motions it makes."""
+
+
+def moves_of(dialect: str, text: str) -> Moves:
+    program = read(text.encode(), "part", dialect)
+    return trace(program, SETUP, ("X", "Y", "Z"), frozenset(), max_blocks=20_000).moves
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_what_never_ends_is_told_at_once(name: str) -> None:
+    dialect, text, line = ENDLESS[name]
+    with pytest.raises(SourceError) as caught:
+        moves_of(dialect, text)
+    assert caught.value.code == "NCF233"
+    assert NEVER_ENDS in str(caught.value)
+    place = caught.value.messages[0].place
+    assert place is not None
+    assert place.line == line
+
+
+@pytest.mark.parametrize("name", COUNTING)
+def test_what_counts_is_followed(name: str) -> None:
+    dialect, text, count = COUNTING[name]
+    assert len(moves_of(dialect, text)) == count
+
+
+def test_a_count_up_without_end_runs_into_the_limit() -> None:
+    with pytest.raises(SourceError, match="seems to be endless"):
+        moves_of("siemens", "R1=0\nAA: R1=R1+1\nGOTOB AA\nM30")
+
+
+def test_a_jump_is_another_when_something_has_changed() -> None:
+    recurrence = Recurrence()
+    assert not recurrence.seen("jump", 1)
+    assert not recurrence.seen("other", 1)
+    assert not recurrence.seen("jump", 2)
+    assert recurrence.seen("jump", 2)
+
+
+def test_jumps_are_forgotten_when_they_are_many() -> None:
+    recurrence = Recurrence()
+    assert not any(recurrence.seen(jump, 0) for jump in range(MOST + 5))
+    assert len(recurrence.made) <= MOST
