@@ -1,8 +1,9 @@
-"""Five-axis programs of any length in Heidenhain Klartext: the surface of `programs`, milled row by row under M128.
+"""Five-axis programs of any length in Heidenhain Klartext: the surface of `programs`, milled row by row.
 
 full   every block has its number and all its words
 modal  what did not change is left out, without block numbers
 mixed  as full, with what interrupts programs of CAM systems: comments, FMAX, arcs, tool changes, normals, tilted planes
+tcp    as mixed, half as large, under control of the tip (M128)
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from pathlib import Path
 
 from programs import point
 
-STYLES = ("full", "modal", "mixed")
-START = "L X+0 Y+0 Z+50 B+0 C+0 FMAX"
+STYLES = ("full", "modal", "mixed", "tcp")
+START = "L X+200 Y+200 Z+50 B+0 C+0 FMAX"
 
 
-def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
-    """What interrupts a mixed program at some of its points."""
+def odd_blocks(k: int, at: tuple[float, ...], on: list[str], off: list[str]) -> list[str]:
+    """What interrupts a mixed program at some of its points; `on`, `off`: what switches control of the tip."""
     x, y, z, b, c = at
     here = f"L X{x:+.4f} Y{y:+.4f} Z{z:+.4f} B{b:+.4f} C{c:+.4f} F2000"
     match k % 4001:
@@ -30,38 +31,34 @@ def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
         case 2000:
             return [here, f"CC X{x + 2:+.4f} Y{y:+.4f}", f"C X{x + 2:+.4f} Y{y + 2:+.4f} DR- F800"]
         case 2500:
-            return ["M129", "TOOL CALL 2 Z S8000", "M128", START, here]
+            return [*off, "TOOL CALL 2 Z S8000", *on, START, here]
         case 3000:
             return [f"LN X{x:+.4f} Y{y:+.4f} Z{z:+.4f} NX+0 NY+0 NZ+1 F2000", "L R0"]
         case 3500:
-            lay = ["PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY", "L X+0 Y+0 Z+50 R0 FMAX", "PLANE RESET STAY"]
-            return ["M129", "L B+0 C+0 FMAX", *lay, "M128", START, here]
+            lay = ["PLANE SPATIAL SPA+0 SPB+0 SPC+20 STAY", "L X+60 Y+60 Z+50 R0 FMAX", "PLANE RESET STAY"]
+            return [*off, "L B+0 C+0 FMAX", *lay, *on, START, here]
     return []
 
 
 def lines(blocks: int, style: str) -> Iterator[str]:
     """The lines of a program with about so many blocks."""
-    body = numbered(_body(blocks, style)) if style != "modal" else _body(blocks, style)
-    yield from body
-
-
-def numbered(body: Iterator[str]) -> Iterator[str]:
-    """Blocks with their numbers."""
-    for number, text in enumerate(body):
-        yield f"{number} {text}"
+    body = _body(blocks, style)
+    return body if style == "modal" else (f"{number} {text}" for number, text in enumerate(body))
 
 
 def _body(blocks: int, style: str) -> Iterator[str]:
+    on, off = (["M128"], ["M129"]) if style == "tcp" else ([], [])
     yield "BEGIN PGM LONG MM"
-    yield from ("BLK FORM 0.1 Z X-10 Y-10 Z-30", "BLK FORM 0.2 X+410 Y+410 Z+20", "TOOL CALL 1 Z S12000", "M128", START)
+    yield from ("BLK FORM 0.1 Z X-10 Y-10 Z-30", "BLK FORM 0.2 X+410 Y+410 Z+20", "TOOL CALL 1 Z S12000", *on, START)
     rows = max(1, int((blocks / 6) ** 0.5))
     per_row = max(2, blocks // rows)
     last: dict[str, str] = {}
     for k in range(blocks):
         at = point(k, per_row, rows)
+        if style == "tcp":
+            at = 100 + at[0] / 2, 100 + at[1] / 2, *at[2:]
         words = dict(zip("XYZBC", (f"{value:+.4f}" for value in at), strict=True))
-        odd = odd_blocks(k, at) if style == "mixed" else []
-        yield from odd
+        yield from odd_blocks(k, at, on, off) if style in ("mixed", "tcp") else []
         if style == "modal":
             changed = [letter + value for letter, value in words.items() if last.get(letter) != value]
             last = words
@@ -69,7 +66,7 @@ def _body(blocks: int, style: str) -> Iterator[str]:
         else:
             text = " ".join(letter + value for letter, value in words.items())
             yield f"L {text} F{2400 + 10 * (k * 7919 % 60)}"
-    yield from ("M129", "L Z+100 R0 FMAX M30", "END PGM LONG MM")
+    yield from (*off, "L Z+100 R0 FMAX M30", "END PGM LONG MM")
 
 
 def write(path: Path, blocks: int, style: str) -> None:

@@ -6,6 +6,7 @@ templates, frames and reasons have the same numbers in all parts, so that parts 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
@@ -167,21 +168,30 @@ def joined_moves(parts: list[Moves], blocks: list[int]) -> Moves:
         return parts[0]
     before = np.cumsum([0, *blocks[:-1]])
     columns: dict[str, Any] = {
-        each.name: _joined_columns([getattr(part, each.name) for part in parts], parts)
-        for each in fields(Moves)
-        if each.name not in TABLES
+        each.name: _joined_columns(each.name, parts) for each in fields(Moves) if each.name not in TABLES
     }
     shifted = [part.block + at for part, at in zip(parts, before.tolist(), strict=True)]
     columns["block"] = np.concatenate(shifted).astype(np.int32)
     return Moves(**columns, **{name: getattr(parts[-1], name) for name in TABLES})
 
 
-def _joined_columns(columns: list[Any], parts: list[Moves]) -> Any:
-    """One column of parts that follow each other; parts that lack it have nothing there, and None if all do."""
+LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
+    "held": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "approach": lambda moves: np.full(moves.end.shape, np.nan),
+    "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
+    "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),
+}
+"""What columns of `Moves` mean that are left out."""
+
+
+def _joined_columns(name: str, parts: list[Moves]) -> NDArray[Any] | None:
+    """One column of parts that follow each other; None if all lack it."""
+    columns = [getattr(part, name) for part in parts]
     if all(column is None for column in columns):
         return None
-    empty = (np.full(part.end.shape, np.nan) for part in parts)
-    return np.concatenate([blank if column is None else column for column, blank in zip(columns, empty, strict=True)])
+    filled = (LACKING[name](part) if column is None else column for part, column in zip(parts, columns, strict=True))
+    return np.concatenate(list(filled))
 
 
 def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:

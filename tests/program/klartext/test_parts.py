@@ -21,7 +21,7 @@ ODDS = (
     "M129\nTOOL CALL 2 Z S8000\nL X+20 Y+20 Z+5 B+10 C+30 R0 FMAX",
     "M128\nL X+20 Y+20 Z+5 B+10 C+30 F500",
     "M129\nL X+20 Y+20 Z+5 B+10 C+30 F500",
-    "CC X+20 Y+20\nC X+22 Y+20 DR+",
+    "L X+20 Y+20 Z+5\nCC X+21 Y+20\nC X+22 Y+20 DR+",
     "CC X+22 Y+20\nL X+20 Y+20 Z+5\nCP IPA+90 DR+",
     "L X+20 Y+20 Z+5\nCR X+22 Y+22 R+2 DR+\nCT X+23 Y+24",
     "L X+20 Y+20 Z+5 RL\nRND R0.5\nL X+24 Y+21 R0",
