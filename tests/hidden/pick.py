@@ -28,7 +28,7 @@ from .visibility import View, first_order, relatives, sensitivities, view
 from .world import Specimen
 
 VISIBLE, FAINT, HIDDEN = 0.4, 0.3, 0.15
-CLOSE_ENOUGH, CLUTTER_MM = 0.3, 0.001
+CLOSE_ENOUGH, STRANGE, CLUTTER_MM = 0.3, 0.5, 0.001
 TOLD_APART, CONFUSED = 12.0, 4.0
 SIGMA_MM, USUAL_MM = 0.003, 0.005
 ROUNDS = 30
@@ -87,10 +87,12 @@ def judge(
     truth = first_order(seen_from, specimen.twists(draft.situation))
     if specimen.entry.name in before or not _shows(spec, left_share(draft.sight, truth)):
         return None
-    if spec.source in ("foreign", "blind"):
+    if spec.source == "blind":
         return Verdict({})
     rivals = tuple(e for e in vocabulary(draft.world.machine) if not matches(named(specimen.entry), e.name))
     kin = relatives(rng, draft.situation, draft.sight, seen_from, truth, rivals)
+    if spec.source == "foreign":
+        return Verdict(_top(kin)) if max(kin.values()) < STRANGE else None
     if any(kin.get(name, 0.0) > 0.8 for name in before):
         return None
     if spec.source == "pair":
