@@ -85,12 +85,16 @@ def place_of_tables(grammar: Path) -> str | None:
 @lru_cache(maxsize=32)
 def parser(name: str) -> Lark:
     """The LALR parser of a grammar; its tables are worked out once (0.1 s), and kept on the disk."""
+    return parser_of(name, place_of_tables(find_grammar(name)))
+
+
+def parser_of(name: str, tables: str | None = None) -> Lark:
+    """A new LALR parser of a grammar, which takes its tables from a file, or leaves them there."""
     from lark import Lark
 
-    path = find_grammar(name)
     return Lark.open(
-        str(path),
-        cache=place_of_tables(path) or False,
+        str(find_grammar(name)),
+        cache=tables or False,
         parser="lalr",
         start="block",
         propagate_positions=True,

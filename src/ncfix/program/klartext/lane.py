@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.lane_tables import FEED, RAPID
+from ncfix.program.klartext.layout import CORNERS
 from ncfix.program.klartext.lines import FLAT
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.builder import Stretch
-from ncfix.program.rs274.lane import filled, followed, followed_compiled, left_adrift
+from ncfix.program.rs274.lane import before_placing, filled, followed, followed_compiled
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -29,8 +30,6 @@ SHORTEST = 16
 
 LONGEST = 1 << 16
 """Blocks that are taken at once."""
-
-CORNERS = frozenset({"rnd", "chf"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +67,9 @@ def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
         return 0, block + 1
     end = unit.lane_end(block)
     stop = before_corner(unit, block, min(end, block + LONGEST))
+    stop = before_placing(control, unit.lanes.words.mask[unit.program.template[block:stop]], block)
     if stop - block < SHORTEST:
-        return 0, end + 1
+        return 0, min(stop, end) + 1
     stage = stage_of(control, unit, block, stop)
     count = count_on_one_turn(control, stage)
     if count < SHORTEST:
@@ -131,7 +131,8 @@ def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
         blocks = np.full(len(moving), control.row_block) if unit.name else block + moving
         mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
         styles = styles_of(control, stage.motion[moving], stage.side[moving])
-        adrift = left_adrift(control, mask)
+        control.places.begun = True
+        adrift = np.full(len(moving), control.places.adrift)
         control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
         control.position = ends[-1].tolist()
         keep_tangent(control, stage.path)

@@ -59,6 +59,9 @@ def run_lane(control: Control, unit: Unit, block: int, main: bool) -> int:
     stop = min(unit.lane_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_open(control, unit, block):
         return 0
+    stop = before_placing(control, unit.lanes.mask[unit.program.template[block:stop]], block)
+    if stop - block < SHORTEST:
+        return 0
     stage = stage_of(control, unit, block, stop)
     feed = filled(stage.feed, ~np.isnan(stage.feed), np.nan)
     count = count_allowed(control, stage, feed)
@@ -75,6 +78,17 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
     begun = modal.motion in (0, 10) or (lane is not None and lane.motion >= 0)
     known = not (control.unknown or control.shaky or control.is_rotated)
     return begun and known and (modal.incremental or control.offset_checked)
+
+
+def before_placing(control: Control, mask: IntArray, block: int) -> int:
+    """The block that first brings an adrift axis to its place, or the end of blocks with these axis words (n,).
+
+    Its way rests on where the axis is said to have stood: it is a motion of its own kind.
+    """
+    if not control.places.adrift or control.modal.incremental:
+        return block + len(mask)
+    placing = (mask & control.places.adrift) != 0
+    return block + (int(np.argmax(placing)) if placing.any() else len(mask))
 
 
 def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
@@ -172,22 +186,11 @@ def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: boo
     styles = np.where(codes == 0, style(control, Kind.RAPID), style(control, Kind.FEED))
     blocks = blocks if main else np.full(len(blocks), control.row_block)
     starts, ends = stage.path[:-1][rows], stage.path[1:][rows]
-    adrift = left_adrift(control, stage.mask[rows])
+    control.places.begun = True
+    adrift = np.full(len(starts), control.places.adrift)
     control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends, adrift))
     control.position = ends[-1].tolist()
     modal.cycle.initial = None
-
-
-def left_adrift(control: Control, mask: IntArray) -> IntArray:
-    """(n,) axes that are adrift in motions with these axis words; the control keeps those that are at the end."""
-    places = control.places
-    places.begun = True
-    if not places.adrift or control.modal.incremental:
-        return np.full(len(mask), places.adrift)
-    named = np.bitwise_or.accumulate(mask)
-    adrift: IntArray = places.adrift & ~named
-    places.settle(int(named[-1]))
-    return adrift
 
 
 def style(control: Control, kind: Kind) -> int:
