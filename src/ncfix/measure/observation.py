@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.machine import Effect, Machine, State
+from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 
 LEVER = 100.0
@@ -136,12 +136,6 @@ class Observation(ABC):
         """The measurement with these values read."""
         rows = values[: len(self.measurement) * len(self.components)].reshape(-1, len(self.components))
         return self.measurement.with_columns(dict(zip(self.components, rows.T, strict=True)))
-
-    # -- for those that look at the tip -------------------------------------------------------------------------------
-
-    def tip_state(self) -> State:
-        """The state of each row."""
-        return self.state
 
 
 def repeatability(measurement: Measurement, components: tuple[str, ...], angular: tuple[bool, ...]) -> float | None:
