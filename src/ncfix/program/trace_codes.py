@@ -177,7 +177,8 @@ TRACE_CODES: dict[str, Code] = {
     ),
     "NCF233": Code(
         "Endless program",
-        "More blocks were executed than ncfix follows: a loop does not end.",
+        "The program jumps back where it did before, and nothing has changed in between; or more blocks were executed "
+        "than ncfix follows.",
         "Check the condition of the loop.",
     ),
     "NCF234": Code(
@@ -231,9 +232,10 @@ TRACE_CODES: dict[str, Code] = {
         "The message names it.",
     ),
     "NCF243": Code(
-        "Several ways to turn to a tilted plane",
-        "G53.1 turns the rotary axes until the tool stands square to the plane, and there is more than one way. Which "
-        "one a control takes depends on its parameters and on its travels; here it is the nearest.",
+        "Several ways to turn the tool",
+        "G53.1 turns the rotary axes until the tool stands square to a plane, I J K of G43.5 until it points along a "
+        "vector, and there is more than one way. Which one a control takes depends on its parameters and on its "
+        "travels; here it is the nearest.",
         "State the rotary axes in the program if they are others.",
     ),
     "NCF244": Code(

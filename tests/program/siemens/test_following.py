@@ -244,9 +244,17 @@ def test_what_is_not_given_is_asked_for() -> None:
     assert texts == ["length of tool DRILL 8.5 is used and not given", "work offset G54 is used and not given"]
 
 
-def test_a_frame_over_a_transformation_is_said() -> None:
-    assert [message.code for message in follow("TRANS X1\nTRAORI\nG0 X1 Y1 Z1").messages] == ["NCF255"]
-    assert not follow("G54\nTRAORI\nTRANS X1\nG0 X1 Y1 Z1\nTRANS\nTRAFOOF").messages
+def test_a_frame_over_a_transformation_is_refused() -> None:
+    text = "TRANS X1\nTRAORI\nG0 X1 Y1 Z1"
+    assert "was in force at TRAORI" in reasons(follow(text))[0]
+    assert not any(reasons(follow(f"{text}\nTRANS X1\nG0 X1 Y1 Z1"))[1:])
+    assert not any(reasons(follow(text, variables={"$MN_FRAME_GEOAX_CHANGE_MODE": 1.0})))
+    assert not any(reasons(follow("G54\nTRAORI\nTRANS X1\nG0 X1 Y1 Z1\nTRANS\nTRAFOOF")))
+
+
+def test_a_modal_cycle_drills_behind_machine_positions_too() -> None:
+    assert xs("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3\nMCALL\nG0 X4") == pytest.approx([0, 3, 3, 3, 4])
+    assert last(follow("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3"))[2] == pytest.approx(5)
 
 
 def test_an_axis_that_the_machine_lacks_is_named() -> None:

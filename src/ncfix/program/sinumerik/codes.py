@@ -34,12 +34,6 @@ SINUMERIK_CODES: dict[str, Code] = {
         "A3 B3 C3 have no length, or the rotary axes of the machine cannot point the tool that way.",
         "Check the vector, and that the machine file is that of the machine the program was written for.",
     ),
-    "NCF255": Code(
-        "Frame over a transformation",
-        "TRAORI goes on or off while a programmed frame (TRANS, ROT, SCALE, MIRROR) is in force. Whether the control "
-        "keeps it depends on its machine data; here it stays.",
-        "Program the frame anew after TRAORI or TRAFOOF.",
-    ),
     "NCF257": Code(
         "Another transformation",
         "TRAORI(2) and further ones are what the machine's data say: another head, or other rotary axes. The tool is "

@@ -32,7 +32,11 @@ from ncfix.program.sinumerik.vocabulary import (
 from ncfix.program.tree import Call, Expression, NamedParameter
 
 CONFLICT = "NCF208"
-FRAME_STAYS = "NCF255"
+FRAMES_STAY = "$mn_frame_geoax_change_mode"
+FRAME_OVER = (
+    "a programmed frame (TRANS, ROT, ...) was in force at {}, and whether it stays is for machine data: "
+    'program it anew, or variables."$MN_FRAME_GEOAX_CHANGE_MODE" = 1 in the setup file'
+)
 OTHER_TRANSFORMATION = "NCF257"
 SWITCHED_ON = (
     "whether CYCLE832 switches TRAORI on depends on the version of the control: "
@@ -149,7 +153,7 @@ def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
 
 def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAORI."""
-    warn_of_frame(control, step)
+    mind_frame(control, step)
     control.suspended.pop("traori", None)
     if len(step.written) > 1:
         control.suspended["traori"] = "TRAORI with a direction of the tool of its own is in force"
@@ -168,17 +172,16 @@ def tolerance(control: Sinumerik, step: Calling) -> None:
         control.suspended["traori"] = SWITCHED_ON
 
 
-def warn_of_frame(control: Sinumerik, step: Calling) -> None:
+def mind_frame(control: Sinumerik, step: Calling) -> None:
     """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
-    if control.frames.program != WORLD:
-        text = f"the programmed frame (TRANS, ROT, ...) is taken to stay in force over {step.name.upper()}"
-        control.warn(FRAME_STAYS, text, "program it anew after the transformation, or take it out before")
+    if control.frames.program != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
+        control.suspended["frame"] = FRAME_OVER.format(step.name.upper())
 
 
 def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
     """TRAFOOF."""
     if control.modes.transformed:
-        warn_of_frame(control, step)
+        mind_frame(control, step)
     control.modes.transformed = False
     end_unfollowed(control, turn, step)
     control.switch_tcp()
@@ -273,7 +276,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         return
     if plan.axes or words.values.keys() & MOVING or is_circle(control, words):
         motion.moved(control, words, frozenset(turn.special))
-        if control.modes.modal_cycle is not None and not turn.special:
+        if control.modes.modal_cycle is not None:
             drill(control, control.modes.modal_cycle)
 
 
