@@ -37,6 +37,12 @@ def point(k: int, per_row: int, rows: int) -> tuple[float, ...]:
     return x, y, z, b, math.degrees(math.atan2(-by_y, -by_x)) % 360
 
 
+def nearer(k: int, per_row: int, rows: int) -> tuple[float, ...]:
+    """The same surface half as large and about the middle of the table, so that under TCP no axis leaves its travel."""
+    x, y, z, b, c = point(k, per_row, rows)
+    return 100 + x / 2, 100 + y / 2, z / 2, b, c
+
+
 def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
     """What interrupts a mixed program at some of its points."""
     x, y, z, b, c = at

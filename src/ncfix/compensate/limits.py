@@ -6,13 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ncfix.compensate.excursion import surely_within
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import distinct
 from ncfix.compensate.rows import finite, lengths
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
 
 FUZZ = 1e-9
@@ -91,6 +92,8 @@ def _correction_excess(written: Written) -> Array:
     pieces = written.pieces
     each = np.arange(len(pieces))
     curved = written.intent.moves.tcp[pieces.move]
+    if curved.any():
+        curved[curved] = _may_leave(written.intent, written.joints, each[curved], written.done[curved])
     if pieces.arc.any():
         curved |= written.segments.arc
     found = excess(written.intent.machine, written.joints, each, curved, written.done)
@@ -176,7 +179,18 @@ def programmed_excess(written: Written) -> Array:
     intent = written.intent
     each = np.arange(len(intent.moves))
     ends = written.programmed if len(each) == len(written.pieces) else None
-    return excess(intent.machine, intent.joints_at, each, intent.curved, ends)
+    curved, led = intent.curved.copy(), np.flatnonzero(intent.moves.tcp & (intent.moves.kind != Kind.ARC))
+    if led.size:
+        curved[led] = _may_leave(intent, intent.joints_at, led, None if ends is None else ends[led])
+    return excess(intent.machine, intent.joints_at, each, curved, ends)
+
+
+def _may_leave(intent: Intent, joints: Joints, each: Index, ends: Array | None) -> Mask:
+    """(k,) which of these motions under tool-centre-point control may leave a range on their way; see `excess`."""
+    begin = joints(each, np.zeros(len(each)))
+    end = joints(each, np.ones(len(each))) if ends is None else ends
+    longest = float(np.nanmax(intent.moves.tool_length, initial=0.0))
+    return ~surely_within(intent.machine, begin, end, longest)
 
 
 def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:
