@@ -43,19 +43,22 @@ FANUC = Dialect(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
         "G90 G91, G20 G21, modal words; numbers without a decimal point by --no-point (never dropped, never added)",
         "G54 ... G59, G54.1 P, G52, G92, G10 L2 L10 L20, G68 G69, G51.1, tool lengths (G43 G44 G49, H alone)",
-        "TCP (G43.4) and tilted planes (G68.2 P0 and P1, G53.1, G69)",
+        "TCP (G43.4), the direction of the tool as a vector (G43.5 with I J K)",
+        "tilted planes by angles, points and vectors (G68.2 P0 ... P3, G53.1, G53.6, G69)",
         "canned cycles G73 G74 G76 G81 ... G89, G98 G99, L and K repeats: depth and R are corrected hole by hole",
         "corners that the control rounds or breaks (,R ,C)",
         "M98 M99 M198, G65 G66 G67, Macro B: variables, vacancy, IF GOTO THEN WHILE DO END, functions, modal system "
         "variables; blocks executed from several states with --flatten",
-        "polar coordinates (G15 G16) with --flatten",
+        "polar coordinates (G15 G16) and scaling (G50 G51, one factor) with --flatten",
         "G41 G42: the programmed contour is corrected, the control offsets it",
     ),
     passes=(
         "G53, G27, G28, G30, G31, the turn of G53.1, dwell (G4), G5.1, G8, G61 ... G64, tool change, other M codes",
+        "calls of programs that are in the control (O8000 to O9999: of a probe's maker or the machine's builder)",
     ),
     refuses=(
-        "G43.5, G68.3, G68.4, G68.2 P2 ... P4, G51, G12.1 while in force, threads, lines by their angle (,A)",
+        "G68.3, G68.4, G68.2 P4, G54.2, G54.4, G12.1 while in force, threads, lines by their angle (,A)",
+        "arcs and rotary words under G43.5, and its Q",
         "G29, and pockets and texts that the control mills by itself (Haas: G12, G13, G47, G150)",
         "a block that names one axis of the plane only, the first after G68 or G69",
         "what is computed from positions (#5001 ...), inputs and clocks: compensation or the machine changes it",
@@ -72,6 +75,10 @@ HAAS = replace(
     signature=(
         rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:(?:187|150)(?!\d)|154[ \t]*P|47[ \t]*[PE]|103[ \t]*P)",
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*97[ \t]*P",
+    ),
+    understands=(
+        *FANUC.understands,
+        "G154 P and G110 ... G129, M97, TCP (G234), the dynamic work offset (G254 G255)",
     ),
     semantics="haas",
 )

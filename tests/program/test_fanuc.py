@@ -231,6 +231,7 @@ def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str)
         ("G17G16\nG0X10.Y90.\nY180.\nX20.\nG15\nX1.", [[0, 10, 0], [-10, 0, 0], [-20, 0, 0], [1, 0, 0]]),
         ("G0X10.\nG16Y90.\nG15", [[10, 0, 0], [0, 10, 0]]),
         ("G0G18G16Z10.X90.\nG15X1.", [[10, 0, 0], [1, 0, 0]]),
+        ("G40.1G50.2\nG5.4Q1\nG54.4P0\nG54.2P0\nG0X1.", [[1, 0, 0]]),
         ("G5.1Q1\nG8P1\nG0X1.\nG5.1Q0", [[1, 0, 0]]),
     ],
 )
@@ -256,6 +257,8 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
         ("G68.2P4I10.\nG0X1.", "tilted plane (G68.2)"),
         ("G254\nG0X1.", "not known"),
         ("G10L50\nG0X1.", "parameters of the control"),
+        ("G54.4P1\nG0X1.", "the setting error of the workpiece (G54.4)"),
+        ("G54.2P2\nG0X1.", "the dynamic offset of the rotary table (G54.2)"),
         ("G10L2P0X1.\nG0X1.", "external work offset"),
         ("G66.1P1\nM30\nO1\nM99", ""),
         ("G12.1\nG0X1.", "polar interpolation (G12.1)"),

@@ -10,6 +10,7 @@ from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
 from ncfix.program.rs274.places import mask_of
+from ncfix.program.rs274.settings import AFTER_UNFOLLOWED
 from ncfix.program.rs274.systems import (
     SYSTEM_NAMES,
     activate,
@@ -32,6 +33,11 @@ MADE = {
 }
 """Motions that the control makes up."""
 
+SETTING_ERRORS = {
+    542: "the dynamic offset of the rotary table (G54.2), whose data are in the control, is in force",
+    544: "the setting error of the workpiece (G54.4), whose data are in the control, is in force",
+}
+
 LENGTHS = (10,)
 UNFOLLOWED = {
     11: "tool wear (G10 L11)",
@@ -47,6 +53,14 @@ def extended(control: Control, block: Block, code: int) -> None:
     """G154 Pn of Haas, and G110 (P1) to G129 (P20): an additional work offset."""
     number = (code - FIRST_EXTENDED) / 10 + 1 if code < ALL_EXTENDED else block.get("P", 1.0)
     extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
+
+
+def setting_error(control: Control, block: Block, code: int) -> None:
+    """G54.2 Pn and G54.4 Pn: offsets that turn with the tables; P0 ends them."""
+    if block.get("P") or block.runtime:
+        control.suspended[SETTING_ERRORS[code]] = SETTING_ERRORS[code]
+    elif control.suspended.pop(SETTING_ERRORS[code], None):
+        control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
 def made(control: Control, block: Block, code: int) -> None:

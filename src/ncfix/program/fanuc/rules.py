@@ -33,6 +33,8 @@ FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} 
     491: groups.LENGTH,
     531: groups.NON_MODAL,
     536: groups.NON_MODAL,
+    542: groups.NON_MODAL,
+    544: groups.NON_MODAL,
     270: groups.NON_MODAL,
     290: groups.NON_MODAL,
     682: groups.ROTATION,
@@ -48,7 +50,8 @@ FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} 
 ALL_CYCLES = frozenset((*groups.CYCLES, 760, 842, 843))
 """G76 bores here; G84.2 and G84.3 tap."""
 
-FANUC_HARMLESS = groups.ISO_HARMLESS_G - {630}
+FANUC_HARMLESS = (groups.ISO_HARMLESS_G - {630}) | {54, 401, 502, 805}
+"""G5.4 is about the servo drives; G40.1, G50.2 and G80.5 end what is refused where it begins."""
 
 FANUC_M = grouped(
     STOP=(0, 10, 20, 300),
@@ -77,6 +80,8 @@ FANUC = Rules(
         511: mirror.mirror,
         531: tilt.align,
         536: tilt.align,
+        542: data.setting_error,
+        544: data.setting_error,
         680: tilt.rotate,
         682: tilt.tilt,
         683: tilt.tilt,
