@@ -116,14 +116,26 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
     return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
 
 
-def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless: bool) -> Scan | None:
-    """As `scan`, compiled; None where there are blocks that must be taken as they are."""
+def scan_compiled(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    pointless: bool,
+    comments: bytes = b"(;",
+    fixed: NDArray[np.bool_] = FIXED,
+    odd: NDArray[np.bool_] = ODD,
+) -> Scan | None:
+    """As `scan`, compiled; None where there are blocks that must be taken as they are.
+
+    comments  the characters with which comments begin
+    fixed     a number after these belongs to the shape
+    odd       bytes that a block may not hold
+    """
     from ncfix.program import kernels
 
     kinds = np.zeros(256, dtype=np.uint8)
-    for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (ODD, kernels.ODD)):
+    for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (odd, kernels.ODD)):
         kinds[members] = kind
-    kinds[list(b"(;")] = kernels.COMMENT
+    kinds[list(comments)] = kernels.COMMENT
     n, most = len(blocks), len(text) // 2 + 1
     group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
     spans, values = np.empty((most, 2), np.int64), np.empty(most)
@@ -131,7 +143,7 @@ def scan_compiled(text: NDArray[np.uint8], blocks: NDArray[np.int64], pointless:
     known = kernels.scan(
         text,
         np.ascontiguousarray(blocks),
-        (kinds, FIXED, UNSIGNED_AFTER, BLANK),
+        (kinds, fixed, UNSIGNED_AFTER, BLANK),
         (BLANKS, EXACT_DIGITS),
         (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
         POWERS,

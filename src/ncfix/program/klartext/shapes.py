@@ -7,8 +7,20 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import NUMERIC, find_numbers, table
-from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, odd_blocks, shape_keys, split_blocks
+from ncfix import fast
+from ncfix.program.numbers import find_numbers, is_numeric, table
+from ncfix.program.shapes import (
+    NUMBER_MARK,
+    ODD,
+    Scan,
+    block_of,
+    cover,
+    first_numbers,
+    odd_blocks,
+    scan_compiled,
+    shape_keys,
+    split_blocks,
+)
 
 COMMENT = re.compile(rb";[^\r\n]*")
 JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
@@ -16,6 +28,12 @@ JOINED = re.compile(rb"~[ \t]*(?=\r*\n)")
 
 FIXED = table(b"QqRrMmNn")
 """A number after these belongs to the shape, or may: `Q5`, `R0`, `M3`; the grammar is asked for each such shape."""
+
+WITHIN_NONE = ODD | table(b"\x0b")
+"""What no block with a shape holds: line ends, too."""
+
+SMALL = 1 << 14
+"""Bytes of text that are not parted any more to find the block in it that has no shape."""
 
 COMMAS = bytes.maketrans(b",\n", b".\x0b")
 """Decimal commas as points, and line ends within a block as blanks: for the scan only, which counts bytes."""
@@ -37,22 +55,47 @@ def split(source: bytes) -> NDArray[np.int64]:
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
     text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
-    comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
+    if fast.engaged():
+        found = scan_compiled(text, blocks, False, b";", FIXED, WITHIN_NONE)
+        if found is not None:
+            return found
+        if len(source) > SMALL and len(blocks) > 1:
+            return in_halves(source, blocks)
+    return scan_plain(source, text, blocks)
+
+
+def in_halves(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """As `scan`, where some block has to be taken as it is: the others need not be."""
+    middle = len(blocks) // 2
+    at = int(blocks[middle, 0])
+    first, second = scan(source[:at], blocks[:middle]).expanded(), scan(source[at:], blocks[middle:] - at).expanded()
+    comment = np.where(second.comment < 0, second.comment, second.comment + at)
+    return Scan(
+        first.shapes + second.shapes,
+        np.concatenate((first.comment, comment)),
+        np.concatenate((first.first_number[:-1], second.first_number + first.first_number[-1])),
+        np.concatenate((first.spans, second.spans + at)),
+        np.concatenate((first.values, second.values)),
+    )
+
+
+def scan_plain(source: bytes, text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> Scan:
+    """As `scan`, with numpy alone; `text` has points for commas."""
+    found = COMMENT.finditer(source) if b";" in source else ()
+    comments = np.array([match.span() for match in found], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
-    numbers = find_numbers(text, NUMERIC[text] & ~cover(len(text), comments[:, 0], comments[:, 1]), FIXED)
-    block_of_number = block_of(blocks, numbers.spans[:, 0])
+    numeric = is_numeric(text)
+    if len(comments):
+        numeric &= ~cover(len(text), comments[:, 0], comments[:, 1])
+    numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    shapes = shape_keys(text, blocks, numbers.spans, comments, marks)
-    for block in {
-        *block_of_number[numbers.broken].tolist(),
-        *odd_blocks(text, blocks),
-        *of_several_lines(text, blocks),
-    }:
+    shapes = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
+    broken = block_of(blocks, numbers.spans[numbers.broken, 0]).tolist()
+    for block in {*broken, *odd_blocks(text, blocks), *of_several_lines(text, blocks)}:
         shapes[block] = None
-    first_number = np.searchsorted(block_of_number, np.arange(len(blocks) + 1))
-    return Scan(shapes, comment, first_number, numbers.spans, numbers.values)
+    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
 
 
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:
