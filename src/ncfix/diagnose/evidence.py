@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from ncfix.diagnose.background import PRIOR, SHARES, Background, marginal
@@ -21,6 +22,8 @@ from ncfix.measure.measurement import Array, Index
 
 SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 """um: sizes of an effect at the tool tip that are considered."""
+FALLEN = 12.0
+"""A share of the background that is less likely than another by this log likelihood adds nothing."""
 
 
 @dataclass(frozen=True)
@@ -33,17 +36,19 @@ class Member:
 
 @dataclass(frozen=True, repr=False)
 class Inner:
-    """Inner products with the covariance of the background at one share.
+    """Inner products of the data with the covariance of the background at one share.
 
-    projected    (p,) of all columns with the data; squares of the data with themselves
+    projected    (p,) with all columns; squares with themselves
     determinant  log determinant of the covariance
-    blocks       for each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)
     """
 
     projected: Array
     squares: float
     determinant: float
-    blocks: list[tuple[Index, Index, Array]]
+
+
+Blocks = list[tuple[Index, Index, Array]]
+"""For each width: numbers of the groups, their columns (g, w), their inner products (g, w, w)."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,9 @@ class Court:
     names: tuple[str, ...] = field(init=False)
     rivals: tuple[str, ...] = field(init=False)
     inner: dict[float, Inner] = field(init=False, default_factory=dict)
+    blocks: dict[float, Blocks] = field(init=False, default_factory=dict)
+    pairs: dict[tuple[float, int, int], Array] = field(init=False, default_factory=dict)
+    products: dict[tuple[float, int], Array] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         """Carry everything into the coordinates, once."""
@@ -108,16 +116,18 @@ class Court:
 
         beside  further columns in the coordinates that are there at unit size
         """
-        share, known = self.share(members, beside), self._known(members, beside)
+        share = self.share(members, beside)
         inner, freedom = self._inner(share), self.background.freedom
-        weighed = known / self.background.variance(share)[:, None]
-        factor = np.linalg.cholesky(np.eye(known.shape[1]) + known.T @ weighed)
-        taken = solve_triangular(factor, weighed.T @ self.columns, lower=True)
-        own = solve_triangular(factor, weighed.T @ self.y, lower=True)
+        factor, own = self._solved(members, beside, share)
+        across = [m.size * self._products(share, m.group) for m in members]
+        if beside is not None:
+            across.append((beside / self.background.variance(share)[:, None]).T @ self.columns)
+        taken = np.concatenate([np.zeros((0, self.columns.shape[1])), *across])
+        taken = solve_triangular(factor, taken, lower=True, check_finite=False)
         total, count = inner.squares - float(own @ own) + freedom, len(self.y) + freedom
         projected = inner.projected - taken.T @ own
         odds = np.empty((len(self.groups), len(SIZES)))
-        for groups, places, blocks in inner.blocks:
+        for groups, places, blocks in self._blocks(share):
             lost = np.moveaxis(taken[:, places], 0, 1)
             odds[groups] = log_odds(blocks - np.swapaxes(lost, 1, 2) @ lost, projected[places], total, count)
         return Heard(odds)
@@ -132,52 +142,94 @@ class Court:
 
     def squares(self, members: Sequence[Member], share: float) -> float:
         """The sum of squares of the data in units of their covariance with these members."""
-        known, variance = self._known(members, None), self.background.variance(share)
-        weighed = known / variance[:, None]
-        own = weighed.T @ self.y
-        inner = np.eye(known.shape[1]) + known.T @ weighed
-        return float((self.y**2 / variance).sum() - own @ np.linalg.solve(inner, own))
+        _, own = self._solved(members, None, share)
+        return self._inner(share).squares - float(own @ own)
 
     def _likelihoods(self, members: Sequence[Member], beside: Array | None) -> Array:
-        """For every share, its probability beforehand counted in, (shares,)."""
-        known, freedom, found = self._known(members, beside), self.background.freedom, []
-        for share, prior in zip(SHARES, PRIOR, strict=True):
-            variance = self.background.variance(share)
-            weighed = known / variance[:, None]
-            factor = np.linalg.cholesky(np.eye(known.shape[1]) + known.T @ weighed)
-            own = solve_triangular(factor, weighed.T @ self.y, lower=True)
-            squares = float((self.y**2 / variance).sum() - own @ own)
-            determinant = float(np.log(variance).sum() + 2 * np.log(np.diag(factor)).sum())
-            found.append(marginal(squares, determinant, len(self.y), freedom) + np.log(prior))
-        return np.array(found)
+        """For every share, its probability beforehand counted in, (shares,); -inf for those far from the likeliest.
 
-    def _known(self, members: Sequence[Member], beside: Array | None) -> Array:
-        """Columns of what is there at unit size, (n, k)."""
-        there = [np.zeros((len(self.y), 0)), *(self.columns[:, self.part(m.group)] * m.size for m in members)]
-        return np.concatenate(there if beside is None else [*there, beside], axis=1)
+        It has one peak: from the middle share on, each side is followed until it has fallen by `FALLEN`.
+        """
+        found, middle = np.full(len(SHARES), -np.inf), len(SHARES) // 2
+        for side in (range(middle, -1, -1), range(middle + 1, len(SHARES))):
+            for k in side:
+                found[k] = self._likelihood(members, beside, SHARES[k]) + np.log(PRIOR[k])
+                if found[k] < found.max() - FALLEN:
+                    break
+        return found
+
+    def _likelihood(self, members: Sequence[Member], beside: Array | None, share: float) -> float:
+        factor, own = self._solved(members, beside, share)
+        inner = self._inner(share)
+        determinant = inner.determinant + 2 * float(np.log(np.diag(factor)).sum())
+        return marginal(inner.squares - float(own @ own), determinant, len(self.y), self.background.freedom)
+
+    def _solved(self, members: Sequence[Member], beside: Array | None, share: float) -> tuple[Array, Array]:
+        """The Cholesky factor of 1 + K'V^-1 K for the columns K of what is there, and what it makes of K'V^-1 y."""
+        inner, seen = self._gram(members, beside, share)
+        factor = cholesky(inner, lower=True, overwrite_a=True, check_finite=False)
+        return factor, solve_triangular(factor, seen, lower=True, check_finite=False)
+
+    def _gram(self, members: Sequence[Member], beside: Array | None, share: float) -> tuple[Array, Array]:
+        """Identity and inner products of what is there, (k, k), the lower half, and those with the data, (k,)."""
+        parts, sizes = [self.part(m.group) for m in members], [m.size for m in members]
+        bounds = np.cumsum([0, *(part.stop - part.start for part in parts), 0 if beside is None else beside.shape[1]])
+        places = [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+        whole, seen = np.eye(int(bounds[-1])), np.zeros(int(bounds[-1]))
+        for k, own in enumerate(places[: len(members)]):
+            seen[own] = sizes[k] * self._inner(share).projected[parts[k]]
+            for j, other in enumerate(places[: k + 1]):
+                products = sizes[k] * sizes[j] * self._pair(share, members[k].group, members[j].group)
+                whole[own, other] += products
+        if beside is not None:
+            weighed, last = beside / self.background.variance(share)[:, None], places[-1]
+            seen[last] = weighed.T @ self.y
+            whole[last, last] += beside.T @ weighed
+            for own, part, size in zip(places, parts, sizes, strict=False):
+                whole[last, own] = size * weighed.T @ self.columns[:, part]
+        return whole, seen
+
+    def _products(self, share: float, group: int) -> Array:
+        """The inner products of a group's columns with all, (w, p); computed once."""
+        key = share, group
+        if key not in self.products:
+            weighed = self.columns[:, self.part(group)] / self.background.variance(share)[:, None]
+            self.products[key] = weighed.T @ self.columns
+        return self.products[key]
+
+    def _pair(self, share: float, first: int, second: int) -> Array:
+        """The inner products of two groups' columns, (v, w); computed once."""
+        key = share, first, second
+        if key not in self.pairs:
+            weighed = self.columns[:, self.part(second)] / self.background.variance(share)[:, None]
+            self.pairs[key] = self.columns[:, self.part(first)].T @ weighed
+        return self.pairs[key]
 
     def _inner(self, share: float) -> Inner:
-        """The inner products with this share of the background; computed once."""
+        """What the data show with this share of the background; computed once."""
         if share not in self.inner:
             variance = self.background.variance(share)
-            blocks = []
+            weighed = self.y / variance
+            self.inner[share] = Inner(self.columns.T @ weighed, float(self.y @ weighed), float(np.log(variance).sum()))
+        return self.inner[share]
+
+    def _blocks(self, share: float) -> Blocks:
+        """The inner products of all groups with themselves; computed once."""
+        if share not in self.blocks:
+            variance, self.blocks[share] = self.background.variance(share), []
             for alike in self._by_width().values():
                 places = np.array([range(self.part(k).start, self.part(k).stop) for k in alike], dtype=np.int64)
                 stack = np.stack([self.columns[:, self.part(k)] for k in alike])
                 products = np.swapaxes(stack, 1, 2) @ (stack / variance[:, None])
-                blocks.append((np.asarray(alike), places.reshape(len(alike), -1), products))
-            weighed = self.y / variance
-            determinant = float(np.log(variance).sum())
-            self.inner[share] = Inner(self.columns.T @ weighed, float(self.y @ weighed), determinant, blocks)
-        return self.inner[share]
+                self.blocks[share].append((np.asarray(alike), places.reshape(len(alike), -1), products))
+        return self.blocks[share]
 
     def numbers(self, members: Sequence[Member], share: float) -> list[Array]:
         """The most probable numbers behind each member when all are fitted, per um."""
         if not members:
             return []
-        known = self._known(members, None)
-        weighed = known / self.background.variance(share)[:, None]
-        found = np.linalg.solve(known.T @ weighed + np.eye(known.shape[1]), weighed.T @ self.y)
+        factor, own = self._solved(members, None, share)
+        found = solve_triangular(factor, own, lower=True, trans="T", check_finite=False)
         widths = [self.groups[m.group].columns.shape[1] for m in members]
         parts = np.split(found, np.cumsum(widths)[:-1])
         return [m.size * part for m, part in zip(members, parts, strict=True)]

@@ -18,6 +18,10 @@ ALIKE = 3.0
 """Log odds (20 to 1) within which another name explains a member's part as well."""
 TOGETHER = 3
 """Names that are tried as a whole where none helps by itself."""
+NEARLY = 20.0
+"""Log odds within which these must come to what is there, before they are helped by what has no name."""
+WEIGHED = 5
+"""Of all changes so many, the best at first sight, are weighed with all care."""
 HELPS = 0.1
 """Log odds by which a change must help."""
 
@@ -66,8 +70,9 @@ def select(scale: Scale, offered: Sequence[str], start: Members | None = None) -
         found = _climbed(scale, [name for name in offered if name != out], others, fixed)
         members = _better(scale, members, found)
     if any(name in scale.court.rivals for name in members if name not in fixed):
-        found = _climbed(scale, offered, _together(scale, offered, fixed), fixed)
-        members = _better(scale, members, found)
+        found = _climbed(scale, names_of(scale, offered), _together(scale, offered, fixed), fixed)
+        if scale.weight(found) > scale.weight(members) - NEARLY:
+            members = _better(scale, members, _climbed(scale, offered, found, fixed))
     return members
 
 
@@ -77,20 +82,32 @@ def _better(scale: Scale, members: dict[str, Member], found: dict[str, Member]) 
 
 def _together(scale: Scale, offered: Sequence[str], members: Members) -> dict[str, Member]:
     """Some names more, the likeliest one after another, whether they help or not."""
-    names, found = [name for name in offered if name in scale.court.names], dict(members)
+    names, found = names_of(scale, offered), dict(members)
     for _ in range(TOGETHER):
         tried = [{**found, name: each} for name, each in likeliest(scale, names, found).items()]
         found = max(tried, key=scale.weight, default=found)
     return found
 
 
+def names_of(scale: Scale, offered: Sequence[str]) -> list[str]:
+    """Those on offer that have a name."""
+    return [name for name in offered if name in scale.court.names]
+
+
 def _climbed(scale: Scale, offered: Sequence[str], members: Members, fixed: Members) -> dict[str, Member]:
     """The best of all changes, again and again until none helps."""
     while True:
-        best = max(_changes(scale, offered, members, fixed), key=scale.weight)
+        best = max(_promising(scale, _changes(scale, offered, members, fixed), members), key=scale.weight)
         if scale.weight(best) <= scale.weight(members) + HELPS:
             return dict(members)
         members = best
+
+
+def _promising(scale: Scale, changes: list[dict[str, Member]], members: Members) -> list[dict[str, Member]]:
+    """Those that leave effects away, and of the others the best at first sight."""
+    fewer = [each for each in changes if len(each) <= len(members) and set(each) <= set(members)]
+    other = [each for each in changes if each not in fewer]
+    return fewer + sorted(other, key=scale.sketched, reverse=True)[:WEIGHED]
 
 
 def _changes(scale: Scale, offered: Sequence[str], members: Members, fixed: Members) -> list[dict[str, Member]]:

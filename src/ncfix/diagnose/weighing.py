@@ -62,22 +62,36 @@ class Scale:
     court: Court
     free: tuple[Member, ...] = ()
     weights: dict[frozenset[Member], float] = field(default_factory=dict)
+    sketches: dict[frozenset[Member], float] = field(default_factory=dict)
     asked: dict[frozenset[Member], Heard] = field(default_factory=dict)
 
     def weight(self, members: Members) -> float:
         """Log likelihood of the data with these members, less their prices."""
         key = frozenset(members.values())
         if key not in self.weights:
-            self.weights[key] = self._likelihood(members) - sum(map(self.price, members)) - margin(len(members))
+            self.weights[key] = self._likelihood(members) - self._paid(members)
         return self.weights[key]
+
+    def sketched(self, members: Members) -> float:
+        """The same at first sight: of effects that are shaped as in the catalogue."""
+        return self._plain(members) - self._paid(members)
+
+    def _paid(self, members: Members) -> float:
+        return sum(map(self.price, members)) + margin(len(members))
+
+    def _plain(self, members: Members) -> float:
+        key = frozenset(members.values())
+        if key not in self.sketches:
+            self.sketches[key] = self.court.likelihood(self.all(members))
+        return self.sketches[key]
 
     def _likelihood(self, members: Members) -> float:
         """Of effects shaped as in the catalogue, or a little otherwise: either in half of all machines."""
-        every, allowance = self.all(members), self.allowance(members)
-        plain = self.court.likelihood(every)
+        plain, allowance = self._plain(members), self.allowance(members)
         if allowance is None:
             return plain
-        return float(np.logaddexp(plain, self.court.likelihood(every, allowance)) - np.log(2))
+        misshapen = self.court.likelihood(self.all(members), allowance)
+        return float(np.logaddexp(plain, misshapen) - np.log(2))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
