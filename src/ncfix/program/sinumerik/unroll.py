@@ -1,7 +1,8 @@
 """Blocks of SINUMERIK written down as they are executed, for a flat program.
 
-A block goes out as it stands, without its number and labels. Expressions give way to their values; assignments,
-definitions, control structures, calls of subprograms and their heads fall away.
+A block goes out as it stands, without its number and labels. Expressions give way to their values; definitions,
+assignments to what they define, control structures, calls of subprograms and their heads fall away. What others may
+read, R parameters, global data and those of the control, is set as it was.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from dataclasses import dataclass, field
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.sinumerik.plans import Calling
+from ncfix.program.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
 from ncfix.program.sinumerik.render import FORM
+from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.statements import Turn
 from ncfix.program.sinumerik.unit import Unit
-from ncfix.program.sinumerik.values import Scope
+from ncfix.program.sinumerik.values import number
+from ncfix.program.sinumerik.variables import Variables, key_of
 from ncfix.program.sinumerik.vocabulary import FORMS, HARMLESS
 from ncfix.program.tree import (
     Assignment,
@@ -28,7 +31,9 @@ from ncfix.program.tree import (
     Flow,
     Item,
     Literal,
+    NamedParameter,
     Opaque,
+    Parameter,
     Span,
     Text,
     Unary,
@@ -57,7 +62,7 @@ class Recorder:
     limit: int
     lines: list[FlatLine] = field(default_factory=list)
 
-    def record(self, scope: Scope, unit: Unit, block: int, turn: Turn, *, main: bool, line: int) -> None:
+    def record(self, scope: Sinumerik, unit: Unit, block: int, turn: Turn, *, main: bool, line: int) -> None:
         """Write a block down as it is executed."""
         if len(self.lines) >= self.limit:
             raise Fault(TOO_LONG, f"the flat program would have more than {self.limit} lines")
@@ -77,11 +82,13 @@ class Recorder:
         if text.split(";")[0].strip() or (main and text):
             self.lines.append(FlatLine(text, line))
 
-    def rewritten(self, scope: Scope, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
+    def rewritten(self, scope: Sinumerik, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
         """The stretch of an item that changes and what it becomes (None: a number); None where the item stays."""
         match item:
-            case Assignment() | Flow():
+            case Flow():
                 return item.span, ""
+            case Assignment():
+                return self.assignment(scope, item, turn)
             case Word():
                 return self.word(item, turn, main=main)
             case Command():
@@ -100,6 +107,30 @@ class Recorder:
             return word.span, ""
         return None if is_plain(word.value) else (word.value_span, None)
 
+    def assignment(self, scope: Sinumerik, item: Assignment, turn: Turn) -> tuple[Span, str | None] | None:
+        """What becomes of an assignment; the block has been executed, so the variable has its value already."""
+        step = next(step for step in turn.plan.steps if isinstance(step, Letting) and step.span == item.span)
+        variables = scope.variables
+        if variables.scope_of(step.name) is not None:
+            return item.span, ""
+        parts = indices(item.target)
+        if is_plain(item.value) and all(part is not None and (is_plain(part) or is_name(part)) for part in parts):
+            return None
+        places = [number(part(scope)) for part in step.index]
+        known = tuple(place for place in places if place is not None)
+        value = variables.value((step.name, known) if known else step.name)
+        if value is None and not any(has_value(variables, name) for name in names_in(item.value)):
+            return None
+        if value is None or len(known) < len(places) or step.value is None:
+            raise Fault(RUNTIME, f"what {step.name.upper()} is set to is known only at run time")
+        return item.span, f"{self.target(step.name, known)}={assigned(value)}"
+
+    def target(self, name: str, places: tuple[float, ...]) -> str:
+        """What gets a value, as it is written."""
+        if name == "r":
+            return f"R{places[0]:.0f}"
+        return name.upper() + (f"[{','.join(written(place, 0) for place in places)}]" if places else "")
+
     def number(self, item: Item, turn: Turn, text: str) -> str:
         """The value of a computed word as it is written, within its brackets if it has a form."""
         assert isinstance(item, Word)
@@ -114,7 +145,7 @@ class Recorder:
         found = FORM.match(text) if isinstance(item.value, Call) and item.value.name in FORMS else None
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
-    def command(self, scope: Scope, command: Command, turn: Turn) -> tuple[Span, str | None] | None:
+    def command(self, scope: Sinumerik, command: Command, turn: Turn) -> tuple[Span, str | None] | None:
         """What becomes of a name."""
         if command.name in ("def", "ret") or (turn.called is not None and turn.called.span == command.span):
             return command.span, ""
@@ -144,6 +175,26 @@ def is_plain(value: Expression) -> bool:
     return False
 
 
+def indices(target: Parameter | NamedParameter | Call) -> tuple[Expression | None, ...]:
+    """The indices of what gets a value."""
+    match target:
+        case Parameter(index):
+            return (index,)
+        case Call(_, arguments):
+            return arguments
+    return ()
+
+
+def has_value(variables: Variables, name: str) -> bool:
+    """Whether a name in an expression is, or may be, that of a variable whose value is known."""
+    return name == ANY_PARAMETER or variables.value(key_of(name)) is not None
+
+
+def is_name(value: Expression) -> bool:
+    """Whether an index is a name, as that of an axis."""
+    return isinstance(value, NamedParameter)
+
+
 def is_head(turn: Turn) -> bool:
     """Whether the block is the first line of a program of an archive, and no PROC."""
     return not turn.plan.steps
@@ -154,6 +205,11 @@ def argument(value: float | str | None) -> str:
     if value is None:
         return ""
     return f'"{value}"' if isinstance(value, str) else written(value, OTHER_DECIMALS)
+
+
+def assigned(value: float | str) -> str:
+    """A value that a variable gets, to all digits."""
+    return f'"{value}"' if isinstance(value, str) else f"{value:.15g}".replace("e", "EX")
 
 
 def written(value: float, digits: int) -> str:

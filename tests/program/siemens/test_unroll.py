@@ -1,0 +1,38 @@
+"""Flat SINUMERIK programs set whatever others may read, as the program did."""
+
+from __future__ import annotations
+
+import pytest
+
+from ncfix.diagnostics import SourceError
+from ncfix.program.flatten import flatten
+from ncfix.program.reader import read
+from program.siemens.following import KNOWN
+
+
+def flat(text: str) -> list[str]:
+    """The lines of the flat program."""
+    program = read(f"{text}\nM30\n".encode(), "part.mpf", "siemens")
+    found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), {"X": 1e-3, "Y": 1e-3, "Z": 1e-3})
+    return found.program.source.decode().split("\n")[:-2]
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("CTOL=0.01 ACC[X]=50\n$A_OUT[1]=1", ["CTOL=0.01 ACC[X]=50", "$A_OUT[1]=1"]),
+        ("FXS[X]=1\nG0 X1", ["FXS[X]=1", "G0 X1"]),
+        ("R5=3\nR6=R5/2 R7=R6*1EX-9", ["R5=3", "R6=1.5 R7=1.5EX-09"]),
+        ("DEF REAL DEEP=2\nDEEP=DEEP+1\nG0 Z=DEEP", ["G0 Z=3"]),
+        ('_TXT="A"<<2\n_GUD=TRUE', ['_TXT="A2"', "_GUD=1"]),
+        ("FOR R1=1 TO 2\n$A_OUT[R1]=R1*2\nR[R1+5]=R1\nENDFOR", ["$A_OUT[1]=2", "R6=1", "$A_OUT[2]=4", "R7=2"]),
+        ("R8=$AA_IW[X]", ["R8=$AA_IW[X]"]),
+    ],
+)
+def test_assignments(text: str, lines: list[str]) -> None:
+    assert flat(text) == lines
+
+
+def test_what_is_known_at_run_time_only_and_counts_on_others() -> None:
+    with pytest.raises(SourceError, match="R8 is set to is known only at run time|R is set to"):
+        flat("FOR R1=1 TO 2\nR8=$AA_IW[X]+R1\nENDFOR")
