@@ -32,7 +32,7 @@ SIEMENS = Dialect(
         "CYCLE800 axis by axis, by solid or projected angles",
         "CYCLE81 ... CYCLE89, CYCLE840 where the axes stand or by MCALL",
         "polar AP= RP= with G110 ... G112, lines and arcs about the pole",
-        "G41 G42: the programmed contour is corrected, the control offsets it",
+        "G41 G42 and CUT3D with surface normals: the programmed contour is corrected, the control offsets it",
     ),
     passes=(
         "SUPA, G53, G153, G74, G75, MEAS, the turn of CYCLE800, the depth of drilling cycles, dwell (G4), tool change, "
@@ -42,7 +42,8 @@ SIEMENS = Dialect(
         "what depends on values known at run time only: global data, $ variables, parameters of a PROC by itself",
         "splines, POLY, threads, soft approach, POS and POSA, TRANSMIT, TRACYL, TOROT, coupled axes, fixed stops, axes "
         "and G codes named by variables",
-        "LEAD and TILT, surface normals, directions under ORIMKS; CYCLE800 by rotary axes, or without turning them",
+        "LEAD and TILT, ORIPATH, directions under ORIMKS in turned frames; CYCLE800 by rotary axes, or without turning",
+        "increments after a frame or tool length has changed; programmed frames over TRAORI; DIAM90 with increments",
         "holes and pockets that a cycle makes up; everything after a block or synchronized action not understood",
         "blocks executed from several states, without --flatten",
     ),
