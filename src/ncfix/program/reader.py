@@ -163,11 +163,15 @@ class Reading:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
             return Columns(np.diff(found.first_number), moved_by(found.spans, self.blocks[first, 0]), found.values)
-        found = found.expanded()
         exact: dict[int, Parsed] = {}
-        for row, shape in enumerate(found.shapes):
-            template = self.index.get(shape)
-            self.take(self.learn(first, row, found, exact) if template is None else template)
+        if found.group is not None:
+            known = [known[group] for group in found.group.tolist()]
+        found = found.expanded()
+        lacking = [row for row, template in enumerate(known) if template is None]
+        self.take(np.array([-1 if template is None else template for template in known], dtype=np.int32))
+        for row in lacking:
+            template = self.index.get(found.shapes[row])
+            self.rows[first + row] = self.learn(first, row, found, exact) if template is None else template
         counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
         return Columns(counts, spans + self.blocks[first, 0], values)
 
@@ -202,9 +206,9 @@ class Reading:
             self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
         return Columns(np.zeros(count, np.int64), np.empty((0, 2), np.int64), np.empty(0))
 
-    def take(self, templates: NDArray[np.int32] | int) -> None:
-        """Note the templates of the next blocks, or the one of the next block."""
-        stop = self.done + (1 if isinstance(templates, int) else len(templates))
+    def take(self, templates: NDArray[np.int32]) -> None:
+        """Note the templates of the next blocks."""
+        stop = self.done + len(templates)
         self.rows[self.done : stop] = templates
         self.done = stop
 

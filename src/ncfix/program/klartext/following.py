@@ -26,10 +26,20 @@ from ncfix.program.language import Run
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.rs274.following import PartFollower
-from ncfix.program.tree import Program
+from ncfix.program.tree import Command, Program, Template
 
 ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)
 """Statements that lead to other programs, or depend on what follows: elements of free contours (FK)."""
+
+
+POLES = frozenset({"c", "cc", "cp", "ctp", "lp"})
+"""Path functions that set a pole or go by one; approaches and departures in polar words do, too."""
+
+
+def has_to_do_with_poles(template: Template) -> bool:
+    """Whether blocks of a shape set a pole or may go by one."""
+    names = (item.name for item in template.items if isinstance(item, Command))
+    return any(name in POLES or name.startswith(("appr p", "dep p")) for name in names)
 
 
 class PartInterpreter(Interpreter):
@@ -72,14 +82,18 @@ class PartInterpreter(Interpreter):
 class KlartextFollower(PartFollower):
     """See `parts.Follower`.
 
-    comma  the parts so far have decimal commas; None before the first one
+    comma   the parts so far have decimal commas; None before the first one
+    shapes  how many shapes have been looked at, and
+    polar   those of them that have to do with poles
     """
 
     control: Control
     comma: bool | None = None
+    shapes: int = 0
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
         super().__init__(Control(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        self.polar: list[int] = []
 
     @property
     def to_the_last(self) -> bool:
@@ -93,8 +107,7 @@ class KlartextFollower(PartFollower):
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""
         self._check_manner(program.source)
-        if poles_move(program.source) or (self.interpreter is not None and relies_at_once(program.source)):
-            raise NotInPartsError("what a pole is depends on an earlier part")
+        self._check_poles(program)
         moves = super().follow(program, last)
         self._check_turns(program, moves)
         pointing = self.control.pointing if self.control.points else None
@@ -106,6 +119,18 @@ class KlartextFollower(PartFollower):
         if (commas and points) or self.comma not in (None, bool(commas)):
             raise NotInPartsError("the program has decimal points and commas")
         self.comma = bool(commas)
+
+    def _check_poles(self, program: Program) -> None:
+        """Raise `NotInPartsError` where a pole was set in an earlier part, or counts from where the tool stands."""
+        templates = program.templates
+        self.polar += [shape for shape in range(self.shapes, len(templates)) if has_to_do_with_poles(templates[shape])]
+        self.shapes = len(templates)
+        blocks = np.flatnonzero(np.isin(program.template, self.polar)) if self.polar else np.empty(0, np.int64)
+        if not len(blocks):
+            return
+        relies = self.interpreter is not None and relies_at_once(program.text_of(int(blocks[0])).encode("latin-1"))
+        if relies or poles_move(program.source):
+            raise NotInPartsError("what a pole is depends on an earlier part")
 
     def _check_turns(self, program: Program, moves: Moves) -> None:
         """Raise `NotInPartsError` where a rotary axis comes from beyond zero or a full turn, and stays within them."""
