@@ -19,13 +19,6 @@ CYCLE = [
     "L \x01 X+5",
     "L X1.2.3",
 ]
-    "CYCL DEF 200 DRILLING ~",
-    "Q200=2 ;CLEARANCE 5 ~",
-    "Q201=-3,5 ;DEPTH",
-    "L X+1 ; a 5, b",
-    "L \x01 X+5",
-    "L X1.2.3",
-]
 
 
 def assert_same(source: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
