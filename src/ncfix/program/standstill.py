@@ -40,7 +40,8 @@ def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kin
     """The command (n_axes,) at the end of a motion in machine coordinates that is left as it is, under TCP.
 
     Axes of the machine that it moves go where they do anyway, the others stand where `position` (n_axes,) has them: the
-    turn of a tilted plane, or the retreat in machine coordinates. None for other motions.
+    turn of a tilted plane, or the retreat in machine coordinates. None for other motions, also for those of which a
+    control says that in coordinates of the tip fewer axes move.
     """
     state = _state(moves, row)
     if kinematics is None or not state.on or moves.rule[row] != Rule.PASS:
@@ -50,7 +51,10 @@ def passed_through(moves: Moves, row: int, position: FloatArray, kinematics: Kin
     start, end, now = (
         np.array(kinematics(each.tolist(), state, MACHINE)) for each in (moves.start[row], moves.end[row], position)
     )
-    return np.array(kinematics(np.where(np.abs(end - start) > ALIKE, end, now).tolist(), MACHINE, state))
+    moved, said = np.abs(end - start) > ALIKE, np.abs(moves.end[row] - moves.start[row]) > ALIKE
+    if moved.sum() >= said.sum():
+        return None
+    return np.array(kinematics(np.where(moved, end, now).tolist(), MACHINE, state))
 
 
 def _state(moves: Moves, row: int) -> TcpState:
