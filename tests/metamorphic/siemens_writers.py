@@ -191,6 +191,46 @@ def shifted(path: Route) -> str:
     return inner.replace("G54", "G54\nTRANS X5 Y-7 Z11")
 
 
+def within(path: Route, frame: str, rewritten: Callable[[re.Match[str]], str]) -> str:
+    """The same in a programmed frame, each word of a motion rewritten for it."""
+    text = re.sub(r"\b([XYZIJG])(-?[\d.]+)", rewritten, full(path).removeprefix(HEAD).removesuffix(TAIL))
+    return HEAD + frame + "\n" + text + "TRANS\n" + TAIL
+
+
+def mirrored(path: Route) -> str:
+    """In a mirrored frame arcs turn the other way."""
+    codes = {"2": "3", "3": "2"}
+
+    def word(found: re.Match[str]) -> str:
+        if found[1] == "G":
+            return "G" + codes.get(found[2], found[2])
+        return f"{found[1]}{(-1 if found[1] in 'XI' else 1) * float(found[2]):.3f}"
+
+    return within(path, "MIRROR X0", word)
+
+
+def scaled(path: Route) -> str:
+    """In a frame of half the size."""
+    return within(
+        path,
+        "SCALE X0.5 Y0.5 Z0.5",
+        lambda found: found[0] if found[1] == "G" else f"{found[1]}{2 * float(found[2]):.3f}",
+    )
+
+
+def rotated(path: Route) -> str:
+    """In a frame that is turned by a right angle."""
+    letters = {"X": ("Y", -1), "Y": ("X", 1), "I": ("J", -1), "J": ("I", 1), "Z": ("Z", 1)}
+
+    def word(found: re.Match[str]) -> str:
+        if found[1] == "G":
+            return found[0]
+        letter, sign = letters[found[1]]
+        return f"{letter}{sign * float(found[2]):.3f}"
+
+    return within(path, "ROT RPL=90", word)
+
+
 # -- five axes --------------------------------------------------------------------------------------------------------
 
 

@@ -20,6 +20,9 @@ Find = Callable[[str], Unit | None]
 
 NO_SUBPROGRAM = "NCF231"
 UNKNOWN_CYCLE = "NCF252"
+TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
+"""How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
+
 CALLED_BY_TEXT = frozenset({"call", "extcall"})
 FILE = re.compile(r"(?:^|[/:])(?:_N_)?(?P<name>\w+?)(?:_(?:SPF|MPF)|\.(?:SPF|MPF))?$", re.IGNORECASE)
 """A program named in a text, perhaps with a path."""
@@ -35,6 +38,11 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
     if unit is not None:
         turn.subprogram, turn.called, turn.arguments, turn.written = unit, step, step.arguments, step.written
         turn.times = round(turn.words.get("P", 1.0))
+        return
+    if step.name.startswith(TRANSFORMING):
+        control.suspended[step.name] = (
+            f"a transformation ({step.name.upper()}) is in force, which ncfix does not follow"
+        )
         return
     text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
