@@ -20,12 +20,11 @@ NUMBERS = ("1.5", "-0.25", "+3.75", "12", "-7", ".5", "-.125", "1234567.125", "0
 ADDED = (" A1.25", "C-3.5 ", "\nX1.5 Y2.5", "\nX1.5\nX2.5 B1.", " (NOTE 3)")
 
 
-@pytest.fixture(params=[False, True], ids=["plain", "compiled"])
-def _way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    if request.param:
-        pytest.importorskip("numba", reason="the `fast` extra is not installed")
-        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
-        assert fast.engage()
+@pytest.fixture(autouse=True)
+def _compiled(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    assert fast.engage()
     yield
     fast.disengage()
 
@@ -68,7 +67,6 @@ def assert_alike(found: Program, expected: Program) -> None:
     assert np.array_equal(np.signbit(found.numbers), np.signbit(expected.numbers))
 
 
-@pytest.mark.usefixtures("_way")
 @pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
 @pytest.mark.parametrize("odd", [0.0, 0.02])
 def test_as_the_whole_reader(dialect: str, odd: float) -> None:
@@ -86,7 +84,6 @@ def test_as_the_whole_reader(dialect: str, odd: float) -> None:
     assert quick >= 3
 
 
-@pytest.mark.usefixtures("_way")
 def test_numbers_of_all_kinds() -> None:
     """Those that are not clearly numbers like the ones before are read with their blocks."""
     rng, quick = random.Random(4), 0
@@ -104,7 +101,6 @@ def test_numbers_of_all_kinds() -> None:
     assert quick > 40
 
 
-@pytest.mark.usefixtures("_way")
 def test_every_byte_between_the_edits_counts() -> None:
     rng = random.Random(5)
     program = reader("linuxcnc").read(lines(rng, 60))
@@ -123,7 +119,6 @@ def test_every_byte_between_the_edits_counts() -> None:
         reread(reader("linuxcnc"), program, splices, text + b" ")
 
 
-@pytest.mark.usefixtures("_way")
 def test_a_wrong_digit_is_read_as_it_stands() -> None:
     rng = random.Random(6)
     program = reader("linuxcnc").read(lines(rng, 60))

@@ -116,7 +116,7 @@ class Bulk:
         parts: list[FloatArray] = []
         row = 0
         while row < len(self.moves):
-            ends = self.take(row, position, frame, decimals)
+            ends = self.take(row, position, frame, decimals, shortest=1)
             if ends is None:
                 return None
             parts.append(ends)
@@ -124,18 +124,21 @@ class Bulk:
             row = int(np.searchsorted(self.first_piece, done))
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
-    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+    def take(
+        self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray, shortest: int = SHORTEST
+    ) -> FloatArray | None:
         """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
 
         position  (n_axes,) the command at which the control stands
         decimals  (n_axes,) digits that the least increment needs
+        shortest  motions that it is worth to take together by columns
 
         Returns the commands (k, n_axes) at the ends of the pieces written, which are those of whole motions.
         """
         if fast.engaged():
             return self._compiled(row, position, frame, decimals)
         stop = min(int(self.stop[row]), row + LONGEST)
-        if stop - row < SHORTEST:
+        if stop - row < shortest:
             return None
         stretch = Stretch.of(self, row, stop, position, frame, decimals).clear_head()
         if not len(stretch.block):

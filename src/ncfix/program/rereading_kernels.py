@@ -1,4 +1,4 @@
-"""The second reading of a text, compiled: one pass over both texts, numbers and edits. As `reread.looked_at`."""
+"""The second reading of a text, compiled: one pass over both texts, the numbers and the edits."""
 
 from __future__ import annotations
 

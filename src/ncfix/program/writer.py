@@ -112,16 +112,16 @@ def spliced(source: bytes, splices: Splices) -> bytes:
         columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
         writing_kernels.spliced(text, *columns, data, out)
         return out.tobytes()
-    kept = ~cover(len(source), start, stop)
+    kept = ~_cover(len(source), start, stop)
     ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
     out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
-    new = cover(len(out), ends - splices.length, ends)
+    new = _cover(len(out), ends - splices.length, ends)
     out[new] = np.frombuffer(splices.data, dtype=np.uint8)
     out[~new] = np.frombuffer(source, dtype=np.uint8)[kept]
     return out.tobytes()
 
 
-def cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
     """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
     full = stops > starts
     change = np.zeros(size + 1, dtype=np.int8)
