@@ -41,7 +41,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
         return
     if step.name.startswith(TRANSFORMING):
         control.suspended[step.name] = (
-            f"a transformation ({step.name.upper()}) is in force, which ncfix does not follow"
+            f"the transformation {step.name.upper()} is in force, which ncfix does not follow"
         )
         return
     text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
