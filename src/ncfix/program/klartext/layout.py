@@ -22,7 +22,7 @@ LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
 FALLBACK = Word("L", Constant(10.0), Span(Anchor(-1, 0), Anchor(-1, 0)), Span(Anchor(-1, 0), Anchor(-1, 0)))
 """Every Klartext block says itself how it moves; blocks of words alone are straight."""
 
-RELATIVE_POLE = re.compile(rb"(?im)^[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n;]*I[XYZ]|[ \t]*(?:;|\r?$))")
+RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n;]*I[XYZ]|[ \t]*(?:;|\r?$))")
 """A pole that counts from where the tool stands."""
 
 
@@ -172,4 +172,4 @@ def tilts(source: bytes) -> bool:
 @lru_cache(maxsize=4)
 def poles_move(source: bytes) -> bool:
     """Whether some pole counts from where the tool stands, and so moves with its correction."""
-    return b"CC" in source.upper() and RELATIVE_POLE.search(source) is not None
+    return RELATIVE_POLE.search(b"\n" + source) is not None

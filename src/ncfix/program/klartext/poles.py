@@ -17,7 +17,9 @@ LINE = re.compile(
 """A pole in plain numbers, or what may set another one or be reached from elsewhere."""
 
 
-NUMBERED = r"(?im)^[ \t]*/?[ \t]*\d*[ \t]*"
+NUMBERED = r"(?i)\n[ \t]*/?[ \t]*\d*[ \t]*(?=[CLADFIE])(?!L[ \t])"
+"""The beginning of a line, behind the end of the one before; most lines are told apart from those that matter here."""
+
 SETS = re.compile(rb"(?i)CC[ \t]*(?:[;~\r\n]|\Z|I?[XYZ][^;\r\nXYZ]*I?[XYZ])|END[ \t]+PGM")
 EVENT = re.compile(
     (
@@ -48,8 +50,9 @@ def relies_at_once(source: bytes) -> bool:
 def _events(source: bytes) -> tuple[list[int], list[bool]]:
     """Where a pole is set or something may rely on one, and which of the two it is."""
     places, relying = [], []
-    for found in EVENT.finditer(source):
-        line = source[found.start("what") : found.start("what") + LOOK]
+    text = b"\n" + source
+    for found in EVENT.finditer(text):
+        line = text[found.start("what") : found.start("what") + LOOK]
         if CALCULATION.match(line) is None:
             places.append(found.start())
             relying.append(SETS.match(line) is None)
