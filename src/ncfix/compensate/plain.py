@@ -12,13 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import REST, matters
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import Split
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.judge import SURE, looked_at, straight_bounds
+from ncfix.compensate.judge import CORNER, SURE, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import Demands, in_pieces
@@ -30,6 +31,8 @@ from ncfix.compensate.settle import rounding
 from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.compensate.units import Part, Unit
 from ncfix.machine import Machine, State
+from ncfix.machine.aim import CLOSE
+from ncfix.machine.bow import MORE
 from ncfix.program.moves import FeedMode, Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 
@@ -96,10 +99,10 @@ class Planner:
         if found.before is None or not found.converged.all():
             return None
         shift = found.q - q
-        if not self._fine(moves, shift):
+        ends = self._displaced(moves, shift)
+        if ends is None:
             return None
         intent = Intent(self.machine, moves, State())
-        ends = moves.start + shift[:-1], moves.end + shift[1:]
         real = replace(intent.segments, start=ends[0], end=ends[1])
         over, parts = self._split(intent, real, shift)
         pieces, first = pieces_of(real, over, parts)
@@ -118,10 +121,7 @@ class Planner:
     def _split(self, intent: Intent, real: Segments, shift: Array) -> tuple[Index, Split | None]:
         """The motions that must be split, and their pieces."""
         moves, limit = intent.moves, self.demands.budget.path
-        bow, linear = self.machine.bow, ~self.machine.rotary
-        assert bow is not None
-        shifts = shift[:-1, linear], shift[1:, linear]
-        bound = straight_bounds(bow, real.start, real.end, shifts, intent.lengths(np.arange(len(moves))), linear)
+        bound = self._bounds(real, shift, intent.lengths(np.arange(1)))
         bound[passed(intent, real.start, real.end)[0]] = np.inf
         rows = np.flatnonzero(~(bound <= SURE * limit) & self.followed(moves))
         if not rows.size:
@@ -131,14 +131,42 @@ class Planner:
         rows = rows[over]
         return rows, in_pieces(intent, real, rows, worst[over], self.strategy, self.demands) if rows.size else None
 
-    def _fine(self, moves: Moves, shift: Array) -> bool:
-        """Whether the ends of all motions stay well within the limits: as `limits`, from the safe side."""
+    def _bounds(self, real: Segments, shift: Array, tool_length: Array) -> Array:
+        """What the deviation of the tip does not exceed along each motion, (n,) mm."""
+        bow, linear = self.machine.bow, ~self.machine.rotary
+        assert bow is not None
+        if not fast.engaged():
+            return straight_bounds(
+                bow, real.start, real.end, (shift[:-1, linear], shift[1:, linear]), tool_length, linear
+            )
+        from ncfix.compensate import plain_kernels
+
+        farthest = np.maximum(np.abs(real.start).max(axis=0), np.abs(real.end).max(axis=0))
+        constants = bow.shift, bow.turn, bow.arm(farthest, float(tool_length), ~linear), MORE, CORNER
+        bound = np.empty(len(real))
+        bends = bow.slopes, bow.curvatures
+        plain_kernels.bounds(real.start, real.end, shift, linear, bends, constants, CLOSE, bound)
+        return bound
+
+    def _displaced(self, moves: Moves, shift: Array) -> tuple[Array, Array] | None:
+        """Where motions really start and end, (n, n_axes) each; None if they come near a limit: as `limits`."""
         low, high = self.machine.ranges.T
-        ends = (moves.end, moves.end + shift[1:])
+        if fast.engaged():
+            from ncfix.compensate import plain_kernels
+
+            found = np.empty_like(moves.end), np.empty_like(moves.end)
+            ranges = np.ascontiguousarray(low), np.ascontiguousarray(high)
+            linear, rotary = (NEARLY * most for most in self.machine.max_correction)
+            limits = linear, rotary, NEARLY * JUMP, FUZZ
+            fine = plain_kernels.displaced(moves.start, moves.end, shift, ranges, ~self.machine.rotary, limits, found)
+            return found if fine else None
+        ends = moves.end, moves.end + shift[1:]
         within = all(
             bool((low - end.min(axis=0) <= FUZZ).all() and (end.max(axis=0) - high <= FUZZ).all()) for end in ends
         )
-        return within and self._small(shift) and self._steady(np.diff(shift, axis=0))
+        if not (within and self._small(shift) and self._steady(np.diff(shift, axis=0))):
+            return None
+        return moves.start + shift[:-1], ends[1]
 
     def _fine_inside(self, intent: Intent, pieces: Pieces, inner: Index, shift: Array) -> bool:
         """The same of pieces that end inside of motions (k,)."""

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
@@ -30,25 +31,62 @@ def figures(course: Course, text: PlainText, rapids: bool) -> PathError:
     start = np.concatenate([text.start[None], text.end[course.first[1:-1] - 1]])
     end = text.end if course.single else text.end[course.first[1:] - 1]
     shown = np.ones(len(moves), dtype=bool) if rapids else moves.kind == Kind.FEED
-    along = shown & _to_be_followed(course, start, end)
-    tally = FigureTally(len(moves))
-    ends = np.flatnonzero(shown & ~along)
-    if ends.size:
-        tally.add(_at_ends(course, start, end, ends))
-    rows = np.flatnonzero(along)
+    tally, along = FigureTally(len(moves)), _in_pieces_or_kinked(course, start, end)
+    (_compiled if fast.engaged() else _by_columns)(course, text, (start, end), (shown, along), tally)
+    rows = np.flatnonzero(along & shown)
     if rows.size:
         for part in _along(course, text, start, rows):
             tally.add(part)
     return tally.result()
 
 
-def _to_be_followed(course: Course, start: Array, end: Array) -> Mask:
-    """(n,) motions of which more than the end is to be looked at, or at the end of which the errors are not known."""
+def _in_pieces_or_kinked(course: Course, start: Array, end: Array) -> Mask:
+    """(n,) motions in several pieces, or with a kink of the error on their way."""
+    found: Mask = np.diff(course.first) > 1
+    found[passed(course.intent, start, end)[0]] = True
+    return found
+
+
+def _by_columns(
+    course: Course, text: PlainText, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
+) -> None:
+    """Count the errors at the ends of motions that need no more; the others are marked."""
+    shown, along = masks
+    along |= _to_be_followed(course, ends[1])
+    rows = np.flatnonzero(shown & ~along)
+    if rows.size:
+        tally.add(_at_ends(course, *ends, rows))
+
+
+def _compiled(
+    course: Course, text: PlainText, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
+) -> None:
+    """As `_by_columns`."""
+    from ncfix.compensate import plain_kernels
+
+    moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
+    assert machine.linear_ways is not None
+    places[0] = 0
+    plain_kernels.at_ends(
+        (moves.start, moves.end),
+        (text.start, text.end, course.first),
+        (course.wanted, course.before),
+        (features(machine), np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
+        (STRAIGHT, TURNED),
+        masks,
+        (sums, places),
+    )
+    way, *squares = sums[:3].tolist()
+    count, *rows = places.tolist()
+    tally.take(way, count, squares, [(most, row, 1.0) for most, row in zip(sums[3:].tolist(), rows, strict=True)])
+
+
+def _to_be_followed(course: Course, end: Array) -> Mask:
+    """(n,) motions along which the error may bend, or at the end of which it is not known."""
     moves, machine = course.part.moves, course.intent.machine
     found: Mask = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1) >= STRAIGHT
     found |= np.abs(end - course.wanted)[:, machine.rotary].max(axis=1, initial=0.0) > TURNED
-    found[passed(course.intent, start, end)[0]] = True
-    return found if course.single else found | (np.diff(course.first) > 1)
+    return found
 
 
 def _at_ends(course: Course, start: Array, end: Array, rows: Index) -> Samples:

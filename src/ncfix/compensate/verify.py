@@ -270,6 +270,16 @@ class FigureTally:
             best = int(known.argmax())
             self.at[side] = max(self.at[side], (float(known[best]), int(part.move[best]), float(part.fraction[best])))
 
+    def take(self, way: float, samples: int, squares: list[float], most: list[tuple[float, int, float]]) -> None:
+        """Take in what was added up elsewhere; of both sides squares times way, and the largest: mm, motion, fraction.
+
+        Not by motion: `move_before` and `move_after` do not know of it.
+        """
+        self.way += way
+        self.samples += samples
+        self.squares = [own + more for own, more in zip(self.squares, squares, strict=True)]
+        self.at = [max(own, other) for own, other in zip(self.at, most, strict=True)]
+
     def result(self) -> PathError:
         """The figures of all batches."""
         before, after = (

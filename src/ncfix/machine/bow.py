@@ -41,6 +41,10 @@ class Bow:
     curvatures: Array
     reach: float
 
+    def arm(self, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> float:
+        """How far the tip is at most from any reference point, mm; arguments as in `of`."""
+        return self.reach + abs(tool_length) + float(farthest[~rotary].sum())
+
     def of(self, ways: Array, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> tuple[Array, Array]:
         """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.
 
@@ -48,7 +52,7 @@ class Bow:
         farthest     (n_axes,) from zero that they go
         tool_length  the largest, mm
         """
-        arm = self.reach + abs(tool_length) + float(farthest[~rotary].sum())
+        arm = self.arm(farthest, tool_length, rotary)
         way, angle = ways[:, ~rotary].sum(axis=1), ways[:, rotary].sum(axis=1)
         shifting, turning = ways @ self.slopes.T[:, 0], ways @ self.slopes.T[:, 1]
         swing = way + arm * angle

@@ -1,0 +1,133 @@
+"""Parts of plain motions come out as by the long way, and what is compiled of it finds what the columns do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensate.test_stream import OPTIONS, program, streamed
+from ncfix import fast
+from ncfix.compensate import corrector
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.units import Unit
+from ncfix.machine import Machine, load
+
+FIGURES = ("error_before_um", "error_after_um")
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(root / "benchmarks" / "five_axis.toml")
+
+
+@pytest.fixture(params=[False, True], ids=["plain", "compiled"])
+def compiled(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[bool]:
+    if request.param:
+        pytest.importorskip("numba", reason="the `fast` extra is not installed")
+        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+        assert fast.engage()
+    yield bool(request.param)
+    fast.disengage()
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Whether each part, in turn, was planned as one of plain motions."""
+    plan, found = Planner.plan, []
+
+    def watched(self: Planner, unit: Unit) -> Course | None:
+        course = plan(self, unit)
+        found.append(course is not None)
+        return course
+
+    monkeypatch.setattr(Planner, "plan", watched)
+    return found
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize(
+    ("seed", "odd", "options"),
+    [
+        (0, 0.0, OPTIONS),
+        (1, 0.0, OPTIONS),
+        (2, 0.02, OPTIONS),
+        (3, 0.0, FixOptions(tolerance_um=1.5, allow_refused=True, split_rapids=True)),
+        (4, 0.0, FixOptions(tolerance_um=20.0, allow_refused=True, verify=False)),
+    ],
+)
+def test_as_by_the_long_way(
+    seed: int, odd: float, options: FixOptions, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = program(seed, 260, odd)
+    plainly = counted(monkeypatch)
+    text, report = streamed(source, machine, 2500, options)
+    assert sum(plainly) >= (4 if odd == 0 else 1)
+    monkeypatch.setattr(corrector.Planner, "of", lambda *given: None)
+    expected, reference = streamed(source, machine, 2500, options)
+    assert text == expected
+    for name, value in reference.items():
+        if name in FIGURES:
+            assert report[name] == pytest.approx(value, abs=2e-4), name
+        else:
+            assert report[name] == value, name
+
+
+def test_what_comes_near_a_limit_goes_the_long_way(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = program(0, 200, 0.0)
+    far = source.replace(b"M30", b"".join(b"G1 X%d Y20 Z5 B0 C0\n" % (440 + k) for k in range(30)) + b"M30")
+    plainly = counted(monkeypatch)
+    report = streamed(far, machine, 1500)[1]
+    assert plainly.count(True) >= 2
+    assert not plainly[-1]
+    assert report["refused"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Displacements to the last bit; bounds but for rounding; figures too."""
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    planner = Planner.of(machine, OPTIONS)
+    assert planner is not None
+    rng = np.random.default_rng(seed)
+    course = course_of(program(seed, 300, 0.0), machine, monkeypatch)
+    moves, lengths = course.part.moves, course.intent.lengths(np.arange(1))
+    shift = np.zeros((len(moves) + 1, len(machine.axes)))
+    shift[:, :3] = rng.uniform(-0.01, 0.01, (len(moves) + 1, 3))
+    plain = planner._displaced(moves, shift), planner._bounds(course.real, shift, lengths)
+    assert fast.engage()
+    try:
+        found = planner._displaced(moves, shift), planner._bounds(course.real, shift, lengths)
+        assert plain[0] is not None
+        assert found[0] is not None
+        for mine, theirs in zip(found[0], plain[0], strict=True):
+            assert np.array_equal(mine, theirs)
+        assert found[1] == pytest.approx(plain[1], rel=1e-12)
+        for row, axis, much in ((5, 0, 0.06), (7, 3, 1.0), (9, 2, np.nan)):
+            wrong = shift.copy()
+            wrong[row, axis] += much
+            assert planner._displaced(moves, wrong) is None
+            fast.disengage()
+            assert planner._displaced(moves, wrong) is None
+            assert fast.engage()
+    finally:
+        fast.disengage()
+
+
+def course_of(source: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> Course:
+    """The plan of a part in the middle of a program."""
+    plan, courses = Planner.plan, []
+
+    def watched(self: Planner, unit: Unit) -> Course | None:
+        courses.append(plan(self, unit))
+        return courses[-1]
+
+    monkeypatch.setattr(Planner, "plan", watched)
+    streamed(source, machine, 4000)
+    monkeypatch.undo()
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    found = [course for course in courses if course is not None]
+    return found[len(found) // 2]
