@@ -252,6 +252,13 @@ def test_a_frame_over_a_transformation_is_refused() -> None:
     assert not any(reasons(follow("G54\nTRAORI\nTRANS X1\nG0 X1 Y1 Z1\nTRANS\nTRAFOOF")))
 
 
+def test_a_work_offset_over_a_transformation_is_said() -> None:
+    offsets = {"G54": ZERO | {"X": 5.0}, "G500": ZERO}
+    for text, count in (("G54\nTRAORI", 1), ("TRAORI\nG54", 0), ("TRAORI\nTRAFOOF\nG54", 0), ("G500\nTRAORI", 0)):
+        codes = [message.code for message in follow(f"{text}\nG0 X1 Y1 Z1\nX2", work_offsets=offsets).messages]
+        assert codes.count("NCF255") == count
+
+
 def test_a_modal_cycle_drills_behind_machine_positions_too() -> None:
     assert xs("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3\nMCALL\nG0 X4") == pytest.approx([0, 3, 3, 3, 4])
     assert last(follow("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3"))[2] == pytest.approx(5)

@@ -34,6 +34,12 @@ SINUMERIK_CODES: dict[str, Code] = {
         "A3 B3 C3 have no length, or the rotary axes of the machine cannot point the tool that way.",
         "Check the vector, and that the machine file is that of the machine the program was written for.",
     ),
+    "NCF255": Code(
+        "Work offset over a transformation",
+        "TRAORI or TRAFOOF stands between the work offset (G54) and a motion. Whether the control keeps the offset "
+        "depends on its machine data; here it stays.",
+        "Program the work offset anew after TRAORI and TRAFOOF.",
+    ),
     "NCF257": Code(
         "Another transformation",
         "TRAORI(2) and further ones are what the machine's data say: another head, or other rotary axes. The tool is "

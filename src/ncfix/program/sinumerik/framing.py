@@ -24,6 +24,7 @@ DIAMETER_SHIFT = "a shift of X while X is a diameter ({}) is in force: which of 
 MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
 FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
 AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
+CARRIED = "NCF255"
 LENGTH_ACROSS = "$sc_tool_length_const"
 PLANE_LENGTH = (
     "in this plane the control adds the tool length along another axis, unless $SC_TOOL_LENGTH_CONST is 17: "
@@ -168,7 +169,17 @@ def diameter(control: Sinumerik, name: str) -> None:
 
 def settable(control: Sinumerik, code: int) -> None:
     """G54 to G57, G505 to G599; G500 switches them off."""
+    control.modes.carried = ""
     control.select(f"G{code // 10}")
+
+
+def mind_carried(control: Sinumerik) -> None:
+    """The first motion after TRAORI or TRAFOOF: say it if the work offset has not been programmed anew."""
+    frames, name = control.frames, control.modes.carried
+    control.modes.carried = ""
+    if name and any(frames.settable.shift):
+        text = f"{frames.name} is taken to stay in force over {name}: where machine data take it out, nothing is right"
+        control.warn(CARRIED, text, f"program {frames.name} anew after {name}")
 
 
 def feed_mode(control: Sinumerik, code: int) -> None:
@@ -181,7 +192,10 @@ def feed_mode(control: Sinumerik, code: int) -> None:
 
 def compensation(control: Sinumerik, code: int) -> None:
     """G40, G41, G42."""
-    control.modal.compensated = 0 if code == 400 else code // 10
+    if code == 400:
+        control.end_compensation()
+    else:
+        control.modal.compensated = code // 10
 
 
 # -- tools ------------------------------------------------------------------------------------------------------------

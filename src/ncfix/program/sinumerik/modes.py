@@ -45,6 +45,7 @@ class Modes:
 
     diameter     "", "DIAMON" or "DIAM90"
     pole         of polar coordinates in the frame of the program, mm; None until one is programmed
+    carried      TRAORI or TRAFOOF, if one came after the settable frame and no motion has come since
     in_plane     the plane has not changed since the start: a pole that nobody has set is the zero point
     polar        the last AP and RP
     transformed  TRAORI is on
@@ -57,6 +58,7 @@ class Modes:
 
     diameter: str = ""
     pole: tuple[float, float] | None = None
+    carried: str = ""
     in_plane: bool = True
     polar: tuple[float | None, float | None] = (None, None)
     transformed: bool = False

@@ -6,7 +6,7 @@ from ncfix.program.moves import Kind
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.sinumerik.circles import arc, through_point
 from ncfix.program.sinumerik.destination import End, Words, destination, doubtful_polar, machine_destination
-from ncfix.program.sinumerik.framing import take_up
+from ncfix.program.sinumerik.framing import mind_carried, take_up
 from ncfix.program.sinumerik.orientation import oriented
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.tangents import tangential
@@ -31,6 +31,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     if code in (0, 10):
         control.modal.straight = code
     take_up(control)
+    mind_carried(control)
     timed = control.modal.feed_mode == 93 and "F" not in words.values
     words.whole = timed or words.block in control.solitary or control.modes.modal_cycle is not None
     oriented(control, words)

@@ -176,6 +176,7 @@ def mind_frame(control: Sinumerik, step: Calling) -> None:
     """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
     if control.frames.program != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
         control.suspended["frame"] = FRAME_OVER.format(step.name.upper())
+    control.modes.carried = step.name.upper()
 
 
 def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
