@@ -257,6 +257,13 @@ TRACE_CODES: dict[str, Code] = {
         "it, the motion code and the feed are not known until the program names them.",
         "Put its file beside the program. If it sets a work offset or a tool length, give those that it finds.",
     ),
+    "NCF247": Code(
+        "A rotary axis may go the other way round",
+        "A word turns a rotary axis by half a turn or more. Whether a control goes there as written or the shorter way "
+        "round (roll-over, Fanuc parameter 1008), cannot be seen in the program. The end is corrected, and the motion "
+        "is not split: pieces of the longer way would lead the axis round against what the program did.",
+        "Write such a turn in two blocks, if it is meant to go the longer way.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

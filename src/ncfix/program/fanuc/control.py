@@ -11,6 +11,7 @@ from ncfix.program.fanuc.scaling import Scaling
 from ncfix.program.fanuc.variables import Variables
 from ncfix.program.moves import Kinematics
 from ncfix.program.pointing import Pointing
+from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.setup import POINTLESS, Setup
@@ -45,6 +46,7 @@ class MacroControl(Control):
         kinematics: Kinematics | None = None,
     ) -> None:
         super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
+        rollover.watch(self)
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
         self.scaling: Scaling | None = None

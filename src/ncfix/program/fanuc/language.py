@@ -20,6 +20,7 @@ from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Run
 from ncfix.program.layout import CENTRE_LETTERS, Layout
 from ncfix.program.moves import Trace
+from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.language import RS274, writable
 from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.shapes import Scan, scan
@@ -45,6 +46,7 @@ def follow(program: Program, run: Run) -> Trace:
     walk = following(program, run)
     walk.run()
     moves = replace(walk.control.builder.moves(), pointing=walk.control.pointing[0] if walk.control.points else None)
+    rollover.say(walk.control, program)
     return finished(walk.control, program, moves)
 
 

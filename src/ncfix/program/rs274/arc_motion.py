@@ -15,6 +15,7 @@ from ncfix.program.rs274.feeds import check_feed
 from ncfix.program.rs274.targets import destination
 
 CLOCKWISE = 20
+SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
 
 
 def arc(control: Control, block: Block, code: int) -> None:
@@ -37,7 +38,7 @@ def arc(control: Control, block: Block, code: int) -> None:
         centre = (1.0, 0.0)
     turns = turns_of(block) if control.rules.strict else 1
     sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
-    refusal = refusal_of(block, plane)
+    refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
     control.move(
         Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep)
     )
@@ -57,6 +58,12 @@ def refusal_of(block: Block, plane: Plane) -> str:
     if block.runtime & centre_words:
         return "the centre of the arc is known only at run time"
     return ""
+
+
+def spiral(block: Block, plane: Plane) -> str:
+    """Why an arc of ISO controls is refused: further words make it wind, on a spiral or a cone, or several times."""
+    winds = block.values.keys() & {"L", "Q"} or block.get(CENTRE_LETTERS[plane.across]) or block.get("P", 1.0) != 1.0
+    return SPIRAL if winds and "R" not in block.values else ""
 
 
 def check_words(control: Control, block: Block, plane: Plane) -> None:

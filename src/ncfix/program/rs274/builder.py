@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.moves import Frame, Kind, Moves, Rule
 from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Rotation, Vector
+from ncfix.program.rs274.rollover import overturned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -101,7 +102,11 @@ BUFFERED = 65536
 
 
 class Builder:
-    """Gathers motions; `moves()` makes the columns of them."""
+    """Gathers motions; `moves()` makes the columns of them.
+
+    rolls       (n_axes,) rotary axes that may roll over (see `rollover`); None: none
+    overturned  the block of the first motion so far that might lead one of them the other way round
+    """
 
     def __init__(self, axes: tuple[str, ...], rotary: frozenset[str]) -> None:
         self.axes = axes
@@ -116,6 +121,8 @@ class Builder:
         self._arcs: dict[int, Arc] = {}
         self._approaches: dict[int, Vector] = {}
         self._counted: dict[int, int] = {}
+        self.rolls: NDArray[np.bool_] | None = None
+        self.overturned: int | None = None
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
@@ -206,6 +213,7 @@ class Builder:
         )
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
         styles = self._style_columns(style)
+        self._keep_whole(styles, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
             axes=self.axes,
@@ -231,6 +239,7 @@ class Builder:
     def clear(self) -> None:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
+        self.overturned = None
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
@@ -240,6 +249,16 @@ class Builder:
             name: np.array([row[index] for row in rows], dtype=DTYPES.get(name, np.bool_))[style]
             for index, name in enumerate(Style._fields)
         }
+
+    def _keep_whole(self, styles: dict[str, NDArray[Any]], start: FloatArray, end: FloatArray, block: IntArray) -> None:
+        """Motions in which an axis might roll over must not be split."""
+        if self.rolls is None:
+            return
+        rows = overturned(self.rolls, start, end) & (styles["rule"] != Rule.PASS) & ~styles["incremental"]
+        styles["compensated"] = styles["compensated"] | rows
+        cuts = np.flatnonzero(rows & (styles["kind"] != Kind.RAPID))
+        if cuts.size and self.overturned is None:
+            self.overturned = int(block[cuts[0]])
 
     def _frame_table(self) -> tuple[Frame, ...]:
         return tuple(

@@ -12,6 +12,7 @@ from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.language import Run
 from ncfix.program.moves import Moves
+from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.interpreter import Interpreter
 from ncfix.program.tree import Program
@@ -104,7 +105,9 @@ class PartFollower(ABC):
             self.interpreter.next_part(program)
         self.control.builder.clear()
         self.interpreter.run_part(last, self.max_blocks)
-        return self.control.builder.moves()
+        moves = self.control.builder.moves()
+        rollover.say(self.control, program)
+        return moves
 
     def stand(self, position: NDArray[np.float64]) -> None:
         """Take the axes to a command (n_axes,), mm and rad."""
@@ -133,6 +136,7 @@ class RS274Follower(PartFollower):
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
         super().__init__(Control(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        rollover.watch(self.control)
 
     def begin(self, program: Program) -> Walk:
         """What goes through the program, of which this is the first part."""

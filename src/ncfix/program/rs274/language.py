@@ -12,6 +12,7 @@ from ncfix.program.layout import AXIS_LETTERS, Layout, bulk_layout, has_free_tex
 from ncfix.program.moves import Trace
 from ncfix.program.reach import tape_end
 from ncfix.program.render import BlockRenderer
+from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.following import RS274Follower
@@ -25,6 +26,7 @@ from ncfix.program.tree import Program, Word
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    rollover.watch(control)
     return Interpreter(control, program, run.resolve, run.max_blocks)
 
 
@@ -32,7 +34,9 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
     walk.run()
-    return finished(walk.control, program, walk.control.builder.moves())
+    moves = walk.control.builder.moves()
+    rollover.say(walk.control, program)
+    return finished(walk.control, program, moves)
 
 
 def writable(program: Program, block: int) -> Layout | None:

@@ -1,0 +1,67 @@
+"""Rotary axes that may roll over: motions that might lead them the other way round stay whole, in both lanes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import follow
+from ncfix.machine import Machine, load
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+SETUP = Setup(assume_zero=True, no_point="calculator")
+HEAD = "G21 G90 G17 G54\nG0 X0. Y0. Z50. A0. C0.\nG1 F500.\n"
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(str(root / "examples/machines/wCAYFXZSt.toml"))
+
+
+def whole(text: str, dialect: str, machine: Machine) -> tuple[list[bool], list[str]]:
+    """Which motions must not be split, those of the head left out, and the codes of what is said."""
+    trace = follow(read((HEAD + text + "M30\n").encode(), "part.nc", dialect), machine, SETUP).trace
+    return trace.moves.compensated[1:].tolist(), [message.code for message in trace.messages]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "mitsubishi", "iso"])
+def test_more_than_half_a_turn_stays_whole(dialect: str, machine: Machine) -> None:
+    found, said = whole("X5. C170.\nX6. C359.5\nX7. C0.5\nC180.5\nG91 X1. C300.\nG0 G90 C0.\n", dialect, machine)
+    assert found == [False, True, True, True, False, True]
+    assert "NCF247" in said
+
+
+@pytest.mark.parametrize(("text", "dialect"), [("C359.5\nC0.5\n", "linuxcnc"), ("A-50.\nA60.\n", "fanuc")])
+def test_where_nothing_rolls_over(text: str, dialect: str, machine: Machine) -> None:
+    found, said = whole(text, dialect, machine)
+    assert not any(found)
+    assert "NCF247" not in said
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "iso"])
+def test_both_lanes_agree(dialect: str, machine: Machine) -> None:
+    lines = [f"X{n}. Y{n % 7}. C{(n * 97) % 360}.\n" for n in range(40)]
+    many, _ = whole("".join(lines), dialect, machine)
+    single, _ = whole("M8\n".join(lines), dialect, machine)
+    assert many == single
+    assert any(many)
+    assert not all(many)
+
+
+def test_no_piece_leads_the_axis_round(machine: Machine) -> None:
+    text = HEAD + "X40. Y30. C350.\nX-40. Y-30. C5.\nX40. C100.\nM30\n"
+    fixed = fix_program(read(text.encode(), "part.nc", "fanuc"), machine, SETUP, FixOptions(verify=False))
+    angles = [float(word[1:]) for word in fixed.text.decode().split() if word[0] == "C" and word[1:2].isdigit()]
+    assert angles[:3] == pytest.approx([0.0, 350.0, 5.0])
+    assert np.all(np.abs(np.diff(angles[2:])) < 100.0)
+
+
+@pytest.mark.parametrize("words", ["I10. J0. K5.", "I10. J0. L2", "I10. J0. P3", "I10. J0. Q2."])
+def test_spirals_are_refused(words: str, machine: Machine) -> None:
+    text = HEAD + f"G2 X20. Y0. Z-5. {words}\nG0 X0. Y0. Z50.\nM30\n"
+    moves = follow(read(text.encode(), "part.nc", "fanuc"), machine, SETUP).trace.moves
+    assert "winds further" in moves.reasons[moves.reason[-2]]
