@@ -14,6 +14,9 @@ from compensate.streaming import SETUP, compared, streamed, whole
 from ncfix import fast
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
+from ncfix.program import emit
+from ncfix.program.reader import read
+from ncfix.program.sinumerik.language import SINUMERIK
 
 CALCULATOR = replace(SETUP, no_point="calculator")
 ELSEWHERE = "the program does not run straight from its first line to its last"
@@ -140,6 +143,25 @@ def test_vectors_are_done_in_parts(machine: Machine) -> None:
     source = program(1, 120, 0.0, siemens=True, vectors=True)
     for size in (300, 3000):
         assert compared(source, machine, "siemens", size) == ""
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_blocks_with_vectors_are_written_in_bulk_as_one_by_one(
+    compiled: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sources = [program(seed, 150, 0.02, siemens=True, vectors=True) for seed in (1, 2)]
+    if compiled:
+        pytest.importorskip("numba", reason="the `fast` extra is not installed")
+        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+        assert fast.engage()
+    try:
+        found = [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources]
+    finally:
+        fast.disengage()
+    layouts = [SINUMERIK.bulk(read(each, "p", "siemens"), 15) for each in sources if SINUMERIK.bulk is not None]
+    assert all(layout is not None and layout.led for layout in layouts)
+    monkeypatch.setattr(emit, "language_of", lambda dialect: replace(SINUMERIK, bulk=None))
+    assert [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources] == found
 
 
 @pytest.mark.parametrize("siemens", [True, False], ids=["sinumerik", "fanuc"])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.bulk_layouts import CLOSING, OPENING, Layouts
+from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
@@ -282,17 +282,17 @@ class Stretch:
         block = bulk.moves.block[move].astype(np.int64)
         further = np.diff(move, prepend=-1) == 0
         words = _words(bulk, block, further)
-        present = words >= 0
+        worded, present = words >= 0, words != NONE
         wanted = frame.program(bulk.pieces.end[rows].copy())
         half = _halves(decimals)
-        original = np.where(present, program.numbers[np.maximum(words, 0)], 0.0)
+        original = np.where(worded, program.numbers[np.maximum(words, 0)], wanted)
         rewrite = present & ((np.abs(wanted - original) >= half) | np.append(further[1:], False)[:, None])
         signed = bulk.layouts.manner.signed
-        styles = styles_of(bulk.text, program.number_spans[words[present]], signed=signed)
+        styles = styles_of(bulk.text, program.number_spans[words[worded]], signed=signed)
         digits = np.broadcast_to(decimals, words.shape).copy()
-        digits[present] = np.maximum(digits[present], styles.decimals)
+        digits[worded] = np.maximum(digits[worded], styles.decimals)
         clear = is_plain(wanted, digits) | (present & ~rewrite)
-        clear[present] &= styles.clear | ~rewrite[present]
+        clear[worded] &= styles.clear | ~rewrite[worded]
         values = np.where(present & ~rewrite, original, rounded(wanted, digits))
         add = np.zeros_like(present)
         if not present.all():
@@ -313,7 +313,7 @@ class Stretch:
 
     def commands(self) -> FloatArray:
         """The commands at the ends of the pieces, (k, n_axes): an axis that is not told to move stays where it was."""
-        told = (self.words >= 0) | self.add
+        told = (self.words != NONE) | self.add
         commands = self.frame.command(self.values)
         if told.all():
             return commands
@@ -391,8 +391,8 @@ def _missing(
 
 
 def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:
-    """(k, n_axes) the number of each axis word of pieces, -1 where there is none."""
+    """(k, n_axes) the number of each axis word of pieces; `NONE`, or `LED` for what is led without one."""
     found = bulk.layouts.slots[bulk.program.template[block]]
-    found[further] = -1
-    words: IntArray = np.where(found >= 0, bulk.program.first_number[block][:, None] + found, -1)
+    found[further] = NONE
+    words: IntArray = np.where(found >= 0, bulk.program.first_number[block][:, None] + found, found)
     return words

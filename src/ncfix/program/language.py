@@ -59,6 +59,7 @@ class BulkLayout:
     signed    numbers are written with their sign
     comma     numbers are written with a decimal comma
     turns_named  a rotary axis that has no word gets none
+    led       rotary axes go where other words of the block lead them, exactly; they have none of their own
     """
 
     slots: Mapping[str, int]
@@ -72,6 +73,7 @@ class BulkLayout:
     signed: bool = False
     comma: bool = False
     turns_named: bool = False
+    led: bool = False
 
 
 @dataclass(frozen=True, slots=True)

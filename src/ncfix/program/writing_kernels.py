@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.kernel import Library
+from ncfix.program.bulk_layouts import LED_HEAD
 from ncfix.program.number_text import LARGEST, LONGEST, MINUS, MOST_DECIMALS, PLUS, TENS, TIE, ZERO
 from ncfix.program.numbers import POINT, POWERS
 
@@ -245,6 +246,8 @@ def add_words(
     """Add words at `place` for axes that must move and have none; as `rewrite_words`."""
     (data, changes), (wanted, now, told), (decimals, half, signed) = pen, axes, digits
     for axis in by_letter:
+        if heads[axis, 1] == LED_HEAD:
+            now[axis], told[axis] = wanted[axis], True
         off = abs(wanted[axis] - now[axis])
         if told[axis] or off < half[axis]:
             continue

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import bulk_layout
-from ncfix.program.moves import Trace
+from ncfix.program.moves import Moves, Trace
+from ncfix.program.pieces import Pieces
 from ncfix.program.reach import whole_text
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
@@ -17,11 +21,14 @@ from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_o
 from ncfix.program.sinumerik.interpreter import Interpreter
 from ncfix.program.sinumerik.layout import layout_of
 from ncfix.program.sinumerik.numbering import renumbered
+from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.render import render
 from ncfix.program.sinumerik.scanning import scan
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unroll import Recorder
 from ncfix.program.tree import Program
+
+SPATIAL = frozenset("XYZ")
 
 
 def following(program: Program, run: Run) -> Interpreter:
@@ -45,9 +52,26 @@ def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
     layout = layout_of(program, block)
-    if layout is None or not layout.axes or layout.polar or layout.points:
+    if layout is None or not layout.axes or layout.polar or layout.angles:
         return None
-    return bulk_layout(program, block, layout)
+    if layout.points and not layout.axes.keys() <= SPATIAL:
+        return None
+    found = bulk_layout(program, block, layout)
+    return found and replace(found, led=layout.points)
+
+
+def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) motions that the renderer has to look at: a direction of the tool that changes, or that further pieces have.
+
+    One that is the same, and in one piece, leads the rotary axes to where the program has them.
+    """
+    shapes = [any(word.address in VECTOR for word in template.words) for template in program.templates]
+    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    if not pointed.any():
+        return pointed
+    last = first_piece[1:] - 1
+    turned = (pieces.end[last] != moves.end)[:, moves.rotary].any(axis=1)
+    return pointed & (turned | (np.diff(first_piece) > 1))
 
 
 SINUMERIK = Language(
@@ -61,6 +85,7 @@ SINUMERIK = Language(
     arc_pieces=True,
     unroll=unroll,
     bulk=in_bulk,
+    one_by_one=one_by_one,
     renumber=renumbered,
     follower=SinumerikFollower,
     straight=runs_straight_on,
