@@ -27,8 +27,10 @@ POSE_LENGTHS = (0.8, 1.6)
 """Of half the travel of every axis at once."""
 PAIR_LENGTH = 0.7
 """The same where two axes at a time matter."""
-TIME_LENGTHS = (300.0, 1500.0)
-"""s"""
+JERK = 300.0
+"""s: over which a course of time bends that no warmth has."""
+TIME_LENGTHS = (1200.0, 2400.0, 7200.0)
+"""s: over which it bends, with kinks, as thermal effects of the catalogue do: a rival may do what they may."""
 LASTING = 3600.0
 """s: how long a step or a walk in time is remembered."""
 MOST = 50
@@ -67,8 +69,10 @@ def _kernels(view: View) -> Iterator[tuple[Candidate, Array]]:
         yield POSE, sum((a * b for a, b in combinations(single, 2)), np.zeros_like(single[0]))
     time = view.column("time_s")
     if np.ptp(time) > 0:
+        yield TIME, _smooth(time[:, None], JERK)
         for length in TIME_LENGTHS:
-            yield TIME, _smooth(time[:, None], length)
+            apart = np.sqrt(3) * np.abs(time[:, None] - time) / length
+            yield TIME, (1 + apart) * np.exp(-apart)
         yield TIME, np.exp(-np.abs(time[:, None] - time) / LASTING)
     sides = _sides(view)
     if sides.shape[1]:

@@ -66,7 +66,7 @@ def _sorts(reach: Reach, axis: Axis) -> Iterator[tuple[str, list[list[Part]]]]:
     """What each component may do: by position, direction, another axis, time."""
     names = [f"E{letter}{axis.name}" for letter in LETTERS + TURNS]
     options, loading = _curve(reach, axis)
-    yield "its position", [[(name, options, loading)] for name in names]
+    yield "its position", [[(name, options, _curved(axis, name, loading))] for name in names]
     if f"dir_{axis.name}" in reach.columns:
         play = {"basis": Backlash(degree=(0, 1, 2, 3)), **reach.scaled(axis)}
         yield "its direction", [[(name, play, weighed(PLAY))] for name in names]
@@ -84,6 +84,11 @@ def _curve(reach: Reach, axis: Axis) -> tuple[dict[str, Any], Array]:
     if axis.rotary and np.ptp(reach.spans[axis.name]) > FULL:
         return {"basis": Fourier(order=tuple(range(1, len(WAVES) + 1)))}, weighed(np.repeat(WAVES, 2))
     return {"basis": shapes.spline(), **reach.scaled(axis)}, shapes.smooth(BEND)
+
+
+def _curved(axis: Axis, name: str, loading: Array) -> Array:
+    """Without what is straight in a shift: that is where the axis lies, or its gain, and has a name of its own."""
+    return loading if axis.rotary or name[1] in TURNS else shapes.bent(BEND)
 
 
 def _warm(reach: Reach) -> list[tuple[dict[str, Any], Array]]:

@@ -29,12 +29,12 @@ def rivals(view: View, named: Sequence[Group]) -> tuple[Group, ...]:
     """
     anywhere = list(fields(view))
     found = [group for group in (*anywhere, *(of_joints(view) if anywhere else ())) if group is not None]
-    seen = _not_in_catalogue(view, found, named)
-    if not seen or not any(group.owner.constant for group in named):
-        return tuple(seen)
-    columns = apart(view, np.concatenate([group.columns for group in seen], axis=1), named)
-    ends = np.cumsum([group.columns.shape[1] for group in seen])[:-1]
-    return tuple(replace(group, columns=own) for group, own in zip(seen, np.split(columns, ends, axis=1), strict=True))
+    if found and any(group.owner.constant for group in named):
+        columns = apart(view, np.concatenate([group.columns for group in found], axis=1), named)
+        ends = np.cumsum([group.columns.shape[1] for group in found])[:-1]
+        parts = np.split(columns, ends, axis=1)
+        found = [replace(group, columns=own) for group, own in zip(found, parts, strict=True)]
+    return tuple(_not_in_catalogue(view, found, named))
 
 
 def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]) -> list[Group]:

@@ -14,6 +14,8 @@ MOST = 5
 """Effects that are taken to be there at most."""
 TRIED = 5
 """Of all effects that may be added so many, the likeliest, are weighed; of those without a name, half as many."""
+FORMS = 2
+"""Forms of another name that are weighed in a member's place."""
 ALIKE = 3.0
 """Log odds (20 to 1) within which another name explains a member's part as well."""
 TOGETHER = 3
@@ -140,8 +142,12 @@ def judged(scale: Scale, members: Members) -> Selected:
     for name in members:
         others = _less(members, name)
         sort = [each for each in _sort(court, name) if each not in others]
-        tried = {**likeliest(scale, sort, others), name: members[name]}
-        gained = {each: scale.weight({**others, each: own}) - scale.weight(others) for each, own in tried.items()}
+        tried = {
+            each: scale.heard(others).likeliest(court.forms[each], FORMS) for each in likeliest(scale, sort, others)
+        }
+        tried[name] = [members[name]]
+        heaviest = {each: max(scale.weight({**others, each: own}) for own in forms) for each, forms in tried.items()}
+        gained = {each: weight - scale.weight(others) for each, weight in heaviest.items()}
         paid = margin(len(members)) - margin(len(others))
         odds[name] = gained.pop(name) + paid
         runners[name] = {each: value + paid for each, value in gained.items()}
