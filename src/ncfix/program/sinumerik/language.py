@@ -71,7 +71,8 @@ def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDAr
         return pointed
     last = first_piece[1:] - 1
     turned = (pieces.end[last] != moves.end)[:, moves.rotary].any(axis=1)
-    return pointed & (turned | (np.diff(first_piece) > 1))
+    found: NDArray[np.bool_] = pointed & (turned | (np.diff(first_piece) > 1))
+    return found
 
 
 SINUMERIK = Language(
