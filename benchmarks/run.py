@@ -3,6 +3,8 @@
     make bench                         10^5 and 10^6 blocks, five runs each: a quarter of an hour
     make bench SIZES="100000" RUNS=3   other sizes, other numbers of runs
     make bench LONG=10000000           and one run of a long file, for memory and scaling: two minutes more
+    make bench OTHERS=1000000          programs of other controls of another length than 200 000 blocks, one run each
+    make bench SIZES="" OTHERS=1000000 only these
 
 A figure is the median of whole processes: start of Python, imports, reading, following, correcting, proof and writing.
 CPU time is what is compared: it depends less on what else the machine does.
@@ -25,12 +27,14 @@ from time import perf_counter
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import controls
 import programs
 
 HERE = Path(__file__).resolve().parent
 PAGE = HERE.parent / "docs" / "performance.md"
 MACHINE = HERE / "five_axis.toml"
 MARK = "<!-- figures: written by `make bench` -->"
+OTHER_BEGIN, OTHER_END = "<!-- other controls: written by `make bench` -->", "<!-- end of other controls -->"
 OUTPUT = "out.nc"
 LARK_LINES = 20_000
 """Plain Lark is timed on so many lines, and the time scaled."""
@@ -68,6 +72,7 @@ class Contender:
         """Run it once; raises CalledProcessError if it fails."""
         begin = perf_counter()
         environment = {**os.environ, "OMP_NUM_THREADS": "1", **self.environment}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)  # modules are compiled once, as after an installation
         process = subprocess.Popen(
             self.command,
             stdin=subprocess.DEVNULL,
@@ -172,7 +177,12 @@ def main() -> None:
     parser.add_argument("--styles", nargs="*", default=["full", "mixed"], choices=programs.STYLES)
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--long", type=int, default=0)
+    parser.add_argument("--others", type=int, default=200_000)
     given = parser.parse_args()
+    if given.others:
+        other_controls(given.others)
+    if not given.sizes:
+        return
     text = [*conditions(given.runs), ""]
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -183,8 +193,7 @@ def main() -> None:
                 text += table(blocks, style, timed(path, folder, blocks, given.runs))
         if given.long:
             text += long_file(given.long, folder)
-        if given.sizes:
-            text += stages(folder)
+        text += stages(folder)
     page = PAGE.read_text()
     PAGE.write_text(page[: page.index(MARK) + len(MARK)] + "\n\n" + "\n".join(text).rstrip() + "\n")
 
@@ -208,6 +217,37 @@ def long_file(blocks: int, folder: Path) -> list[str]:
         times.append(run.cpu)
         rows.append(f"| {spaced(count)} | {run.cpu:.1f} | {run.wall:.1f} | {run.memory:.0f} |")
     return [*rows, "", f"Ratio of the times: {times[1] / times[0]:.2f}.", ""]
+
+
+def other_controls(blocks: int) -> None:
+    """One run each of the programs of other controls, into the page."""
+    rows = [f"{spaced(blocks)} blocks, {conditions(1)[0]}", ""]
+    rows += ["| | program | way | CPU s | us a block | peak MB |", "|---|---|---|---|---|---|"]
+    with tempfile.TemporaryDirectory() as temporary:
+        for control in controls.OTHERS:
+            for style in control.programs.STYLES:
+                path = Path(temporary) / "program"
+                control.programs.write(path, blocks, style)
+                rows += [row_of(control, style, way, way.run(), blocks) for way in ways_of(control, path)]
+                print(*rows[-2:], sep="\n", flush=True)
+    page = PAGE.read_text()
+    head, rest = page.split(OTHER_BEGIN)
+    PAGE.write_text(f"{head}{OTHER_BEGIN}\n\n" + "\n".join(rows) + f"\n\n{OTHER_END}" + rest.split(OTHER_END)[1])
+
+
+def ways_of(control: controls.OtherControl, program: Path) -> list[Contender]:
+    """ncfix on a program of another control, plain and compiled."""
+    ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
+    fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
+    fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", *control.options]
+    found = [Contender("plain", fix, {"NCFIX_NO_FAST": "1"})]
+    return [*found, Contender("`fast`", fix, {"NCFIX_NO_FAST": ""})] if has_numba() else found
+
+
+def row_of(control: controls.OtherControl, style: str, way: Contender, run: Run, blocks: int) -> str:
+    """A row of the table of other controls."""
+    figures = f"{run.cpu:.1f} | {1e6 * run.cpu / blocks:.0f} | {run.memory:.0f}"
+    return f"| {control.title} | {style} | {way.name} | {figures} |"
 
 
 def stages(folder: Path) -> list[str]:

@@ -24,6 +24,8 @@ OFFSET, PRIME = np.uint64(14695981039346656037), np.uint64(1099511628211)
 UNTOUCHED = -1
 """Instead of the number of shapes: there is a block that must be taken as it is."""
 NONE, BROKEN = -1, -2
+FREE, FIXED = 1, 2
+"""A number, and one that belongs to the shape."""
 LITERAL, NUMERIC, SIGN, COMMENT, ODD = range(5)
 """Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
 
@@ -102,6 +104,55 @@ def entry(table: Ints, code: np.uint64, shapes: Bytes, begin: int, end: int, sta
     return at
 
 
+@LIBRARY.helper
+def numbered(
+    table: Ints, code: np.uint64, shapes: Bytes, span: tuple[int, int], starts: Ints, known: int
+) -> tuple[int, int]:
+    """The number of the shape at a span, a new one if it is not known yet; and how many are known."""
+    slot = entry(table, code, shapes, span[0], span[1], starts)
+    if table[slot] < 0:
+        table[slot] = known
+        known += 1
+        starts[known] = span[1]
+    return table[slot], known
+
+
+@LIBRARY.helper
+def number_from(
+    text: Bytes, place: int, stop: int, tables: Tables, most: tuple[int, int], powers: Floats
+) -> tuple[int, int, int, bool, float]:
+    """What the run of digits at a place is: `FREE`, `FIXED` or `BROKEN`; its start, with a sign before it, and end.
+
+    Also whether it has a point, and its value.
+    """
+    (kinds, fixed, unsigned_after, blank), (blanks, digits_most) = tables, most
+    past, points, digits, decimals, mantissa = run_of(text, place, stop)
+    at = before(text, place, blank, blanks)
+    leader = text[at] if at >= 0 else np.uint8(0)
+    if fixed[leader]:
+        return FIXED, place, past, points > 0, 0.0
+    if points > 1 or digits == 0 or digits > digits_most:
+        return BROKEN, place, past, points > 0, 0.0
+    value = float(mantissa) / powers[decimals]
+    if kinds[leader] == SIGN and takes_sign(text, at, unsigned_after, blank, blanks):
+        return FREE, at, past, points > 0, -value if leader == MINUS else value
+    return FREE, place, past, points > 0, value
+
+
+@LIBRARY.helper
+def spelled(
+    shapes: Bytes, end: int, code: np.uint64, text: Bytes, place: int, past: int, character: np.uint8
+) -> tuple[int, np.uint64]:
+    """Add a character to a shape, and those behind its place up to `past`; where the shape ends then, and its hash."""
+    while True:
+        shapes[end] = character
+        code = (code ^ np.uint64(character)) * PRIME
+        place, end = place + 1, end + 1
+        if place >= past:
+            return end, code
+        character = text[place]
+
+
 @LIBRARY.kernel(
     "u1[:]",
     "i8[:,:]",
@@ -138,9 +189,8 @@ def scan(
     found    the shapes one after the other, where each begins, and a table of hashes, all -1, whose size is a power of
              two
     """
-    (kinds, fixed, unsigned_after, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
-    (blanks, digits_most), (group, comment, first), (spans, values) = most, columns, numbers
-    shapes, starts, table = found
+    (kinds, _, _, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
+    (group, comment, first), (spans, values), (shapes, starts, table) = columns, numbers, found
     n, count, known, end, starts[0] = len(blocks), 0, 0, 0, 0
     for block in range(n):
         first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
@@ -149,19 +199,14 @@ def scan(
             character, past = text[place], place + 1
             kind = kinds[character]
             if kind == NUMERIC:
-                past, points, digits, decimals, mantissa = run_of(text, place, stop)
-                at = before(text, place, blank, blanks)
-                leader = text[at] if at >= 0 else np.uint8(0)
-                if not fixed[leader]:
-                    if points > 1 or digits == 0 or digits > digits_most:
-                        return UNTOUCHED
-                    start, value = place, float(mantissa) / powers[decimals]
-                    if kinds[leader] == SIGN and takes_sign(text, at, unsigned_after, blank, blanks):
-                        start, value = at, -value if leader == MINUS else value
+                form, start, past, pointed, value = number_from(text, place, stop, tables, most, powers)
+                kind = ODD if form == BROKEN else kind
+                if form == FREE:
+                    if start < place:
                         code, end = code_at_sign, end_at_sign
                     spans[count, 0], spans[count, 1], values[count] = start, past, value
                     count += 1
-                    place, character = past - 1, np.uint8(number_mark if points else pointless_mark)
+                    place, character = past - 1, np.uint8(number_mark if pointed else pointless_mark)
             elif kind == COMMENT:
                 close = comment_end(text, place, stop, kinds)
                 past = max(past, close)
@@ -172,18 +217,8 @@ def scan(
                 code_at_sign, end_at_sign = code, end
             if kind == ODD:
                 return UNTOUCHED
-            while True:
-                shapes[end] = character
-                code = (code ^ np.uint64(character)) * PRIME
-                place, end = place + 1, end + 1
-                if place >= past:
-                    break
-                character = text[place]
-        slot = entry(table, code, shapes, begin, end, starts)
-        if table[slot] < 0:
-            table[slot] = known
-            known += 1
-            starts[known] = end
-        group[block] = table[slot]
+            end, code = spelled(shapes, end, code, text, place, past, character)
+            place = max(past, place + 1)
+        group[block], known = numbered(table, code, shapes, (begin, end), starts, known)
     first[n] = count
     return known
