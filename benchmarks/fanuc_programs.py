@@ -39,7 +39,15 @@ def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
         case 2500:
             return ["G49", "G0 B0. C0.", *plane, "G0 Z100.", *begin(1)[2:], here]
         case 3000:
-            return ["G49", "G0 X20. Y20. Z50. B0. C0.", "G81 X25. Y25. Z-3. R2. F200.", "X30.", "G80", *begin(1)[2:], here]
+            return [
+                "G49",
+                "G0 X20. Y20. Z50. B0. C0.",
+                "G81 X25. Y25. Z-3. R2. F200.",
+                "X30.",
+                "G80",
+                *begin(1)[2:],
+                here,
+            ]
         case 3300:
             return ["G91", *["G1 X.01 Y-.01", "G1 X-.01 Y.01"] * 20, "G90", here]
         case 3600:

@@ -42,7 +42,7 @@ def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
     """What interrupts a mixed program at some of its points."""
     x, y, z, b, c = at
     here = f"G1 X{x:.4f} Y{y:.4f} Z{z:.4f} B{b:.4f} C{c:.4f} F2000."
-    plane = ["CYCLE800(1,\"TABLE\",0,57,0,0,0,0,0,0,0,0,0,1)", "G0 X20. Y20. Z60.", "G1 X25. F900."]
+    plane = ['CYCLE800(1,"TABLE",0,57,0,0,0,0,0,0,0,0,0,1)', "G0 X20. Y20. Z60.", "G1 X25. F900."]
     match k % 4001:
         case 700:
             return [f"; POINT {k}", f'MSG("ROW {k}")']
@@ -55,7 +55,14 @@ def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
         case 2500:
             return ["TRAFOOF", *plane, "CYCLE800()", "G0 Z100.", "TRAORI", START, here]
         case 3000:
-            drilling = ["TRAFOOF", "G0 X20. Y20. Z50. B0. C0.", "MCALL CYCLE81(10,0,2,-3)", "X25. Y25.", "X30.", "MCALL"]
+            drilling = [
+                "TRAFOOF",
+                "G0 X20. Y20. Z50. B0. C0.",
+                "MCALL CYCLE81(10,0,2,-3)",
+                "X25. Y25.",
+                "X30.",
+                "MCALL",
+            ]
             return [*drilling, "G0 Z60.", "TRAORI", START, here]
         case 3300:
             return ["G91", *["G1 X.01 Y-.01", "G1 X-.01 Y.01"] * 20, "G90", here]
