@@ -16,6 +16,7 @@ from ncfix.program.rs274.systems import (
     activate,
     extended_system,
     first_parameter,
+    moved_while_turned,
     store,
     stored,
     words_of,
@@ -99,6 +100,7 @@ def set_offset(control: Control, block: Block) -> None:
         value += before[index] if control.modal.incremental else 0.0
         store(control, first, index, value, LETTERS[index] in block.runtime)
     if system == control.modal.system:
+        moved_while_turned(control, "G10")
         activate(control, system)
         control.places.shift(mask_of(words_of(block)))
 
@@ -117,6 +119,7 @@ def set_extended(control: Control, block: Block) -> None:
         control.refusal = control.refusal or f"the work offset {name} is known only at run time"
     control.extended[name] = given
     if control.modal.system == 0 and control.extended_name == name:
+        moved_while_turned(control, "G10")
         extended_system(control, block)
         control.places.shift(mask_of(words_of(block)))
 

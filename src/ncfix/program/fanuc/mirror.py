@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, X, Y, Z, as_rotation, zeros
 from ncfix.program.rs274.settings import unfollowed
-from ncfix.program.rs274.systems import words_of
+from ncfix.program.rs274.systems import turned_back, words_of
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
@@ -50,4 +50,5 @@ def put_up(control: MacroControl) -> None:
     control.offsets.rotation = as_rotation(rows) if control.mirrored else IDENTITY
     control.offsets.centre = centre
     control.handedness = signs[0] * signs[1] * signs[2]
+    turned_back(control)
     control.refresh()

@@ -27,6 +27,7 @@ from ncfix.program.rs274.coordinates import (
 )
 from ncfix.program.rs274.settings import unfollowed
 from ncfix.program.rs274.shifts import rotate_system
+from ncfix.program.rs274.systems import turned_back
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
@@ -138,6 +139,7 @@ def end(control: MacroControl) -> None:
     control.tilted = False
     control.offsets.rotation, control.offsets.feature = IDENTITY, zeros()
     tcp.switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
+    turned_back(control)
     control.refresh()
 
 

@@ -11,7 +11,15 @@ from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, N_LETTERS, about,
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.settings import ENDS, unfollowed
-from ncfix.program.rs274.systems import SHIFT, mark_shaky, store, stored, words_of
+from ncfix.program.rs274.systems import (
+    SHIFT,
+    mark_shaky,
+    moved_while_turned,
+    store,
+    stored,
+    turned_back,
+    words_of,
+)
 
 SHIFT_ACTIVE = 5210
 
@@ -22,6 +30,7 @@ def shift_system(control: Control, block: Block, code: int) -> None:
         if control.rules.strict:
             raise Fault("NCF221", f"G{code // 10} needs an axis word")
         return
+    moved_while_turned(control, f"G{code // 10}")
     if not control.rules.strict and code in (520, 920):
         set_local(control, block, cancelled=code == 920)
     if code == 520 and not control.rules.strict:
@@ -81,6 +90,7 @@ def rotate_system(control: Control, block: Block, code: int) -> None:
         unfollowed(control, block, code)
     if control.offsets.rotation != before:
         control.unnamed = frozenset((control.modal.plane.first, control.modal.plane.second))
+    turned_back(control)
     control.refresh()
 
 

@@ -35,6 +35,9 @@ REFERENCES = {"G28": 5161, "G30": 5181}
 
 BAD_G10 = "NCF222"
 TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
+TURNED = "turned"
+MOVED_WHILE_TURNED = "what {} does while coordinates are turned, mirrored or tilted differs from control to control"
+AFTER_TURNED = "where the axis {} stands after an origin that was moved in turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
 
@@ -88,8 +91,31 @@ def words_of(block: Block) -> list[int]:
 # -- selecting --------------------------------------------------------------------------------------------------------
 
 
+def moved_while_turned(control: Control, what: str) -> None:
+    """The origin is moved while coordinates are turned, mirrored or tilted: refused until they are not.
+
+    LinuxCNC knows only turns of the work offset itself, and what they do.
+    """
+    if not control.rules.strict and (control.offsets.rotation != IDENTITY or control.tilted):
+        control.suspended[TURNED] = MOVED_WHILE_TURNED.format(what)
+
+
+def turned_back(control: Control) -> None:
+    """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
+    if control.offsets.rotation == IDENTITY and not control.tilted and control.suspended.pop(TURNED, ""):
+        control.lose(control.machine, AFTER_TURNED)
+
+
 def select_system(control: Control, block: Block, code: int) -> None:
     """G54 to G59.3, and G54.1 Pn."""
+    before = control.modal.system, control.extended_name
+    take_system(control, block, code)
+    if (control.modal.system, control.extended_name) != before:
+        moved_while_turned(control, f"G{code / 10:g}")
+
+
+def take_system(control: Control, block: Block, code: int) -> None:
+    """Take another work offset into force, if it is another."""
     if code == 541:
         extended_system(control, block)
         return
@@ -197,6 +223,7 @@ def set_system(control: Control, block: Block, *, at_position: bool) -> None:
         if value != stored(control, first)[index] or block.axes >> index & 1:
             store(control, first, index, value, index in doubtful or LETTERS[index] in block.runtime)
     if system == control.modal.system:
+        moved_while_turned(control, "G10")
         activate(control, system)
         control.places.shift(mask_of(words_of(block)) | (mask_of((X, Y)) if "R" in block.values else 0))
 
