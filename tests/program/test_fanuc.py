@@ -262,6 +262,7 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
         ("G51.1X0\nG92X5.\nG0X1.Y1.", "what G92 does while coordinates are turned"),
         ("G68.2X0Y0Z0I0J0K30.\nG54.1P1\nG0X1.Y1.", "what G54.1 does while coordinates are turned"),
         ("G68X0Y0R90.\nG10L2P1X5.\nG0X1.Y1.", "what G10 does while coordinates are turned"),
+        ("G10L10P1Z5.\nG0X1.", "a tool is set by other words"),
         ("G54.4P1\nG0X1.", "the setting error of the workpiece (G54.4)"),
         ("G54.2P2\nG0X1.", "the dynamic offset of the rotary table (G54.2)"),
         ("G10L2P0X1.\nG0X1.", "external work offset"),

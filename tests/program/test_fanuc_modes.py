@@ -51,6 +51,12 @@ def test_codes(text: str, expected: list[list[float]]) -> None:
     np.testing.assert_allclose(motions(text), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize(("dialect", "z"), [("fanuc", 25), ("haas", 5)])
+def test_the_reference_point_takes_the_length_away_on_haas(dialect: str, z: float) -> None:
+    found = follow("G43H2G0Z0.\nG91G28Z0.\nG90G0Z5.", setup=SETUP, dialect=dialect)
+    assert ends(found)[-1] == [0.0, 0.0, z]
+
+
 def test_after_skipping_the_code_before_it_is_in_force_again() -> None:
     found = follow("G1X1.F50.\nG31Z-5.\nX2.\nG0X3.Y0.Z9.\nG1G31X0.\nZ8.", setup=SETUP, dialect="fanuc")
     assert reasons(found)[1] == "probing"

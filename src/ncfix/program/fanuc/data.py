@@ -128,6 +128,7 @@ def set_length(control: Control, block: Block) -> None:
     """L10 Pn R: the length of tool offset n; in G91 it is added."""
     number = whole(block.get("P"), "P of G10")
     if "R" not in block.values:
+        control.refusal = control.refusal or "a tool is set by other words than R (G10 L10)"
         return
     length = control.modal.unit * block.values["R"]
     if control.modal.incremental:

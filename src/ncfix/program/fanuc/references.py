@@ -1,18 +1,26 @@
 """Reference points of these controls: G27 checks one, G30 Pn goes to the second, third or fourth.
 
-Source: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words.
+Sources: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words; Haas mill
+operator's manual, G28, G49.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.lengths import tool_offset
 from ncfix.program.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, go_to_reference
 from ncfix.program.rs274.targets import destination
 
+if TYPE_CHECKING:
+    from ncfix.program.fanuc.control import MacroControl
+
 CHECKED = "reference point check (G27)"
 SECOND = 2
+NO_LENGTH = 490
 
 
 def check(control: Control, block: Block, code: int) -> None:
@@ -20,6 +28,14 @@ def check(control: Control, block: Block, code: int) -> None:
     if block.axes:
         target, unknown = destination(control, block)
         control.move(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED)
+
+
+def cancelling(control: MacroControl, block: Block, code: int) -> None:
+    """G28 of Haas takes the tool length offset away as well."""
+    go_to_reference(control, block, code)
+    if control.length_code:
+        control.length_code = 0
+        tool_offset(control, Block(block.index, {}, frozenset(), 0), NO_LENGTH)
 
 
 def further(control: Control, block: Block, code: int) -> None:

@@ -113,6 +113,7 @@ HAAS = replace(
         **dict.fromkeys(HAAS_OFFSETS, data.extended),
         **dict.fromkeys((dynamic.ON, dynamic.OFF), dynamic.dynamic_offset),
         lengths.HAAS_TIP: lengths.tool_offset,
+        280: references.cancelling,
     },
     takes=FANUC.takes | set(HAAS_MADE),
     repeats="L",
