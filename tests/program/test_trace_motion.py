@@ -120,10 +120,25 @@ def test_after_rigid_tapping_the_tool_is_where_it_was() -> None:
 
 
 def test_cutter_compensation_is_marked_and_the_programmed_contour_followed() -> None:
-    moves = follow("F100 G41 D2\nG1 X10\nY10\nG40 X0").moves
-    assert moves.compensated.tolist() == [True, True, False]
-    assert moves.end[:, :2].tolist() == [[10, 0], [10, 10], [0, 10]]
+    moves = follow("F100 G41 D2\nG1 X10\nY10\nG40 X0\nX5").moves
+    assert moves.compensated.tolist() == [True, True, True, False]
+    assert moves.end[:, :2].tolist() == [[10, 0], [10, 10], [0, 10], [5, 10]]
     assert (moves.rule == Rule.CORRECT).all()
+
+
+def test_across_the_plane_of_an_offset_contour_axes_of_the_plane_get_no_word() -> None:
+    moves = follow("F100 G1 X0 Y0 Z5\nG41 D2 X10\nZ1\nY10\nG40 Z5\nX0\nX0 Y0\nZ9").moves
+    plane = moves.wordless[:, [moves.axes.index(letter) for letter in "XY"]].tolist()
+    assert plane == [
+        [False, False],
+        [False, False],
+        [True, True],
+        [False, False],
+        [True, True],
+        [False, True],
+        [False, False],
+        [False, False],
+    ]
 
 
 def test_blocks_run_again_give_rows_again() -> None:

@@ -150,7 +150,9 @@ CODES = {
         "The correction needs an axis that the block does not name, and the program has not said where that axis is: "
         "at the start, after machine coordinates and reference points, a change of tool, of its length offset, of the "
         "work offset. A word for it would lead it to where the setup says that it is, and if that is wrong, into the "
-        "part. So it gets none, and this part of the correction is made when the program names it.",
+        "part. So it gets none, and this part of the correction is made when the program names it. The same holds for "
+        "motions across the plane while cutter radius compensation is on, and after it until the axes are named: there "
+        "the tool stands beside the contour, and the least way in the plane would be offset by the radius.",
         "Let the program name X, Y and Z in the first blocks, and again after such a change. At the start `--initial` "
         "with `--offset` and `--tool`, without `--assume-zero`, says it as well.",
     ),

@@ -197,3 +197,12 @@ def test_a_rotary_axis_that_stays_where_it_is_does_not_turn_under_a_plane() -> N
     body = "L X+0 Y+0 Z+9 B+0 C+0 FMAX\nPLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY\nL X+1 Y+1 Z+9 C+0 F100\nL X+2 C+1"
     moves = follow(body, "XYZBC").moves
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]
+
+
+def test_beside_a_contour_no_word_moves_the_tool_in_its_plane() -> None:
+    """The least way in the plane would be offset by the radius; and after R0 the tool stands beside the contour."""
+    body = "L X+0 Y+0 Z+9 R0 FMAX\nL X+100 Y+30 RL F250\nL Z-5\nL X+300\nL Z+90 R0 FMAX\nL X+20 FMAX\nL X-30 Y+0 FMAX"
+    _, _, down, _, up, aside, away = lines(body)
+    assert not set("XY") & set(down + up.replace("FMAX", ""))
+    assert "Y" not in aside
+    assert "X-" in away

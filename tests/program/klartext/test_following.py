@@ -251,11 +251,17 @@ def test_corners_are_left_to_the_control_and_not_split() -> None:
 
 
 def test_approach_and_departure() -> None:
-    body = "APPR LT X+10 Y+5 LEN15 RR F100\nL X+20\nDEP LT LEN10 F200\nL Z+5 R0 FMAX"
+    body = "APPR LT X+10 Y+5 LEN15 R0 F100\nL X+20\nDEP LT LEN10 F200\nL Z+5 R0 FMAX"
     moves = follow(body).moves
     assert moves.end.tolist() == [[10, 5, 0], [20, 5, 0], [30, 5, 0], [30, 5, 5]]
     assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.PASS, Rule.CORRECT]
-    assert moves.compensated.tolist() == [True, True, True, False]
+    assert moves.compensated.tolist() == [True, False, False, False]
+
+
+def test_beside_the_contour_a_departure_ends_where_the_radius_of_the_tool_leads() -> None:
+    moves = follow("APPR LT X+10 Y+5 LEN15 RR F100\nL X+20\nDEP LT LEN10 F200\nL Z+5 R0 FMAX\nL X+0 Y+0 FMAX").moves
+    assert np.isnan(moves.end[2, :2]).all()
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.PASS, Rule.PASS, Rule.CORRECT]
 
 
 def test_skipped_blocks_are_executed_unless_asked() -> None:

@@ -172,7 +172,7 @@ def test_all_ways_to_and_from_a_contour(block: str, written: str) -> None:
     found = next(line for line in lines(body) if line.startswith(("APPR", "DEP")))
     assert found.startswith(written)
     assert "PA" not in found
-    unknown_after = block.startswith(("DEP LN", "DEP CT"))
+    unknown_after = block.startswith(("DEP LT", "DEP LN", "DEP CT"))
     assert [refusal.line for refusal in report.refused] == ([6] if unknown_after else [])
 
 

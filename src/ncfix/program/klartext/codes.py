@@ -29,6 +29,8 @@ def before_motion(control: Control, step: Step) -> None:
     """What acts from the start of the block."""
     for flag, side in COMPENSATION.items():
         if flag in step.flags:
+            if not side:
+                control.end_compensation()
             control.modal.compensated = side
     for code in step.codes:
         if code in SUSPENDING:

@@ -230,15 +230,15 @@ class Control(base.Control):
         own = axes | (1 << Z if code == BY_DEPTH else 0)
         if settles is None:
             settles = 0 if self.modal.incremental or passing.startswith("machine") else own
-        before = self.modal.compensated
+        whole = self.whole
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
-            self.modal.compensated = before or 41
+            self.whole = True
         super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
         if self.is_rotated:
             self.places.settle(settles)
-        self.modal.compensated = before
+        self.whole = whole
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
         """As for the RS274 family; a cycle begins with a rapid, so it does not matter where from."""

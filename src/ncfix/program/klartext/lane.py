@@ -21,6 +21,7 @@ from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.builder import Stretch
 from ncfix.program.rs274.lane import before_placing, filled, followed, followed_compiled
+from ncfix.program.rs274.places import mask_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -71,7 +72,7 @@ def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
     if stop - block < SHORTEST:
         return 0, min(stop, end) + 1
     stage = stage_of(control, unit, block, stop)
-    count = count_on_one_turn(control, stage)
+    count = min(count_on_one_turn(control, stage), count_beside(control, stage))
     if count < SHORTEST:
         return 0, block + count + 1
     take(control, stage.head(count), unit, block)
@@ -120,6 +121,13 @@ def count_on_one_turn(control: Control, stage: Stage) -> int:
     return int(np.argmax(turns)) if turns.any() else len(turns)
 
 
+def count_beside(control: Control, stage: Stage) -> int:
+    """How many blocks run before one that ends radius compensation (R0): from there on it matters what is named."""
+    before = np.append(control.modal.compensated, stage.side[:-1])
+    ends = (before != 0) & (stage.side == 0)
+    return int(np.argmax(ends)) if ends.any() else len(ends)
+
+
 def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
     """Add the motions of a stretch, and leave the control as they leave it."""
     control.suspended.pop("M130", None)
@@ -132,7 +140,9 @@ def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
         mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
         styles = styles_of(control, stage.motion[moving], stage.side[moving])
         control.places.begun = True
-        adrift = np.full(len(moving), control.places.adrift)
+        plane = 1 << control.modal.plane.first | 1 << control.modal.plane.second
+        still = (stage.side[moving] != 0) & (mask & plane == 0)
+        adrift = control.places.adrift | np.where(still, plane & mask_of(control.machine), 0)
         control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
         control.position = ends[-1].tolist()
         keep_tangent(control, stage.path)

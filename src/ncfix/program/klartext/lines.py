@@ -198,7 +198,11 @@ def approach(control: Control, step: Step) -> None:
 
 
 def departure(control: Control, step: Step) -> None:
-    """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it."""
+    """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it.
+
+    Beside the contour, with RL or RR, the tool may end by its radius beside the element that it follows (LT).
+    """
+    beside, control.modal.compensated = control.modal.compensated, 0
     if step.name.endswith("lct"):
         approach(control, step)
         return
@@ -206,7 +210,8 @@ def departure(control: Control, step: Step) -> None:
     plane = control.path.plane
     lost: Unknown = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
     target = control.position[:]
-    if step.name == "dep lt" and tangent is not None and "LEN" in step.words.values and not step.words.runtime:
+    straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.runtime)
+    if straight_on and tangent is not None:
         length = control.modal.unit * step.words.values["LEN"]
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}

@@ -285,7 +285,7 @@ class Control:
         if settles is None:
             settles = 0 if passing or self.modal.incremental else axes
         placing = kind == Kind.FEED and settles & self.places.adrift != 0
-        adrift = self._adrift(settles)
+        adrift = self._adrift(settles) | self.still_beside(axes)
         if not passing and settles & axes != (0 if self.modal.incremental else axes):
             self.builder.counted(axes & ~settles)
         if not (passing or refusal or unknown) and (why := self._dragged(axes, adrift, target)):
@@ -319,6 +319,20 @@ class Control:
             turned = self._turned()
             adrift |= turned if adrift & turned else 0
         return adrift
+
+    def still_beside(self, axes: int) -> int:
+        """Axes of the plane that get no word in a motion across it while the control offsets the contour.
+
+        The least way in the plane would be offset by the radius, in whatever direction it leads.
+        """
+        plane = 1 << self.modal.plane.first | 1 << self.modal.plane.second
+        return plane & mask_of(self.machine) if self.modal.compensated and not axes & plane else 0
+
+    def end_compensation(self) -> None:
+        """Where the axes of the plane stand after the contour the control knows, until they are named."""
+        if self.modal.compensated:
+            self.places.lose(mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine))
+        self.modal.compensated = 0
 
     def _turned(self) -> int:
         """Axes that are moved by words of others, since the frame is turned."""

@@ -187,7 +187,8 @@ def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: boo
     blocks = blocks if main else np.full(len(blocks), control.row_block)
     starts, ends = stage.path[:-1][rows], stage.path[1:][rows]
     control.places.begun = True
-    adrift = np.full(len(starts), control.places.adrift)
+    plane = control.still_beside(0)
+    adrift = control.places.adrift | np.where(stage.mask[rows] & plane != 0, 0, plane)
     control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends, adrift))
     control.position = ends[-1].tolist()
     modal.cycle.initial = None

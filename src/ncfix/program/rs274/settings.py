@@ -75,6 +75,8 @@ def compensation(control: Control, block: Block, code: int) -> None:
             raise Fault(BAD_SETTING, "cutter compensation is on already")
         if control.modal.plane.code == 190:
             raise Fault(BAD_SETTING, "cutter compensation works in the planes G17 and G18 only")
+    if not side:
+        control.end_compensation()
     control.modal.compensated = side
 
 

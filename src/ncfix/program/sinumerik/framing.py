@@ -192,7 +192,10 @@ def feed_mode(control: Sinumerik, code: int) -> None:
 
 def compensation(control: Sinumerik, code: int) -> None:
     """G40, G41, G42."""
-    control.modal.compensated = 0 if code == 400 else code // 10
+    if code == 400:
+        control.end_compensation()
+    else:
+        control.modal.compensated = code // 10
 
 
 # -- tools ------------------------------------------------------------------------------------------------------------
