@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from compensate.streaming import SETUP, compared, streamed, whole
 from ncfix import fast
+from ncfix.compensate.following import traced
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.program import emit
 from ncfix.program.reader import read
+from ncfix.program.rs274.lane import take
+from ncfix.program.sinumerik import vectors
 from ncfix.program.sinumerik.language import SINUMERIK
 
 CALCULATOR = replace(SETUP, no_point="calculator")
@@ -143,6 +147,33 @@ def test_vectors_are_done_in_parts(machine: Machine) -> None:
     source = program(1, 120, 0.0, siemens=True, vectors=True)
     for size in (300, 3000):
         assert compared(source, machine, "siemens", size) == ""
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("orientation", ["ORIAXES", "ORIVECT"])
+def test_blocks_with_vectors_are_followed_at_once_as_one_by_one(
+    orientation: str, compiled: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = program(1, 150, 0.02, siemens=True, vectors=True).replace(b"ORIAXES", orientation.encode())
+    source = source.replace(b"\r", b"").replace(b"TRAFOOF", b"X150. A3=0.4 B3=0 C3=1\nX150.5 A3=0 B3=0 C3=1\nTRAFOOF")
+    if compiled:
+        pytest.importorskip("numba", reason="the `fast` extra is not installed")
+        monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+        assert fast.engage()
+    taken = []
+    try:
+        monkeypatch.setattr(vectors, "take", lambda *given: (taken.append(given), take(*given)))
+        at_once = traced(read(source, "p", "siemens"), machine, SETUP)
+    finally:
+        fast.disengage()
+    assert taken
+    monkeypatch.setattr(vectors, "is_ready", lambda control: False)
+    singly = traced(read(source, "p", "siemens"), machine, SETUP)
+    assert at_once.messages == singly.messages
+    for each in fields(at_once.moves):
+        one, other = getattr(at_once.moves, each.name), getattr(singly.moves, each.name)
+        if isinstance(one, np.ndarray):
+            assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), each.name
 
 
 @pytest.mark.parametrize("compiled", [False, True])

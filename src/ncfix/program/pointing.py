@@ -145,10 +145,14 @@ def _triple(vector: FloatArray) -> Triple:
 
 
 def _turned(axis: Triple, angle: float, vector: Triple) -> Triple:
-    along, sideways = dot(axis, vector), cross(axis, vector)
+    along, (u, v, w) = dot(axis, vector), cross(axis, vector)
     c, s = math.cos(angle), math.sin(angle)
-    x, y, z = (along * k * (1 - c) + c * v + s * w for k, v, w in zip(axis, vector, sideways, strict=True))
-    return x, y, z
+    rest = 1 - c
+    return (
+        along * axis[0] * rest + c * vector[0] + s * u,
+        along * axis[1] * rest + c * vector[1] + s * v,
+        along * axis[2] * rest + c * vector[2] + s * w,
+    )
 
 
 def _across(axis: Triple, vector: Triple) -> Triple:

@@ -16,13 +16,14 @@ from ncfix.program.reader import read
 from ncfix.program.recurrence import NEVER_ENDS, Recurrence
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
+from ncfix.program.rs274.places import mask_of
 from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.calling import call_word
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import stand
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
-from ncfix.program.sinumerik.orientation import leads_along
+from ncfix.program.sinumerik.orientation import leads_along, turning
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
@@ -31,6 +32,7 @@ from ncfix.program.sinumerik.sweep import DECIDED_AT_RUNTIME, demoted, sweep
 from ncfix.program.sinumerik.synchronous import is_harmless
 from ncfix.program.sinumerik.unit import Unit, units_of
 from ncfix.program.sinumerik.unroll import Recorder
+from ncfix.program.sinumerik.vectors import run_vectors
 from ncfix.program.tree import Program, Span
 
 ENDLESS = "NCF233"
@@ -125,8 +127,10 @@ class Interpreter:
                 course.finish()
                 continue
             main = not course.unit.external
-            if course.unit.plan(course.block).lane is not None and self.lane_is_open():
-                done = run_lane(control, course.unit, course.block, main)  # type: ignore[arg-type]
+            plan = course.unit.plan(course.block)
+            if plan.lane is not None and self.lane_is_open():
+                run = run_lane if plan.vector is None else run_vectors
+                done = run(control, course.unit, course.block, main)  # type: ignore[arg-type]
                 if done:
                     self.stand(done)
                     course.block += done
@@ -134,7 +138,6 @@ class Interpreter:
                     self.spend(done)
                     continue
             unit, block = course.unit, course.block
-            plan = unit.plan(block)
             course.block += 1
             self.spend(1)
             if self.execute(plan):
@@ -164,7 +167,10 @@ class Interpreter:
         control.fresh_tool = False
         if control.counted != control.footing:
             shapes = np.unique(unit.program.template[block : block + blocks])
-            named = reduce(or_, (unit.plan_of_shape(shape).axes for shape in shapes.tolist()))
+            plans = [unit.plan_of_shape(shape) for shape in shapes.tolist()]
+            named = reduce(or_, (plan.axes for plan in plans))
+            if any(plan.vector is not None for plan in plans):
+                named |= mask_of(turning(control))
             stand(control, named, by_machine=False)
 
     def spend(self, blocks: int) -> None:

@@ -32,6 +32,8 @@ OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA",
 """Other ways to say how the tool stands, which are not followed."""
 
 BAD_VECTOR = "NCF254"
+NO_LENGTH = 1e-9
+"""A shorter vector says nothing."""
 WAY = "NCF253"
 AT_RUNTIME = "the direction of the tool is known only at run time"
 NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
@@ -144,16 +146,21 @@ TURNS = {
 def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:
     """A vector of the program as a unit vector in the workpiece."""
     size = math.hypot(*vector)
-    if size < 1e-9:
+    if size < NO_LENGTH:
         raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
     return np.array([dot(row, vector) / size for row in control.rotation])
+
+
+def is_choice(pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]) -> bool:
+    """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+    return len(ways) > 1 and pointing.at_pole(pointing.at(*here)) and not pointing.at_pole(pointing.at(*ways[0]))
 
 
 def note_choice(
     control: Sinumerik, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
 ) -> None:
-    """Say which way was taken where the tool stood along the outer axis, so that either would have been as near."""
-    if len(ways) < 2 or not pointing.at_pole(pointing.at(*here)) or pointing.at_pole(pointing.at(*ways[0])):
+    """Say which way was taken where either would have been as near."""
+    if not is_choice(pointing, here, ways):
         return
     names = [LETTERS[control.machine[column]] for column in pointing.columns]
     angles = " ".join(f"{name}{angle / DEGREE:.3f}" for name, angle in zip(names, ways[0], strict=True))

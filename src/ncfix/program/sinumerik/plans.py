@@ -37,6 +37,7 @@ LISTS = frozenset({BRACKET, "set", "rep"})
 
 ANY_PARAMETER = "r[]"
 LANE_LETTERS = INDEX.keys() | {"F", "N"}
+DIRECTION = ("A3", "B3", "C3")
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,7 @@ class Plan:
     skip       the level of block skip, 0 without
     opaque     kinds of text that is passed over or not understood
     lane       set if the block may go through the fast lane
+    vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
     """
 
     template: Template
@@ -116,6 +118,7 @@ class Plan:
     skip: int = -1
     opaque: frozenset[str] = frozenset()
     lane: Lane | None = None
+    vector: tuple[int, ...] | None = None
     names: frozenset[str] = field(default=frozenset())
 
 
@@ -137,6 +140,8 @@ def plan_of(template: Template) -> Plan:
     plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
     plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
     plan.lane = lane_of(plan)
+    if plan.lane is not None and not template.slots.keys().isdisjoint(DIRECTION):
+        plan.vector = tuple(template.slots.get(address, -1) for address in DIRECTION)
     return plan
 
 
@@ -228,7 +233,9 @@ def lane_of(plan: Plan) -> Lane | None:
     plain = all(isinstance(item, Word | Comment) for item in items)
     words = plan.template.words
     letters = {word.address for word in words} - {"G", ":"}
-    if not plain or plan.m or len(plan.g) > 1 or not set(plan.g) <= {0, 10} or not letters <= LANE_LETTERS:
+    pointed = not letters.isdisjoint(DIRECTION)
+    allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS
+    if not plain or plan.m or len(plan.g) > 1 or not set(plan.g) <= {0, 10} or not letters <= allowed:
         return None
     if any(not isinstance(word.value, Literal) for word in words if not is_code(word)) or len(letters) < len(
         [word for word in words if not is_code(word)]

@@ -89,6 +89,8 @@ class Unit:
     saves: bool = False
     _lane_stops: NDArray[np.int64] | None = None
     _lanes: LaneTables | None = None
+    _vector_stops: NDArray[np.int64] | None = None
+    _vectors: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         self._match_structures()
@@ -112,10 +114,27 @@ class Unit:
     def lane_end(self, block: int) -> int:
         """The first block from `block` on that cannot go through the fast lane."""
         if self._lane_stops is None:
-            closed = np.array([plan.lane is None for plan in self.text.plans], dtype=np.bool_)
+            closed = np.array(
+                [plan.lane is None or plan.vector is not None for plan in self.text.plans], dtype=np.bool_
+            )
             blocked = np.flatnonzero(closed[self.program.template[self.begin : self.stop]]) + self.begin
             self._lane_stops = np.append(blocked, self.stop)
         return int(self._lane_stops[np.searchsorted(self._lane_stops, block)])
+
+    def vector_end(self, block: int) -> int:
+        """The first block from `block` on that gives no direction of the tool, or is not for the fast lane."""
+        if self._vector_stops is None:
+            other = np.array([plan.vector is None for plan in self.text.plans], dtype=np.bool_)
+            blocked = np.flatnonzero(other[self.program.template[self.begin : self.stop]]) + self.begin
+            self._vector_stops = np.append(blocked, self.stop)
+        return int(self._vector_stops[np.searchsorted(self._vector_stops, block)])
+
+    @property
+    def vectors(self) -> NDArray[np.int64]:
+        """(s, 3) the slots of A3 B3 C3 in the blocks of each shape, -1 for none."""
+        if self._vectors is None:
+            self._vectors = np.array([plan.vector or (-1, -1, -1) for plan in self.text.plans], dtype=np.int64)
+        return self._vectors
 
     @property
     def lanes(self) -> LaneTables:
