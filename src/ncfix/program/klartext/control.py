@@ -115,6 +115,7 @@ class Control(base.Control):
         self.shortest = False
         self.pointing: Pointing | None = None
         self.points = False
+        self.stood: tuple[Vector, object] | None = None
         self.auto_feed = math.nan
         self.preset = ""
         self.preset_checked = False

@@ -55,6 +55,15 @@ def posture(control: Control, position: Vector) -> Posture | None:
     if control.kinematics is None or not {X, Y, Z} <= set(control.machine):
         return None
     still = [value if control.rotary[index] else 0.0 for index, value in enumerate(position)]
+    if control.stood is None or control.stood[0] != still:
+        control.stood = still, _posture(control, still)
+    found = control.stood[1]
+    assert found is None or isinstance(found, Posture)
+    return found
+
+
+def _posture(control: Control, still: Vector) -> Posture | None:
+    """As `posture`, with X Y Z at zero."""
     origin = tip(control, still, 0.0)
     tool = unit(minus(origin, tip(control, still, PROBE)))
     columns = []

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ncfix.program.klartext.control import SPATIAL, Control
 from ncfix.program.rs274.control import ADRIFT, AT_START, Unknown
@@ -37,19 +38,34 @@ class Words:
     @property
     def axes(self) -> int:
         """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar`)."""
-        letters = {address.removeprefix("I") for address in self.values if address not in ("PA", "PR", "IPA", "IPR")}
-        return sum(1 << INDEX[letter] for letter in letters if letter in INDEX)
+        return _axes_of(tuple(self.values))
 
     @property
     def incremental(self) -> bool:
         """Some word counts from where the axis stands."""
-        return any(address[0] == "I" for address in self.values)
+        return _counts_on(tuple(self.values))
 
 
-def axis_letters(words: Words) -> list[str]:
+def axis_letters(words: Words) -> tuple[str, ...]:
     """The axes that have a word."""
-    letters = (address.removeprefix("I") for address in words.values)
-    return [letter for letter in letters if letter in INDEX]
+    return _letters_of(tuple(words.values))
+
+
+@lru_cache(maxsize=1024)
+def _axes_of(addresses: tuple[str, ...]) -> int:
+    letters = {address.removeprefix("I") for address in addresses if address not in ("PA", "PR", "IPA", "IPR")}
+    return sum(1 << INDEX[letter] for letter in letters if letter in INDEX)
+
+
+@lru_cache(maxsize=1024)
+def _counts_on(addresses: tuple[str, ...]) -> bool:
+    return any(address[0] == "I" for address in addresses)
+
+
+@lru_cache(maxsize=1024)
+def _letters_of(addresses: tuple[str, ...]) -> tuple[str, ...]:
+    letters = (address.removeprefix("I") for address in addresses)
+    return tuple(letter for letter in letters if letter in INDEX)
 
 
 @dataclass(slots=True)
@@ -132,6 +148,8 @@ def derived(control: Control, words: Words, axes: int) -> str:
     Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
     that the program may not have said.
     """
+    if not control.places.adrift:
+        return ""
     own = words.axes
     if {"PR", "PA"} <= words.values.keys():
         own |= polar_axes(control, words)
