@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
@@ -26,7 +26,7 @@ from ncfix.program.rs274.coordinates import (
 )
 from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
 from ncfix.program.rs274.knowledge import Knowledge
-from ncfix.program.rs274.modal import Modal, Offsets, Saved
+from ncfix.program.rs274.modal import Modal, Offsets, Saved, Tools
 from ncfix.program.rs274.parameters import Parameters
 from ncfix.program.rs274.places import Places, mask_of
 from ncfix.program.setup import Setup
@@ -64,21 +64,6 @@ class Block:
     def get(self, letter: str, default: float = 0.0) -> float:
         """The value of a word."""
         return self.values.get(letter, default)
-
-
-@dataclass(slots=True)
-class Tools:
-    """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
-
-    lengths   lengths that the program has set (G10 L1), mm
-    measured  tools whose length it has set from what is known only at run time
-    """
-
-    selected: int = 0
-    spindle: int = 0
-    offset: int | None = None
-    lengths: dict[int, float] = field(default_factory=dict)
-    measured: set[int] = field(default_factory=set)
 
 
 class Control:

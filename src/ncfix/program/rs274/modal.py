@@ -96,3 +96,18 @@ class Offsets:
     centre: Vector = field(default_factory=zeros)
     feature: Vector = field(default_factory=zeros)
     rotation: Rotation = IDENTITY
+
+
+@dataclass(slots=True)
+class Tools:
+    """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
+
+    lengths   lengths that the program has set (G10 L1), mm
+    measured  tools whose length it has set from what is known only at run time
+    """
+
+    selected: int = 0
+    spindle: int = 0
+    offset: int | None = None
+    lengths: dict[int, float] = field(default_factory=dict)
+    measured: set[int] = field(default_factory=set)
