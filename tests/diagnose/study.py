@@ -1,7 +1,8 @@
 """How often the diagnosis is right on worlds of its own: `python tests/diagnose/study.py single=20 deleted=20 ...`.
 
 `--set weighing.MISSHAPEN=0.1` tries another value of a constant, `--from 40` other worlds, `--log FILE` keeps a line
-of JSON for every scene. Prints a row of the table of docs/diagnose.md for every family.
+of JSON for every scene, and `--read FILE` takes such scenes as done. Prints the table of docs/diagnose.md, or puts it
+there with `--table docs/diagnose.md`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.random import Generator
 
+from diagnose.tables import put
 from diagnose.worlds import FOREIGN, THERMAL, World
 from ncfix.diagnose.diagnosis import Diagnosis, diagnose
 from ncfix.diagnose.verdict import NOTHING, UNKNOWN
@@ -166,34 +168,43 @@ class Outcome:
     seconds: float
 
 
-def outcome(family: str, index: int) -> Outcome:
-    """One scene."""
-    drawn, right, _ = FAMILIES[family]
+def drawn(family: str, index: int) -> tuple[World, Scene, Generator]:
+    """One scene, where it is, and chance for the noise."""
     name, kind = WORLDS[index % len(WORLDS)]
     world = World.of(name, index // len(WORLDS) % EACH, kind=kind)
     random = np.random.default_rng([index, *family.encode()])
-    scene = drawn(world, random)
+    return world, FAMILIES[family][0](world, random), random
+
+
+def outcome(family: str, index: int) -> Outcome:
+    """What comes out of one scene."""
+    world, scene, random = drawn(family, index)
     measured, started = world.measured(scene.shown, random, bool(index % 2)), time.process_time()
     found = diagnose([measured], world.machine, scene.refused)
     seconds = time.process_time() - started
     sets = tuple((each.candidate.name, *each.aliases) for each in found.findings)
     unnamed = f"{found.unknown_um:.1f} um {found.rest.kind}" if found.unknown_um else ""
-    good = right(found, scene, world), inside(found, scene), exact(found, scene, world)
-    return Outcome(family, index, f"{name} {kind}", scene.names, found.verdict, sets, unnamed, *good, round(seconds, 2))
+    good = FAMILIES[family][1](found, scene, world), inside(found, scene), exact(found, scene, world)
+    place = " ".join(WORLDS[index % len(WORLDS)])
+    return Outcome(family, index, place, scene.names, found.verdict, sets, unnamed, *good, round(seconds, 2))
+
+
+NAMED = ("single", "thermal", "curves", "weak", "two", "three")
+"""Families in which names are to be found."""
+HEAD = (
+    "| what | right | in the set | alone | names in a set | s, median | s, longest |",
+    "|---|---|---|---|---|---|---|",
+)
 
 
 def row(family: str, found: Sequence[Outcome]) -> str:
     """A row of the table: right, in the set, alone; how many names a set has; processor seconds, median and longest."""
-    count, said = len(found), [len(each.sets[0]) for each in found if each.sets]
-    named = family in ("single", "thermal", "curves", "weak", "two", "three")
-    sets = (
-        f"{sum(e.inside for e in found)} | {sum(e.exact for e in found)} | {np.mean(said or [0]):.2f}"
-        if named
-        else "| |"
-    )
+    said, count = [len(each.sets[0]) for each in found if each.sets], len(found)
+    counts = f"{sum(each.inside for each in found)} | {sum(each.exact for each in found)} | {np.mean(said or [0]):.2f}"
     times = np.array([each.seconds for each in found])
     right = f"{sum(each.right for each in found)} of {count}"
-    return f"| {FAMILIES[family][2]} | {right} | {sets} | {np.median(times):.1f} | {times.max():.1f} |"
+    named = counts if family in NAMED else " | | "
+    return f"| {FAMILIES[family][2]} | {right} | {named} | {np.median(times):.1f} | {times.max():.1f} |"
 
 
 def outcomes(family: str, indices: Sequence[int], log: str | None) -> Iterator[Outcome]:
@@ -207,21 +218,34 @@ def outcomes(family: str, indices: Sequence[int], log: str | None) -> Iterator[O
         yield found
 
 
+def read(path: str) -> list[Outcome]:
+    """The scenes of a log."""
+    with open(path, encoding="utf-8") as file:
+        return [Outcome(**json.loads(line)) for line in file]
+
+
 def main() -> None:
     wanted = argparse.ArgumentParser(description=__doc__)
-    wanted.add_argument("families", nargs="+", help="family=count")
+    wanted.add_argument("families", nargs="*", help="family=count")
     wanted.add_argument("--set", action="append", default=[], help="module.NAME=value")
     wanted.add_argument("--from", dest="start", type=int, default=0)
     wanted.add_argument("--log")
+    wanted.add_argument("--read", action="append", default=[])
+    wanted.add_argument("--table")
     given = wanted.parse_args()
     for each in given.set:
         place, value = each.split("=")
         module, name = place.rsplit(".", 1)
         setattr(importlib.import_module(f"ncfix.diagnose.{module}"), name, float(value))
+    found = [each for path in given.read for each in read(path)]
     for argument in given.families:
         family, count = argument.split("=")
-        indices = range(given.start, given.start + int(count))
-        print(row(family, list(outcomes(family, indices, given.log))), flush=True)
+        found += outcomes(family, range(given.start, given.start + int(count)), given.log)
+    own = {family: [each for each in found if each.family == family] for family in FAMILIES}
+    lines = [*HEAD, *(row(family, each) for family, each in own.items() if each)]
+    print("\n".join(lines))
+    if given.table:
+        put(given.table, "study", lines)
 
 
 if __name__ == "__main__":

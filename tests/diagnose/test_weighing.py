@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
 from diagnose.worlds import World
-from ncfix.diagnose.background import background, everything_of
+from ncfix.diagnose.background import PRIOR, SHARES, background, everything_of, marginal
 from ncfix.diagnose.diagnosis import FOUND, UNKNOWN, diagnose
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.rivals import rivals
@@ -53,6 +54,21 @@ def test_noise_alone_rarely_weighs_more_than_nothing(court: Court) -> None:
         alarms += best > scale.weight({})
     assert alarms <= 4
     assert pytest.approx(np.exp(-SURE)) == FALSE_ALARM
+
+
+def test_the_likelihood_of_a_set_is_that_of_one_normal_distribution(court: Court) -> None:
+    """From inner products of pairs, the same as with the covariance written out; its scale is integrated out."""
+    members = [Member(court.forms["EXX"][0], 6.0), Member(court.forms["drift Y"][0], 3.0)]
+    beside = np.random.default_rng(2).normal(size=(len(court.y), 3))
+    found, parts = court.likelihood(members, beside), []
+    known = [court.columns[:, court.part(each.group)] * each.size for each in members]
+    for share, prior in zip(SHARES, PRIOR, strict=True):
+        whole = np.diag(court.background.variance(share))
+        whole += sum((each @ each.T for each in [*known, beside]), np.zeros_like(whole))
+        squares = float(court.y @ np.linalg.solve(whole, court.y))
+        determinant = float(np.linalg.slogdet(whole)[1])
+        parts.append(marginal(squares, determinant, len(court.y), court.background.freedom) + np.log(prior))
+    assert found == pytest.approx(float(logsumexp(parts)), abs=1e-4)  # evidence.FALLEN: exp(-12) is left away
 
 
 def test_every_further_name_pays_less_than_the_first() -> None:
@@ -111,6 +127,21 @@ def test_warmth_far_from_twenty_degrees_hides_nothing(world: World) -> None:
     )
     hidden = {candidate.name for candidate, _ in replace(world, plain=warm).gathered.invisible}
     assert not hidden & {"spindle growth", "drift X", "thermal scale X", "artefact growth"}
+
+
+@pytest.mark.parametrize(("seed", "name"), [(2, "thermal bend EBX"), (3, "drift X")])
+def test_what_warms_is_named_by_where_it_acts_whatever_the_sensors_say(world: World, seed: int, name: str) -> None:
+    """Sensors that are late and sit on other bodies: the course is the effect's own."""
+    random = np.random.default_rng(seed)
+    found = diagnose([world.measured(world.effect(name, SIZE_UM, random), random)], world.machine)
+    assert len(found.findings) == 1
+    assert name in (found.findings[0].candidate.name, *found.findings[0].aliases)
+
+
+def test_what_happens_in_three_directions_is_no_three_drifts(five: World) -> None:
+    random = np.random.default_rng(4)
+    found = diagnose([five.measured(five.foreign("walk", SIZE_UM, random), random)], five.machine)
+    assert (found.verdict, found.findings) == (UNKNOWN, ())
 
 
 def test_an_artefact_that_grows_is_named(world: World) -> None:
