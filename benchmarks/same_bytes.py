@@ -22,6 +22,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import controls
 import programs
 
 from ncfix import fast
@@ -238,6 +239,17 @@ def long_programs(blocks: int, folder: Path) -> Iterator[Case]:
         yield Case(path, "linuxcnc", load(MACHINE), setup, ("--offset", "G54=0,0,0,0,0", "--assume-zero"))
 
 
+def others(blocks: int, folder: Path) -> Iterator[Case]:
+    """Long programs of other controls."""
+    setup = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True, no_point="calculator")
+    for control in controls.OTHERS:
+        for style in control.programs.STYLES:
+            path = folder / f"{control.dialect}_{style}"
+            control.programs.write(path, blocks, style)
+            arguments = ("--assume-zero", *controls.OFFSET, "--no-point", "calculator")
+            yield Case(path, control.dialect, load(MACHINE), setup, arguments)
+
+
 def main() -> int:
     """Compare all, and put the table into the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -249,6 +261,8 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         cases = long_programs(given.blocks, Path(folder))
         rows.append(compared(f"benchmark, {given.blocks} blocks", cases, LONG_WAYS))
+        cases = others(given.blocks // 5, Path(folder))
+        rows.append(compared(f"benchmark of other controls, {given.blocks // 5} blocks", cases, LONG_WAYS))
     rows += [compared(f"corpus, {name}", corpus(name, given.most), SHORT_WAYS) for name in FOLDERS]
     write(rows, given.most)
     return int(any(row.differing for row in rows))
