@@ -36,9 +36,11 @@ HEIDENHAIN = Dialect(
         "rotary axes that are positioned in a tilted plane, TOOL CALL, BLK FORM, other M codes",
     ),
     refuses=(
-        "free contours (FK), other cycles with a path of their own, called programs (they are not rewritten)",
+        "other cycles with a path of their own, called programs (they are not rewritten)",
+        "free contours (FK): --flatten writes those that have one solution as lines and arcs",
         "patterns (PATTERN DEF with CYCL CALL PAT, cycles 220, 221) without --flatten, which writes their holes out",
         "tables of datums, TCPM with spatial angles or another point than the tip, M114, M138, M144",
+        "rotary axes with a datum of their own under M128 or PLANE; increments of more than half a turn under M126",
         "what follows a probing cycle that sets a datum or a rotation, until a preset is chosen",
         "a shift in a rotated frame, mirror with rotation, a scale of single axes: how they add up is not sure",
         "what depends on Q parameters that the control sets, blocks executed from several states",
