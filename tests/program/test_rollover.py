@@ -60,6 +60,15 @@ def test_no_piece_leads_the_axis_round(machine: Machine) -> None:
     assert np.all(np.abs(np.diff(angles[2:])) < 100.0)
 
 
+def test_a_corrected_angle_leads_no_axis_round(machine: Machine) -> None:
+    text = HEAD + "X10. A20. C30.\nX20. C40.\nX30. C219.995\nX40. C200.\nM30\n"
+    options = FixOptions(strategy="full", verify=False)
+    fixed = fix_program(read(text.encode(), "part.nc", "fanuc"), machine, SETUP, options).text.decode()
+    assert "C219.995" in fixed
+    assert "C40." in fixed
+    assert "C30.00" in fixed
+
+
 @pytest.mark.parametrize("words", ["I10. J0. K5.", "I10. J0. L2", "I10. J0. P3", "I10. J0. Q2."])
 def test_spirals_are_refused(words: str, machine: Machine) -> None:
     text = HEAD + f"G2 X20. Y0. Z-5. {words}\nG0 X0. Y0. Z50.\nM30\n"

@@ -217,6 +217,8 @@ class MacroInterpreter(Interpreter):
         before = self.control.offsets.tool[Z]
         super().settings(codes, block)
         lone_number(self.control, block, codes)
+        if self.control.vectors and codes.takes and block.values.keys() & {*vectors.COMPONENTS}:
+            self.control.lose(vectors.turning(self.control), vectors.AFTER_VECTOR)
         changed = self.control.offsets.tool[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)

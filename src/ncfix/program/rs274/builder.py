@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.moves import Frame, Kind, Moves, Rule
 from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.program.rs274.rollover import overturned
+from ncfix.program.rs274.rollover import doubtful, overturned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -251,11 +251,12 @@ class Builder:
         }
 
     def _keep_whole(self, styles: dict[str, NDArray[Any]], start: FloatArray, end: FloatArray, block: IntArray) -> None:
-        """Motions in which an axis might roll over must not be split."""
+        """Motions in which an axis might roll over must not be split, nor their angles led to the other side."""
         if self.rolls is None:
             return
         rows = overturned(self.rolls, start, end) & (styles["rule"] != Rule.PASS) & ~styles["incremental"]
         styles["compensated"] = styles["compensated"] | rows
+        styles["held"] = styles["held"] | doubtful(self.rolls, start, end)
         cuts = np.flatnonzero(rows & (styles["kind"] != Kind.RAPID))
         if cuts.size and self.overturned is None:
             self.overturned = int(block[cuts[0]])

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 ROLLED = "NCF247"
 HALF_A_TURN = math.pi * (1 - 1e-9)
+BESIDE = math.radians(0.5)
+"""rad; no correction turns an axis by as much."""
+
 TEXT = (
     "a rotary axis turns by half a turn or more here: a control with roll-over goes the other way, and such motions are"
     " corrected at their ends and not split"
@@ -43,6 +46,13 @@ def overturned(rolls: NDArray[np.bool_], start: NDArray[np.float64], end: NDArra
     """Motions (n,) from `start` to `end` (n, n_axes), rad, that turn such an axis by half a turn or more."""
     way = np.abs(end[:, rolls] - start[:, rolls])
     return np.asarray((way >= HALF_A_TURN).any(axis=1))
+
+
+def doubtful(rolls: NDArray[np.bool_], start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Motions (n,) about half a turn long, and those before them: a correction of the angle might turn them round."""
+    way = np.abs(end[:, rolls] - start[:, rolls])
+    near: NDArray[np.bool_] = np.any(np.abs(way - math.pi) < BESIDE, axis=1)
+    return np.asarray(near | np.append(near[1:], False))
 
 
 def say(control: Control, program: Program) -> None:
