@@ -5,12 +5,25 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from ncfix.program.klartext.plans import FUNCTIONS, OPENING, owners
 from ncfix.program.layout import AXIS_LETTERS
-from ncfix.program.tree import Anchor, Command, Comment, Constant, Item, Literal, Opaque, Program, Skip, Span, Word
+from ncfix.program.tree import (
+    Anchor,
+    Command,
+    Comment,
+    Constant,
+    Item,
+    Literal,
+    Opaque,
+    Program,
+    Skip,
+    Span,
+    Template,
+    Word,
+)
 
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
@@ -76,7 +89,37 @@ class Layout:
 
 def layout_of(program: Program, block: int) -> Layout | None:
     """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
-    items = program.items_of(block)
+    found = _of_shape(Shape(program.templates[int(program.template[block])]))
+    if found is None:
+        return None
+    layout, last = found
+    return replace(
+        layout,
+        blank=separator(program, block, last),
+        comma=uses_comma(program.source),
+        corner=is_corner(program, block, -1) or is_corner(program, block, 1),
+    )
+
+
+class Shape:
+    """A template as a key: two are the same only if they are one."""
+
+    __slots__ = ("template",)
+
+    def __init__(self, template: Template) -> None:
+        self.template = template
+
+    def __hash__(self) -> int:
+        return id(self.template)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Shape) and other.template is self.template
+
+
+@lru_cache(maxsize=4096)
+def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
+    """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
+    items = shape.template.items
     commands = [item for item in items if isinstance(item, Command)]
     owned = owners(items)
     words = [w for k, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and k not in owned]
@@ -89,8 +132,8 @@ def layout_of(program: Program, block: int) -> Layout | None:
         return None
     leading = [*axes.values(), *polar]
     begins = [item.span.start for item in items if not isinstance(item, Skip) and item not in numbers_of(items)]
-    last = max(leading, key=lambda word: program.position(block, word.span.stop), default=None)
-    return Layout(
+    last = max(leading, key=lambda word: word.span.stop, default=None)
+    layout = Layout(
         name=function.name if function else "",
         function=function.span if function else None,
         axes=axes,
@@ -103,23 +146,31 @@ def layout_of(program: Program, block: int) -> Layout | None:
         ),
         words_at=last.span.stop if last else function.span.stop if function else Anchor(-1, 0),
         starts_at=begins[0] if begins else Anchor(-1, 0),
-        blank=separator(program, block, last),
-        comma=uses_comma(program.source),
+        blank=" ",
+        comma=False,
         rapid=any(command.name == "fmax" for command in commands),
-        corner=is_corner(program, block, -1) or is_corner(program, block, 1),
+        corner=False,
     )
+    return layout, last
 
 
 def is_corner(program: Program, block: int, way: int) -> bool:
     """Whether the next element of the path is RND or CHF; `way`: 1 after this block, -1 before it."""
     block += way
     while 0 <= block < len(program):
-        items = program.items_of(block)
-        if not is_between(items):
-            names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
-            return any(name.lower() in CORNERS for name in names)
+        between, corner = _in_path(Shape(program.templates[int(program.template[block])]))
+        if not between:
+            return corner
         block += way
     return False
+
+
+@lru_cache(maxsize=4096)
+def _in_path(shape: Shape) -> tuple[bool, bool]:
+    """Whether blocks of a shape stand between elements of the path, and whether they are corners."""
+    items = shape.template.items
+    names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
+    return is_between(items), any(name.lower() in CORNERS for name in names)
 
 
 def is_between(items: Sequence[Item]) -> bool:
