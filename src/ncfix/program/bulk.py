@@ -150,7 +150,7 @@ class Bulk:
     def _compiled(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
         """The same, compiled."""
         from ncfix.program import writing_kernels
-        from ncfix.program.writing_kernels import ROOM
+        from ncfix.program.number_kernels import ROOM
 
         stop = int(self.stop[row])
         if stop == row:

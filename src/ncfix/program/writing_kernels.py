@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ncfix.kernel import Library
 from ncfix.program.bulk_layouts import LED_HEAD
-from ncfix.program.number_text import LARGEST, LONGEST, MINUS, MOST_DECIMALS, PLUS, TENS, TIE, ZERO
-from ncfix.program.numbers import POINT, POWERS
+from ncfix.program.number_kernels import HELPERS, copied, put_all, put_in_style, put_new
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -29,125 +28,10 @@ Digits = tuple[Ints, Floats, int]
 Lines = tuple[Bytes, Ints, Bytes, Bytes]
 """Of further pieces: the end of a line, and `leads`, `openings`, `closings` of `Layouts`."""
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__file__, HELPERS)
 
 ROUNDED = 1.01
 """Half output steps by which an axis may stand off its place for nothing but rounding."""
-
-MOST_STEPS = 18
-"""Decimals of the finest output step that is written here."""
-ROOM = LONGEST + MOST_STEPS + 4
-"""Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
-
-
-@LIBRARY.helper
-def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
-    """Copy some bytes to `at`; where the next one goes."""
-    for place in range(start, stop):
-        out[at + place - start] = data[place]
-    return at + stop - start
-
-
-@LIBRARY.helper
-def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool, bool, int, bool]:
-    """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that.
-
-    `signed`: a minus sign counts as one, too: what had a sign keeps one.
-    """
-    first = start + (text[start] == PLUS or text[start] == MINUS)
-    point = -1
-    for place in range(first, stop):
-        character = text[place]
-        if character == POINT and point < 0:
-            point = place
-        elif character < ZERO or character > ZERO + 9:
-            return 0, False, False, 0, False
-    decimals = stop - point - 1 if point >= 0 else 0
-    clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
-    plus = text[start] == PLUS or (signed != 0 and text[start] == MINUS)
-    return decimals, point >= 0, plus, stop - first - decimals - (point >= 0), clear
-
-
-@LIBRARY.helper
-def steps_of(value: float, decimals: int) -> int:
-    """The output steps of a number; -1 where it is too large, or too near to the middle between two outputs."""
-    if decimals > MOST_STEPS:
-        return -1
-    steps = abs(value) * POWERS[decimals]
-    if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE * steps):
-        return -1
-    return int(np.rint(steps))
-
-
-@LIBRARY.helper
-def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, point: bool) -> int:
-    """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero."""
-    whole, fraction = steps // TENS[decimals], steps % TENS[decimals]
-    if sign:
-        data[at] = sign
-        at += 1
-    count = max(least, 0 if whole == 0 and least < 0 and decimals > 0 else 1)
-    while count < 18 and whole >= TENS[count]:
-        count += 1
-    for place in range(at + count - 1, at - 1, -1):
-        data[place] = ZERO + whole % 10
-        whole //= 10
-    at += count
-    if point or decimals > 0:
-        data[at] = POINT
-        at += 1
-    for place in range(at + decimals - 1, at - 1, -1):
-        data[place] = ZERO + fraction % 10
-        fraction //= 10
-    return at + decimals
-
-
-@LIBRARY.helper
-def put_in_style(
-    data: Bytes, at: int, text: Bytes, start: int, stop: int, value: float, decimals: int, signed: int
-) -> tuple[int, float]:
-    """Write a value in the style of the number at a span, as `NumberStyle.write`; -1 where that is not clear.
-
-    Returns where the next byte goes, and what a reader makes of the number.
-    """
-    own, point, plus, whole, clear = style_of(text, start, stop, signed)
-    if not clear:
-        return -1, 0.0
-    most = max(own, decimals)
-    steps = steps_of(value, most)
-    if steps < 0:
-        return -1, 0.0
-    read = np.copysign(steps / POWERS[most], value) + 0.0
-    while most > own and steps % 10 == 0:
-        steps //= 10
-        most -= 1
-    sign = MINUS if value < 0 and steps != 0 else PLUS if plus else 0
-    padded = whole > 1 and text[stop - own - point - whole] == ZERO
-    least = whole if padded else -1 if whole == 0 else 1
-    return put(data, at, steps, most, sign, least, point), read
-
-
-@LIBRARY.helper
-def put_all(data: Bytes, at: int, characters: Bytes) -> int:
-    """Write all of some bytes that are not 0; where the next byte goes."""
-    for character in characters:
-        if character:
-            data[at] = character
-            at += 1
-    return at
-
-
-@LIBRARY.helper
-def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int, signed: int) -> tuple[int, float]:
-    """Write a missing word: what stands before its number, and the number with all decimals; -1 if not clear."""
-    steps = steps_of(value, decimals)
-    if steps < 0:
-        return -1, 0.0
-    at = put_all(data, at, head)
-    sign = MINUS if np.signbit(value) else 0
-    if signed != 0:
-        sign = MINUS if value < 0 and steps != 0 else PLUS
-    return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
 
 
 @LIBRARY.helper
@@ -287,6 +171,44 @@ def to_commands(now: Floats, told: Mask, here: Floats, frame: tuple[Floats, Floa
         out[axis] = now[axis] * scale[axis] + offset[axis] if told[axis] else here[axis]
 
 
+@LIBRARY.helper
+def set_out(here: Floats, target: Floats, frame: tuple[Floats, Floats], axes: Axes) -> None:
+    """Put down the numbers of where the axes stand and where they shall be; none has been told to move yet."""
+    wanted, now, told = axes
+    to_numbers(here, frame, now)
+    to_numbers(target, frame, wanted)
+    told[:] = False
+
+
+@LIBRARY.helper
+def put_lines(
+    data: Bytes,
+    at: int,
+    text: Bytes,
+    lead: tuple[int, int],
+    lines: Lines,
+    shape: int,
+    style: tuple[Ints, Bytes, Axes, Digits],
+    standing: tuple[Floats, tuple[Floats, Floats]],
+    ends: Floats,
+    commands: Floats,
+) -> int:
+    """Write the further pieces of a motion, each as `put_line` does, by `style` (its last four arguments).
+
+    standing  where the control stands before the motion, and the frame
+    ends      (k, axes) commands at the ends of the pieces; `commands`: room for those that are written
+    """
+    (by_letter, heads, axes, digits), (here, frame) = style, standing
+    wanted, now, told = axes
+    for piece in range(len(ends)):
+        to_numbers(ends[piece], frame, wanted)
+        at = put_line(data, at, text, lead, lines, shape, by_letter, heads, axes, digits)
+        if at < 0:
+            break
+        to_commands(now, told, here, frame, commands[piece])
+    return at
+
+
 @LIBRARY.kernel(
     "u1[:]",
     ("i8[:,:]", "i4[:]", "i8[:]", "i4[:]"),
@@ -337,24 +259,19 @@ def write(
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
         shape, number, several = shapes[block], first[block], first_piece < last_piece
-        to_numbers(here, frame, now)
-        to_numbers(ends[first_piece], frame, wanted)
-        told[:] = False
+        set_out(here, ends[first_piece], frame, by_axis)
         places = slots[shape], by_place[shape]
         edits, size = rewrite_words(pen, edits, size, text, number, numbers, places, by_axis, several, digits)
         if size >= 0:
             place = place_of(anchors[shape], edges[block], spans, number)
             edits, size = add_words(pen, edits, size, place, by_letter, heads[shape], by_axis, digits)
         to_commands(now, told, here, frame, commands[first_piece])
-        lines_from, lead = size, (edges[block, 0], edges[block, 0])
-        if several:
+        lines_from = size
+        if several and size >= 0:
             lead = edges[block, 0], place_of(leads[shape], edges[block], spans, number)
-        for piece in range(first_piece + 1, last_piece + 1):
-            if size < 0:
-                break
-            to_numbers(ends[piece], frame, wanted)
-            size = put_line(data, size, text, lead, lines, shape, by_letter, heads[shape], by_axis, digits)
-            to_commands(now, told, here, frame, commands[piece])
+            rest, into = ends[first_piece + 1 : last_piece + 1], commands[first_piece + 1 : last_piece + 1]
+            style = by_letter, heads[shape], by_axis, digits
+            size = put_lines(data, size, text, lead, lines, shape, style, (here, frame), rest, into)
         if size < 0:
             edits, size = before, was
             break
