@@ -118,14 +118,14 @@ class Corrector:
 
     def _agreed(self, unit: Unit) -> Agreed:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
-        part = unit.together()
+        part = unit.together
         nowhere = np.zeros(len(part.moves.axes))
         guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
         return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
     def _settled(self, unit: Unit, agreed: Agreed, before: Before | None, share: Share) -> Done:
         """Correct a part by the long way."""
-        task, part = self.task, unit.together()
+        task, part = self.task, unit.together
         moves = part.moves
         first: Agreed | None = agreed
         if before is not None:

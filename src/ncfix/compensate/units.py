@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Part:
     last: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Unit:
     """A part, and the last motion of the one before, which is written already.
 
@@ -44,6 +45,7 @@ class Unit:
     head: Part | None
     direction: Signs
 
+    @cached_property
     def together(self) -> Part:
         """The part behind that motion."""
         if self.head is None:
@@ -184,7 +186,7 @@ class Units:
         part, direction = unit.part, unit.direction
         head = Part(*last_of(part.program, part.moves), False)
         if matters(self.machine):
-            moves = unit.together().moves
+            moves = unit.together.moves
             arrival = Intent(self.placed, moves, State(direction=direction)).arrival
             assert arrival is not None
             direction = arrival[-2] if len(moves) > 1 else direction
