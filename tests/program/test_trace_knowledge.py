@@ -228,3 +228,9 @@ def test_further_work_offsets() -> None:
     with pytest.raises(UsageError) as caught:
         follow("G54.1 P3\nG0 X1", dialect="iso")
     assert caught.value.messages[0].text == "work offset G54.1P3 is used and not given"
+
+
+@pytest.mark.parametrize("setting", ["G10 L20 P1 X0", "G10 L10 P1 R50.", "G10 L1 P1 Z50.", "G10 L2 P1 R30."])
+def test_what_g10_sets_that_controls_take_otherwise_is_refused_in_iso(setting: str) -> None:
+    found = follow(f"G0 X1. Y1. Z1.\n{setting}\nG0 X2.", dialect="iso")
+    assert "differs from control to control" in reasons(found)[-1]

@@ -15,6 +15,7 @@ from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"
+DIFFERS = "what G10 L{} sets differs from control to control (--dialect says which one it is)"
 
 
 # -- tool numbers -----------------------------------------------------------------------------------------------------
@@ -103,14 +104,14 @@ def length_of(control: Control, number: int) -> float:
 def set_data(control: Control, block: Block, code: int) -> None:
     """G10: L2 and L20 set a coordinate system, L1, L10 and L11 a tool."""
     kind = whole(block.get("L", -1.0), "L of G10")
-    if kind in (2, 20):
+    if not control.rules.strict and (kind != 2 or "R" in block.values):
+        control.refusal = control.refusal or DIFFERS.format(kind)
+    elif kind in (2, 20):
         set_system(control, block, at_position=kind == 20)
     elif kind in (1, 10, 11):
         set_tool(control, block, kind)
-    elif control.rules.strict:
+    else:
         raise Fault(BAD_G10, "G10 needs L1, L2, L10, L11 or L20")
-    elif block.axes or "R" in block.values:
-        control.refusal = control.refusal or "G10 sets data of the control that ncfix does not follow"
 
 
 def set_tool(control: Control, block: Block, kind: int) -> None:
