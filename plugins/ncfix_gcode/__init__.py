@@ -30,7 +30,7 @@ ISO = Dialect(
     passes=("G53, G28, G30, G31, dwell, G5.1, G8, G61, tool change and other M codes",),
     refuses=(
         "G16, G51, G51.1, G12.1, G68.2 while in force, threads, incremental canned cycles without --flatten",
-        "everything after a G code that is not known, or after a G10 that sets other things on other controls (L20, L10)",
+        "everything after a G code that is not known, or a G10 that sets other things on other controls (L10, L20)",
         "blocks executed from several states without --flatten",
     ),
 )
