@@ -68,6 +68,7 @@ class Units:
     tools     what was taken as zero of tool lengths, in words
     notes     what there is to say about them
     lacking   what of them is not known
+    led       the tip is under control (TCP), or may be
     """
 
     machine: Machine
@@ -85,6 +86,7 @@ class Units:
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     lacking: dict[str, Message] = field(default_factory=dict)
     units: set[float] = field(default_factory=set)
+    led: bool = True
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -118,6 +120,7 @@ class Units:
             self.reader.first_line += program.lines_ended
             self.blocks += len(program)
             pending.append((program, self.follower.follow(program, last)))
+            self.led = bool(pending[-1][1].tcp.any())
             last |= self.follower.ended
             if not last and not _ends_clean(*pending[-1]):
                 if len(pending) > MOST_PENDING:
@@ -139,9 +142,14 @@ class Units:
         if self.follower.to_the_last and self.rest.strip():
             raise NotInPartsError("text that may belong to the program comes after its end")
 
+    @property
+    def _wanted(self) -> int:
+        """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
+        return self.size // 2 if self.led else self.size
+
     def _texts(self) -> Iterator[tuple[Program, bool]]:
         """The text in parts that end between two blocks of plain words; True with the last one."""
-        wanted = self.size
+        wanted = self._wanted
         while True:
             new = self.read(max(wanted - len(self.rest), self.size // 4))
             text = self.rest + new
@@ -159,7 +167,7 @@ class Units:
             if program is None or not cut:
                 self.rest, wanted = text, 2 * max(wanted, len(text))
                 continue
-            wanted = self.size
+            wanted = self._wanted
             self.rest = text[int(program.blocks[cut, 0]) :]
             yield stretch(program, 0, cut), False
 
