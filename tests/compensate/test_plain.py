@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,8 +15,11 @@ from ncfix import fast
 from ncfix.compensate import corrector
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plain import Course, Planner
+from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.units import Unit
 from ncfix.machine import Machine, load
+from ncfix.program.parts import NotInPartsError
+from ncfix.program.writer import Splices, spliced
 
 FIGURES = ("error_before_um", "error_after_um")
 
@@ -102,6 +106,30 @@ def test_what_comes_near_a_limit_goes_the_long_way(machine: Machine, monkeypatch
     assert plainly.count(True) >= 2
     assert not plainly[-1]
     assert report["refused"]
+
+
+@pytest.mark.parametrize("word", [rb"N\d", rb"X-?\d+\.\d"])
+def test_a_writer_that_gets_a_character_wrong_is_caught(
+    word: bytes, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a number that was written, and in what should have stayed as it was."""
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    plainly, source = counted(monkeypatch), winding(0, 200)
+
+    def wrong(source: bytes, splices: Splices) -> bytes:
+        text = spliced(source, splices)
+        place = list(re.finditer(word, text))[-2].end() - 1
+        return text if len(plainly) < 3 else text[:place] + bytes([text[place] ^ 1]) + text[place + 1 :]
+
+    monkeypatch.setattr(corrector, "spliced", wrong)
+    assert fast.engage()
+    try:
+        with pytest.raises((NotInPartsError, SelfCheckError)):
+            streamed(source, machine, 1500)
+    finally:
+        fast.disengage()
+    assert plainly == [False, True, True]
 
 
 @pytest.mark.parametrize("seed", range(4))
