@@ -13,7 +13,7 @@ from time import process_time
 from typing import Any
 
 from ncfix import fast
-from ncfix.compensate import corrector, path, settle, stream
+from ncfix.compensate import corrector, plain, settle, stream
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.task import Task
 from ncfix.machine import load
@@ -29,15 +29,16 @@ SHOWN = 16
 """Functions of the profile that are shown."""
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
-    ("read the text (twice: the original, and for the proof)", parts.PartReader, "read"),
+    ("read the text (by columns twice)", parts.PartReader, "read"),
+    ("read again what was written", corrector, "reread"),
     ("follow it (twice)", RS274Follower, "follow"),
-    ("correct the ends of motions", path, "corrected"),
-    ("judge the path between them", path, "_judged"),
-    ("split what leaves the tolerance", path, "in_pieces"),
-    ("check limits", settle, "findings"),
-    ("write: which words change, digits", settle, "emit"),
+    ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
+    ("plan, the long way", corrector, "agree"),
+    ("write: which words change, digits", corrector, "written"),
+    ("write, the long way", settle, "emit"),
     ("write: put the text together", corrector, "spliced"),
-    ("figures: tip errors before and after", corrector, "path_error"),
+    ("figures: tip errors before and after", corrector, "figures"),
+    ("figures, the long way", corrector, "path_error"),
 )
 
 
