@@ -57,7 +57,8 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if layout.points and not layout.axes.keys() <= SPATIAL:
         return None
     found = bulk_layout(program, block, layout)
-    return found and replace(found, led=layout.points)
+    further = not (layout.after or layout.prefix or layout.points)
+    return found and replace(found, further=further, led=layout.points)
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
