@@ -140,8 +140,9 @@ class Author:
         self.anew()
 
     def contour(self) -> None:
-        """Cutter compensation and roundings: the control's business."""
-        self.lines += ["G41 G1 X=AC(5) Y=AC(5)", "G1 X=AC(25) RND=1", "G3 X=IC(5) Y=IC(5) CR=5", "G40 G1 Y=AC(30)"]
+        """Cutter compensation and roundings: the control's business; after G40 an axis without a word gets none."""
+        self.lines += ["G41 G1 X=AC(5) Y=AC(5)", "G1 X=AC(25) RND=1", "G3 X=IC(5) Y=IC(5) CR=5"]
+        self.lines.append("G40 G1 X=AC(30) Y=AC(30)")
 
     def holes(self) -> None:
         """A modal drilling cycle."""
