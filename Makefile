@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench same-bytes tables hidden metamorphic refusals ci clean
+.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -30,6 +30,11 @@ same-bytes:      ## correct programs in all ways, compare, into docs/performance
 
 tables:          ## all controls on all shipped machines into docs/controllers.md (ten minutes)
 	OMP_NUM_THREADS=1 $(PYTHON) tests/tables/all_controls.py
+
+study:           ## the diagnosis on worlds of its own and other values of its constants into docs/diagnose.md (an hour); SCENES="single=40 two=20" AGAIN=6
+	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/study.py --table docs/diagnose.md --from 24 \
+		$(or $(SCENES),clean=10 clutter=20 single=30 thermal=20 curves=20 weak=20 two=20 three=15 deleted=20 foreign=20)
+	PYTHONPATH=src:plugins:tests OMP_NUM_THREADS=1 $(PYTHON) tests/diagnose/calibration.py $(or $(AGAIN),6) --from 30 --table docs/diagnose.md
 
 hidden:          ## the hidden-effect benchmark into docs/accuracy.md (two hours); FINAL=1 for the final seeds, COUNT="10 single=40"
 	$(PYTHON) -m tests.hidden --callable tests.diagnose.resident:resident --table docs/accuracy.md \
