@@ -39,9 +39,10 @@ def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float
 
 def skew(machine: Machine) -> float | None:
     """How far X, Y and Z may have to go for 1 mm of way; None where rotary axes carry them along."""
-    nested = [axis for axis in machine.axes if axis.workpiece_side][::-1], [
-        axis for axis in machine.axes if not axis.workpiece_side
-    ]
+    nested = (
+        [axis for axis in machine.axes if axis.workpiece_side][::-1],
+        [axis for axis in machine.axes if not axis.workpiece_side],
+    )
     for branch in nested:
         kinds = [axis.rotary for axis in branch]
         if sorted(kinds) != kinds:
