@@ -145,7 +145,7 @@ class Units:
     @property
     def _wanted(self) -> int:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
-        return self.size // 2 if self.led else self.size
+        return self.size // 4 if self.led else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool]]:
         """The text in parts that end between two blocks of plain words; True with the last one."""
