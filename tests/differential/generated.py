@@ -79,6 +79,7 @@ def terms_of(source: str, outcome: product.Outcome, model: Machine) -> Terms:
         rotary_step=model.rotary_step,
         refused=outcome.refused,
         left=outcome.left,
+        whole=outcome.whole,
         passed=corpus.passed_by_rule(source.encode()),
         tool_length={number: length for number, (length, _) in SETUP.tools.items()},
     )

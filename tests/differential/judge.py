@@ -44,6 +44,7 @@ class Terms:
     rapids       hold rapids to the tolerance along their way too
     rotary       the strategy moves rotary axes: their ends are free by so many degrees
     tool_length  tool number -> mm
+    whole        line -> how far, mm, the product says that the tip leaves its path there, since it must not be split
     calls        compare the calls that are no motions too
     """
 
@@ -56,6 +57,7 @@ class Terms:
     rapids: bool = False
     rotary: float = 0.0
     tool_length: Mapping[int, float] = field(default_factory=dict)
+    whole: Mapping[int, float] = field(default_factory=dict)
     calls: bool = True
 
 
@@ -282,6 +284,7 @@ class _Judge:
         excused = self.entry_error(segments, pieces, of) * (1 - u)
         allowed = self.terms.tolerance + np.sqrt(3) * self.halves(of, pieces) + excused
         allowed = allowed + self.rotary_rounding(pieces, of, segments, command)
+        allowed = allowed + np.array([self.terms.whole.get(int(line), 0.0) for line in self.original.line[of]])
         self.verdict.note(what, distance, allowed, self.original.line[of], excused)
 
     def entry_error(self, segments: Segments, pieces: NDArray[np.int64], of: NDArray[np.int64]) -> Floats:

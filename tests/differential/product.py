@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 from ncfix.cli.main import run
 
 LETTERS = "XYZABCUVW"
+SPLIT = re.compile(r"leaves the intended path by (?P<um>[\d.]+) um, and this motion must not be split")
 DONE, FINDINGS, USAGE, UNREADABLE, REFUSED, FAULT = range(6)
 
 
@@ -44,6 +46,12 @@ class Outcome:
                 for line in range(first, last + 1):
                     found[line] = found.get(line, frozenset()) | {LETTERS.index(each["axis"])}
         return found
+
+    @property
+    def whole(self) -> dict[int, float]:
+        """Line -> how far, mm, the tip leaves its path there, since the motion must not be split."""
+        said = [(each["line"], SPLIT.search(each["text"])) for each in self.entry.get("warnings", [])]
+        return {int(line): float(found["um"]) / 1e3 for line, found in said if found}
 
     @property
     def codes(self) -> list[str]:

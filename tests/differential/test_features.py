@@ -85,6 +85,7 @@ def _terms(case: Case, outcome: product.Outcome, model: Machine) -> Terms:
         rotary_step=model.rotary_step,
         refused=outcome.refused,
         left=outcome.left,
+        whole=outcome.whole,
         passed=corpus.passed_by_rule(case.source.encode()),
         tool_length={number: length for number, (length, _) in case.controls.tools.items()},
     )
