@@ -288,6 +288,14 @@ def test_text_behind_the_end_that_may_belong_to_a_program_is_looked_at(machine: 
     assert compared(fanuc + cut, machine, "fanuc", 400, setup=CALCULATOR) == ""
 
 
+def test_a_cycle_that_goes_on_in_the_next_part_is_seen(machine: Machine) -> None:
+    head = program(0, 20, 0.0, siemens=True).replace(b"\r", b"").split(b"TRAFOOF")[0]
+    holes = b"".join(b"G0 X%d. Y150.\n" % (150 + k) for k in range(40))
+    text = head + b"TRAFOOF\nG0 X150. Y150. Z50. B0. C0.\nMCALL CYCLE81(10,0,2,-3)\n" + holes + b"MCALL\nM30\n"
+    assert "goes on in the next part" in compared(text, machine, "siemens", 300)
+    assert compared(text, machine, "siemens", 40_000) == ""
+
+
 def test_an_m6_further_down_makes_a_t_before_it_mean_something_else(machine: Machine) -> None:
     source = program(0, 60, 0.0, siemens=True).replace(b"\r", b"").replace(b'T="BALL_8" M6', b'T="BALL_8"')
     assert compared(source, machine, "siemens", 400) == ""

@@ -49,6 +49,8 @@ class PartInterpreter(Interpreter):
         unit = Unit(self.units[0].text.followed_by(program), 0, len(program))
         if begins_a_program(unit):
             raise NotInPartsError("the text holds several programs")
+        if self.control.modes.modal_cycle is not None:
+            raise NotInPartsError("a cycle (MCALL) goes on in the next part, whose motions are those of its block")
         if self.at_once and changes_tools(unit.text.plans, program.source):
             if self.called:
                 raise NotInPartsError("there is an M6 only further down")
