@@ -291,7 +291,14 @@ def test_text_behind_the_end_that_may_belong_to_a_program_is_looked_at(machine: 
 def test_a_cycle_that_goes_on_in_the_next_part_is_seen(machine: Machine) -> None:
     head = program(0, 20, 0.0, siemens=True).replace(b"\r", b"").split(b"TRAFOOF")[0]
     holes = b"".join(b"G0 X%d. Y150.\n" % (150 + k) for k in range(40))
-    text = head + b"TRAFOOF\nG0 X150. Y150. Z50. B0. C0.\nMCALL CYCLE81(10,0,2,-3)\n" + holes + b"MCALL\nM30\n"
+    text = (
+        head
+        + b"TRAFOOF\nG0 X150. Y150. Z50. B0. C0.\nMCALL CYCLE81(10,0,2,-3)\n"
+        + holes
+        + b"MCALL\n"
+        + holes
+        + b"M30\n"
+    )
     assert "goes on in the next part" in compared(text, machine, "siemens", 300)
     assert compared(text, machine, "siemens", 40_000) == ""
 
