@@ -307,7 +307,7 @@ def blocks_of(text: str) -> list[tuple[int, str]]:
         if follows:
             continue
         block = re.sub(r"\s+", " ", joined.upper().replace(",", ".")).strip()
-        block = re.sub(r"^/?\s*\d+(?=\s+[A-Z*]|$)\s*", "", block)
+        block = re.sub(r"^/?\s*(\d+(?=\s+[A-Z*]|$)\s*)?", "", block)
         found.append((number, block))
         joined = ""
     return found
