@@ -143,3 +143,16 @@ def test_offsets_that_the_program_sets_are_set_in_the_flat_program_too() -> None
     program = read(text.encode(), "part", "fanuc")
     found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), STEPS)
     assert found.program.source.decode() == "#5221=2.\nG0X3.\nM30\n"
+
+
+def test_what_other_programs_find_is_left_to_them_in_the_flat_program_too() -> None:
+    text = "#500=[1+1]\n#100=3\n#501=#0\nG0X#100\nM30\n"
+    program = read(text.encode(), "part", "fanuc")
+    found = flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), STEPS)
+    assert found.program.source.decode() == "#500=2.\n#501=#0\nG0X3.\nM30\n"
+
+
+def test_what_other_programs_find_must_be_known() -> None:
+    program = read(b"#500=#5041\n#1=3\nG0X#1\nM30\n", "part", "fanuc")
+    with pytest.raises(NcfixError, match="what #500 is set to is known only at run time"):
+        flatten(program, KNOWN, ("X", "Y", "Z"), frozenset(), STEPS)

@@ -17,7 +17,10 @@ from ncfix.program.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, P
 LOCAL = range(1, 34)
 """#1 to #33 belong to the call level."""
 
-COMMON = (range(100, 200), range(500, 1000), range(98000, 98500))
+LASTING = range(500, 1000)
+"""Common variables that other programs find as this one has left them."""
+
+COMMON = (range(100, 200), LASTING, range(98000, 98500))
 LAST = 149_999
 POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""

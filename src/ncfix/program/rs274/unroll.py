@@ -164,14 +164,22 @@ class Recorder:
         return None
 
     def of_assignment(self, unit: Unit, index: int, item: Assignment) -> Change:
-        """An assignment falls away, unless the control does something with what it sets: offsets, for one."""
-        target = item.target
+        """An assignment falls away, unless the control does something with it (it is an offset, for one) or keeps it."""
+        target, rules = item.target, self.control.rules
         if isinstance(target, Parameter) and isinstance(target.index, Literal):
             number = round(float(unit.program.values_of(index)[target.index.slot]))
-            if self.control.rules.system(number):
-                value = self.control.parameters.numbered(number)
-                return Change(*unit.program.span(index, item.span), f"#{number}={trimmed(value, VARIABLE_DECIMALS)}")
+            if rules.system(number) or rules.lasting(number):
+                return Change(*unit.program.span(index, item.span), f"#{number}={self.value_of(number)}")
         return self.removal(unit, index, item)
+
+    def value_of(self, number: int) -> str:
+        """The value of a parameter as text; raises `Fault` where it depends on the machine at run time."""
+        parameters = self.control.parameters
+        if number in parameters.numbers.runtime:
+            what = f"what #{number} is set to"
+            raise Fault(RUNTIME, f"{what} is known only at run time, so the program cannot be written out flat")
+        value = parameters.numbered(number)
+        return "#0" if math.isnan(value) else trimmed(value, VARIABLE_DECIMALS)
 
     def of_word(self, unit: Unit, index: int, word: Word, codes: Codes, block: Block) -> Change | None:
         """What becomes of a word."""
