@@ -164,7 +164,7 @@ class Recorder:
         return None
 
     def of_assignment(self, unit: Unit, index: int, item: Assignment) -> Change:
-        """An assignment falls away, unless the control does something with it (it is an offset, for one) or keeps it."""
+        """An assignment falls away, unless the control does something with it (offsets, for one) or keeps it."""
         target, rules = item.target, self.control.rules
         if isinstance(target, Parameter) and isinstance(target.index, Literal):
             number = round(float(unit.program.values_of(index)[target.index.slot]))
