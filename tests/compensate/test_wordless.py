@@ -330,21 +330,3 @@ def test_check_tells_only_of_cuts() -> None:
 
     assert not found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nZ5\nG1 X7 F100\nM2\n")
     assert found("G21 G90 G94\nG0 X1 Y2 Z3\nT1 M6\nG0 X100 Y50\nG1 X7 F100\nM2\n")
-
-
-CUTS = {
-    "linuxcnc": ["g21 g90 g94", "g1 x-90 f500", "g1 x90", "g1 y0 z40", "m2"],
-    "fanuc": ["O1", "G1 X-90. F500", "G1 X90.", "G1 Y0. Z40.", "M30"],
-    "siemens": ["G71 G90 G94", "G1 X-90 F500", "G1 X90", "G1 Y0 Z40", "M30"],
-    "heidenhain": ["BEGIN PGM A MM", "L X-90 R0 F500", "L X+90", "L Y+0 Z+40", "END PGM A MM"],
-}
-
-
-@pytest.mark.parametrize("dialect", CUTS)
-def test_the_way_to_the_first_place_of_an_axis_is_not_split(dialect: str) -> None:
-    """Only the ends of the first cuts are the program's own; between places that it has been to, cuts are split."""
-    text = fixed("\n".join(CUTS[dialect]) + "\n", dialect, tolerance_um=0.5).text.decode().upper()
-    cuts = [line for line in re.sub(r"\(.*?\)|;.*", "", text).splitlines() if re.search(r"[XYZ][-+]?\d", line)]
-    assert re.search(r"X-(90|89\.9)", cuts[0])
-    assert len([line for line in cuts if "Z" in line]) == 1
-    assert len(cuts) > 3

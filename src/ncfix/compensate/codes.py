@@ -78,9 +78,8 @@ CODES = {
     "NCF413": Code(
         "the path cannot be kept within the tolerance without splitting",
         "The motion would have to be split, and must not be: cutter radius compensation is on, and the control works "
-        "out the contour from the motions as they are; or the program brings an axis to its place with it for the "
-        "first time, and places on its way would rest on where the axis is said to have stood.",
-        "Let the CAM system compensate the cutter radius; approach with a rapid; or ask for a larger tolerance.",
+        "out the contour from the motions as they are.",
+        "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
     ),
     "NCF414": Code(
         "the length of the tool is not known",

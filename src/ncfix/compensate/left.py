@@ -96,7 +96,7 @@ def left_where_they_stand(program: Program, settled: Settled, steps: Array, own:
         axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())
         cuts, stretches = int(moves.cuts[rows].sum()), stretches_of(program, moves.block[rows])
         found[axis] = Left(axis, turns, len(rows), cuts, stretches, most)
-    return found
+    return in_order(found)
 
 
 def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int, int], ...]:
@@ -117,4 +117,9 @@ def merged(before: tuple[tuple[int, int], ...], later: tuple[tuple[int, int], ..
 def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, Left]:
     """What was left in two parts of a program, one behind the other."""
     both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
-    return {**before, **later, **both}
+    return in_order({**before, **later, **both})
+
+
+def in_order(found: Mapping[str, Left]) -> dict[str, Left]:
+    """Those that are left in the earliest lines first."""
+    return dict(sorted(found.items(), key=lambda item: (item[1].first, item[0])))

@@ -162,7 +162,7 @@ class Units:
                 self.rest = text
                 continue
             stop = text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1
-            program = self.reader.read(text[:stop]) if stop else None
+            program = self.reader.read(text[:stop]) if text[:stop].strip() else None
             cut = self.reader.last_cut(program) if program is not None else 0
             if program is None or not cut:
                 self.rest, wanted = text, 2 * max(wanted, len(text))

@@ -261,15 +261,11 @@ class Control:
         """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed.
 
         settles  the axes whose words say where they stand afterwards; those of absolute words if not given
-
-        A cut by which the program first brings an axis to its place is not split: places on its way would rest on
-        where tables or people say that the axis stood.
         """
         if not passing:
             self._ask_for_start(kind, unknown)
         if settles is None:
             settles = 0 if passing or self.modal.incremental else axes
-        placing = kind == Kind.FEED and settles & self.places.adrift != 0
         adrift = self._adrift(settles) | self.still_beside(axes)
         if not passing and settles & axes != (0 if self.modal.incremental else axes):
             self.builder.counted(axes & ~settles)
@@ -281,9 +277,7 @@ class Control:
         self.places.lose(mask_of(unknown))
         self.places.begun = True
         rule, reason = self._verdict(kind, unknown, refusal, passing)
-        whole, self.whole = self.whole, self.whole or placing
         style = self._style(kind, rule, reason, code)
-        self.whole = whole
         if arc is not None:
             self.builder.arc(arc)
         start, end = self.position, target

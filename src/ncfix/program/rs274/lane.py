@@ -83,7 +83,7 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
 def before_placing(control: Control, mask: IntArray, block: int) -> int:
     """The block that first brings an adrift axis to its place, or the end of blocks with these axis words (n,).
 
-    Its way rests on where the axis is said to have stood: it is a motion of its own kind.
+    That block goes by itself, so that all of a stretch have the same axes adrift.
     """
     if not control.places.adrift or control.modal.incremental:
         return block + len(mask)
