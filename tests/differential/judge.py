@@ -170,8 +170,13 @@ class _Judge:
                 self.verdict.complain(line, "a motion that is passed by rule was corrected")
 
     def stood_still(self, segments: Segments) -> None:
-        """An axis that is said to be left where it stood makes the way of the original, and no other."""
-        rows = np.flatnonzero(self.left.any(axis=1) & (segments.fate != Fate.WRONG))
+        """An axis that is said to be left where it stood makes the way of the original, and no other.
+
+        Not so beside a contour, nor from there: where the axis stands then is where the control has offset it to.
+        """
+        contour = segments.fate == Fate.CONTOUR
+        offset = contour | np.append(False, contour[:-1])
+        rows = np.flatnonzero(self.left.any(axis=1) & (segments.fate != Fate.WRONG) & ~offset)
         whole = self.fixed.end[segments.last[rows]] - self.fixed.start[segments.first[rows]]
         way = np.abs(whole - (self.original.end - self.original.start)[rows])
         moved = (way > 1e-6 + 2 * self.rough[0][rows, None]) & self.left[rows]

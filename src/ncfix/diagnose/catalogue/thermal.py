@@ -35,6 +35,8 @@ FOREIGN = 0.3
 """Variance of a sensor that is likely of another body."""
 AIR = ("ambient", "air", "hall", "room")
 HOT = ("spindle", "head", "motor", "bearing")
+HOLDS = 5
+"""Places along its travel at which a scale may be held; the true one is between two of them."""
 SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
 WARMER = 5.0
@@ -82,19 +84,18 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
         if own is not None:
             title = f"thermal scale of {axis.name}: positions stretch with temperature"
             name = f"E{LETTERS[own]}{axis.name}"
-            fixed = [
-                [(name, linear | {"times_center": place})]
-                for place in (*reach.spans[axis.name], linear["times_center"])
-            ]
+            places = np.linspace(*reach.spans[axis.name], HOLDS).tolist()
+            fixed = [[(name, linear | {"times_center": place})] for place in places]
             yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven)
         for turn in TURNS:
             title = f"thermal bend: {axis.name} tilts about {LETTERS[TURNS.index(turn)]} with temperature"
             name = f"E{turn}{axis.name}"
             yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
     for axis in reach.rotary:
-        lines: Parts = [(f"E{LETTERS[k]}0{axis.name}", {}) for k in across(axis)]
+        lines = [f"E{LETTERS[k]}0{axis.name}" for k in across(axis)]
+        ways: list[Parts] = [[(line, {"carried": True}) for line in lines], [(line, {}) for line in lines]]
         title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
-        yield _driven(f"rotary centre drift {axis.name}", title, axis.name, [lines], driven)
+        yield _driven(f"rotary centre drift {axis.name}", title, axis.name, ways, driven)
     yield _artefact(reach, clocked)
     if clocked:
         yield from _slip(reach)
