@@ -20,17 +20,11 @@ from ncfix.program.klartext.lines import FLAT
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.builder import Stretch
-from ncfix.program.rs274.lane import before_placing, filled, followed, followed_compiled
+from ncfix.program.rs274.lane import LONGEST, SHORTEST, before_placing, filled, followed, followed_compiled
 from ncfix.program.rs274.places import mask_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-SHORTEST = 16
-"""Stretches of fewer blocks go one by one."""
-
-LONGEST = 1 << 16
-"""Blocks that are taken at once."""
 
 
 @dataclass(frozen=True, slots=True)
