@@ -83,6 +83,7 @@ class Control:
     left_out   the block just followed has no place in a flat program
     unwritten  why a flat program cannot say what the program means; empty if it can
     whole      the motions of the block must not be split, as under cutter compensation
+    beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     saved      the modal states that M70 saved, one place for each call level
     places     which axes the program itself has brought to where they stand
     """
@@ -120,6 +121,7 @@ class Control:
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
         self.whole = False
+        self.beside = 0
         self.left_out = False
         self.unwritten = ""
         self.handedness = 1.0
@@ -277,7 +279,9 @@ class Control:
         self.places.lose(mask_of(unknown))
         self.places.begun = True
         rule, reason = self._verdict(kind, unknown, refusal, passing)
+        whole, self.whole = self.whole, self.whole or bool(self.beside & axes)
         style = self._style(kind, rule, reason, code)
+        self.whole, self.beside = whole, self.beside & ~axes
         if arc is not None:
             self.builder.arc(arc)
         start, end = self.position, target
@@ -310,7 +314,8 @@ class Control:
     def end_compensation(self) -> None:
         """Where the axes of the plane stand after the contour the control knows, until they are named."""
         if self.modal.compensated:
-            self.places.lose(mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine))
+            self.beside = mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
+            self.places.lose(self.beside)
         self.modal.compensated = 0
 
     def _turned(self) -> int:
