@@ -19,7 +19,7 @@ from ncfix.program.bulk_lines import lines_of, with_lines
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
-from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
+from ncfix.program.number_text import ROUNDED, Styles, in_style, is_plain, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, line_end
@@ -30,8 +30,6 @@ Mask = NDArray[np.bool_]
 
 SHORTEST = 16
 """Stretches of fewer motions go one by one."""
-ROUNDED = 1.01
-"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 SWAPPED = bytes.maketrans(b".,", b",.")
 LONGEST = 1 << 12
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""

@@ -17,7 +17,6 @@ from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.levels import LevelBook
 from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule
-from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
 from ncfix.program.standstill import passed_through, renamed
@@ -121,7 +120,7 @@ class _Emitter:
         self.reading = reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
-        self.decimals = [_decimals(frame, least_increment) for frame in self.frames]
+        self.decimals = [frame.decimals(least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves)
         self.wordless, self.increments = moves.wordless, moves.increments
@@ -375,10 +374,6 @@ def _plane(normal: FloatArray) -> tuple[int, int, int]:
     """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
     across = int(np.argmax(np.abs(normal)))
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
-
-
-def _decimals(frame: FrameMap, least_increment: FloatArray) -> NDArray[np.int64]:
-    return np.array([decimals_for(step) for step in least_increment / frame.scale], dtype=np.int64)
 
 
 def _last_pieces(pieces: Pieces) -> NDArray[np.intp]:

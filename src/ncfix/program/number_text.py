@@ -26,6 +26,8 @@ LARGEST = 1e9
 TIE = 1e-14
 """So close to the middle between two outputs, as a share of it, a value counts as on it; a hundred times the rounding
 of a product of doubles."""
+ROUNDED = 1.01
+"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 ZERO, MINUS, PLUS = ord("0"), ord("-"), ord("+")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ncfix.kernel import Library
 from ncfix.program.bulk_layouts import LED_HEAD
 from ncfix.program.number_kernels import HELPERS, copied, put_all, put_in_style, put_new
+from ncfix.program.number_text import ROUNDED
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -29,9 +30,6 @@ Lines = tuple[Bytes, Ints, Bytes, Bytes]
 """Of further pieces: the end of a line, and `leads`, `openings`, `closings` of `Layouts`."""
 
 LIBRARY = Library(__file__, HELPERS)
-
-ROUNDED = 1.01
-"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 
 @LIBRARY.helper

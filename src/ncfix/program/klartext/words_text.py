@@ -12,13 +12,11 @@ from ncfix.program.block_words import BlockWriter
 from ncfix.program.klartext.layout import Layout, tilts
 from ncfix.program.klartext.number_text import Style, value_of
 from ncfix.program.klartext.turns import UNCORRECTED, on_its_side
+from ncfix.program.number_text import ROUNDED
 from ncfix.program.target import Target
 from ncfix.program.tree import Literal, Program, Span, Word
 
 FloatArray = NDArray[np.float64]
-
-ROUNDED = 1.01
-"""Half output steps by which an axis may stand off its place for nothing but rounding."""
 
 VECTOR_DIGITS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees; the control takes eight."""
