@@ -35,6 +35,29 @@ def test_more_than_half_a_turn_stays_whole(dialect: str, machine: Machine) -> No
     assert "NCF247" in said
 
 
+def test_sinumerik_counts_from_zero_to_a_full_turn(machine: Machine) -> None:
+    """Of plain words nobody knows which way a modulo axis goes (MD30455); ACP, DC and increments say it."""
+    found, said = whole("X5. C170.\nX6. C359.5\nC=DC(0.5)\nC=ACP(300.)\nX9. C100.\nC=IC(-200.)\n", "siemens", machine)
+    assert found == [False, True, True, False, True, True]
+    assert said.count("NCF247") == 1
+
+
+def test_back_from_beyond_a_full_turn(machine: Machine) -> None:
+    """Increments lead to 380 or to 20 degrees; whichever it is, a plain word behind them is not split, the next is."""
+    text = "X5. C170.\nG91 C90.\nC90.\nC30.\nG90 X7. C250.\nX9. C300.\n"
+    found, said = whole(text, "siemens", machine)
+    assert found == [False, False, False, False, True, False]
+    assert said.count("NCF247") == 1
+    found, said = whole(text, "fanuc", machine)
+    assert not any(found)
+
+
+def test_below_zero_as_written(machine: Machine) -> None:
+    found, said = whole("X5. C-20.\nX6. C15.\nX7. C-100.\n", "siemens", machine)
+    assert not any(found)
+    assert "NCF247" not in said
+
+
 @pytest.mark.parametrize(("text", "dialect"), [("C359.5\nC0.5\n", "linuxcnc"), ("A-50.\nA60.\n", "fanuc")])
 def test_where_nothing_rolls_over(text: str, dialect: str, machine: Machine) -> None:
     found, said = whole(text, dialect, machine)
@@ -42,9 +65,9 @@ def test_where_nothing_rolls_over(text: str, dialect: str, machine: Machine) -> 
     assert "NCF247" not in said
 
 
-@pytest.mark.parametrize("dialect", ["fanuc", "iso"])
+@pytest.mark.parametrize("dialect", ["fanuc", "iso", "siemens"])
 def test_both_lanes_agree(dialect: str, machine: Machine) -> None:
-    lines = [f"X{n}. Y{n % 7}. C{(n * 97) % 360}.\n" for n in range(40)]
+    lines = ["G91 C390.\nG90\n"] + [f"X{n}. Y{n % 7}. C{(n * 97 + 250) % 360}.\n" for n in range(40)]
     many, _ = whole("".join(lines), dialect, machine)
     single, _ = whole("M8\n".join(lines), dialect, machine)
     assert many == single
@@ -67,6 +90,24 @@ def test_a_corrected_angle_leads_no_axis_round(machine: Machine) -> None:
     assert "C219.995" in fixed
     assert "C40." in fixed
     assert "C30.00" in fixed
+
+
+def at_zero(machine: Machine, dialect: str) -> list[str]:
+    """The words for C of a program that goes to C0 sixty times, corrected in direction."""
+    rng = np.random.default_rng(1)
+    places = rng.uniform((-60, -60, -80), (60, 60, 80), (60, 3))
+    text = HEAD + "".join(f"X{x:.0f}. Y{y:.0f}. A{a:.0f}. C0.\nA{a:.0f}. C340.\n" for x, y, a in places) + "M30\n"
+    options = FixOptions(strategy="full", verify=False)
+    fixed = fix_program(read(text.encode(), "part.nc", dialect), machine, SETUP, options).text.decode()
+    return [word[1:] for word in fixed.split() if word[0] == "C" and word[1:2] in "-0123456789"]
+
+
+@pytest.mark.parametrize("dialect", ["fanuc", "haas", "iso", "siemens"])
+def test_no_correction_leads_below_zero(dialect: str, machine: Machine) -> None:
+    """C-0.001 would be 359.999 to an axis that counts from 0 to 360, and the next word might lead it round."""
+    words = at_zero(machine, dialect)
+    assert min(map(float, words)) == 0.0
+    assert min(map(float, at_zero(machine, "linuxcnc"))) < 0.0
 
 
 @pytest.mark.parametrize("words", ["I10. J0. K5.", "I10. J0. L2", "I10. J0. P3", "I10. J0. Q2."])

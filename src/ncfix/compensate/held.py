@@ -3,9 +3,15 @@
 One that must get no word stays where it stands. And in a plane that was swivelled without tool-centre-point control the
 control moves linear axes as if the rotary axes stood still for good: turned by a correction, they would take the tip
 along.
+
+An axis whose angles a control may count from 0 to 360 degrees stays within them where the program does: on such a
+control -0.001 is 359.999, and leads it round, or is an alarm, and the sign of a word may even be the sense of the turn.
+Source: Siemens, "SINUMERIK 840D sl, axes and spindles", R2, MD30455; Fanuc 30i parameter manual, No. 1008.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -14,6 +20,10 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.steer import Correction, steer
 from ncfix.compensate.strategies import Strategy
 
+FULL = 2 * math.pi
+NO_ANGLE = 1e-9
+"""rad"""
+
 
 def with_rotary_held(
     intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, found: Correction
@@ -21,17 +31,31 @@ def with_rotary_held(
     """The corrections `found` for poses q (k, n_axes) of motions `move`, but for rotary axes that are held."""
     if not strategy.corrects_orientation:
         return found
-    held = held_axes(intent, move)
-    rows = np.flatnonzero((held & (found.q != q)).any(axis=1))
+    there = on_their_side(intent, move, q, np.where(held_axes(intent, move), q, found.q))
+    rows = np.flatnonzero((there != found.q)[:, intent.machine.rotary].any(axis=1))
     if not rows.size:
         return found
     target = intent.machine.tip(q[rows], intent.lengths(move[rows]))
-    there = np.where(held[rows], q[rows], found.q[rows])
     corrected, converged, oriented = found.q.copy(), found.converged.copy(), found.oriented.copy()
-    corrected[rows], arrived = steer(intent.machine, there, target, intent.states(move[rows], fraction[rows]))
+    corrected[rows], arrived = steer(intent.machine, there[rows], target, intent.states(move[rows], fraction[rows]))
     converged[rows] &= arrived
     oriented[rows] = False
     return Correction(corrected, converged, oriented)
+
+
+def on_their_side(intent: Intent, move: Index, q: Array, corrected: Array) -> Array:
+    """Corrected positions (k, n_axes); not below zero or past a full turn where the program never is.
+
+    Directions that are given as vectors lead the axes as the control thinks best.
+    """
+    moves = intent.moves
+    if moves.angles is None or moves.pointing is not None:
+        return corrected
+    least, most = moves.angles.T
+    zero = np.array([frame.offset for frame in moves.frames])[moves.frame[move]]
+    low = np.where(least >= -NO_ANGLE, zero, -np.inf)
+    high = np.where(most < FULL - NO_ANGLE, zero + FULL - intent.machine.least_increment[1], np.inf)
+    return np.asarray(np.clip(corrected, np.minimum(low, q), np.maximum(high, q)))
 
 
 def held_axes(intent: Intent, move: Index) -> Mask:

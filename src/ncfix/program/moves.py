@@ -132,6 +132,8 @@ class Moves:
                  only then may it get a word that its block lacks (see `rs274.places`). None: all are
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
+    angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
+                 may count from 0 to 360 degrees; NaN for others. None: none
     """
 
     axes: tuple[str, ...]
@@ -164,6 +166,7 @@ class Moves:
     placed: NDArray[np.bool_] | None = None
     fixed_centre: NDArray[np.bool_] | None = None
     counted: NDArray[np.bool_] | None = None
+    angles: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         return len(self.block)

@@ -21,7 +21,7 @@ from ncfix.program.moves import Moves
 from ncfix.program.reader import Reading
 from ncfix.program.tree import Program, Skip, Template
 
-TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing"})
+TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles"})
 """The fields of `Moves` that are the same for all rows."""
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.moves import Frame, Kind, Moves, Rule
 from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.program.rs274.rollover import doubtful, overturned
+from ncfix.program.rs274.rollover import Winding, doubtful, extremes, overturned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -105,7 +105,9 @@ class Builder:
     """Gathers motions; `moves()` makes the columns of them.
 
     rolls       (n_axes,) rotary axes that may roll over (see `rollover`); None: none
+    winding     how they came to where they stand, where that matters
     overturned  the block of the first motion so far that might lead one of them the other way round
+    brought_back  that of the first one that brings one of them back from beyond a full turn
     """
 
     def __init__(self, axes: tuple[str, ...], rotary: frozenset[str]) -> None:
@@ -122,7 +124,15 @@ class Builder:
         self._approaches: dict[int, Vector] = {}
         self._counted: dict[int, int] = {}
         self.rolls: NDArray[np.bool_] | None = None
+        self.winding: Winding | None = None
+        self._said: list[tuple[int, int, int]] = []
         self.overturned: int | None = None
+        self.brought_back: int | None = None
+
+    @property
+    def endless(self) -> int:
+        """The axes that may roll over, as bits."""
+        return 0 if self.rolls is None else sum(1 << self.columns[place] for place in np.flatnonzero(self.rolls))
 
     # -- what is shared -----------------------------------------------------------------------------------------------
 
@@ -181,6 +191,10 @@ class Builder:
         """The motion that is added next has words that count from where it starts for these axes, and only these."""
         self._counted[self.count] = axes
 
+    def says_the_way(self, axes: int, motions: int = 1) -> None:
+        """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
+        self._said.append((self.count, self.count + motions, axes))
+
     def extend(self, stretch: Stretch) -> None:
         """Many motions."""
         self._flush()
@@ -213,14 +227,15 @@ class Builder:
         )
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
         styles = self._style_columns(style)
-        self._keep_whole(styles, start, end, block)
+        programmed, counted = (mask[:, None] & bits) != 0, self._counted_column(styles["incremental"])
+        angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
             axes=self.axes,
             rotary=self.rotary,
             start=start,
             end=end,
-            programmed=(mask[:, None] & bits) != 0,
+            programmed=programmed,
             block=block.astype(np.int32),
             feed=feed,
             centre=centre,
@@ -232,14 +247,16 @@ class Builder:
             approach=self._approach_column(len(block)),
             placed=(adrift[:, None] & bits) == 0,
             fixed_centre=self._fixed_column(len(block)),
-            counted=self._counted_column(styles["incremental"]),
+            counted=counted,
+            angles=angles,
             **styles,
         )
 
     def clear(self) -> None:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
-        self.overturned = None
+        self.overturned = self.brought_back = None
+        self._said = []
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
@@ -250,16 +267,37 @@ class Builder:
             for index, name in enumerate(Style._fields)
         }
 
-    def _keep_whole(self, styles: dict[str, NDArray[Any]], start: FloatArray, end: FloatArray, block: IntArray) -> None:
-        """Motions in which an axis might roll over must not be split, nor their angles led to the other side."""
+    def _keep_whole(
+        self,
+        styles: dict[str, NDArray[Any]],
+        programmed: NDArray[np.bool_],
+        counted: NDArray[np.bool_] | None,
+        start: FloatArray,
+        end: FloatArray,
+        block: IntArray,
+    ) -> FloatArray | None:
+        """Motions in which an axis might roll over must not be split, nor their angles led to the other side.
+
+        Returns the angles to which plain words lead these axes, see `Moves.angles`.
+        """
         if self.rolls is None:
-            return
-        rows = overturned(self.rolls, start, end) & (styles["rule"] != Rule.PASS) & ~styles["incremental"]
-        styles["compensated"] = styles["compensated"] | rows
+            return None
+        said = np.repeat(styles["incremental"][:, None], len(self.columns), axis=1) if counted is None else counted
+        said = said.copy()
+        for first, stop, axes in self._said:
+            said[first:stop] |= [bool(axes >> column & 1) for column in self.columns]
+        free = styles["rule"] != Rule.PASS
+        rows = overturned(self.rolls, said, start, end) & free
+        back, plain = np.zeros(len(block), dtype=np.bool_), programmed & ~said
+        offset = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[styles["frame"]]
+        if self.winding is not None:
+            back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows
+        styles["compensated"] = styles["compensated"] | rows | back
         styles["held"] = styles["held"] | doubtful(self.rolls, start, end)
-        cuts = np.flatnonzero(rows & (styles["kind"] != Kind.RAPID))
-        if cuts.size and self.overturned is None:
-            self.overturned = int(block[cuts[0]])
+        cuts = styles["kind"] != Kind.RAPID
+        self.overturned = _first(block, rows & cuts, self.overturned)
+        self.brought_back = _first(block, back & cuts, self.brought_back)
+        return extremes(self.rolls, plain, end - offset)
 
     def _frame_table(self) -> tuple[Frame, ...]:
         return tuple(
@@ -299,3 +337,9 @@ class Builder:
             normal[rows] = [arc.normal for arc in self._arcs.values()]
             sweep[rows] = [arc.sweep for arc in self._arcs.values()]
         return centre, normal, sweep
+
+
+def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int | None:
+    """The block of the first of these motions, if none is known from before."""
+    found = np.flatnonzero(rows)
+    return int(block[found[0]]) if known is None and found.size else known

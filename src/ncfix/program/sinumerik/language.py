@@ -15,6 +15,7 @@ from ncfix.program.layout import bulk_layout
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.pieces import Pieces
 from ncfix.program.reach import whole_text
+from ncfix.program.rs274 import rollover
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_on
@@ -41,6 +42,7 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
     moves, control = walk.run(), walk.control
+    rollover.say(control, program)
     return finished(control, program, replace(moves, pointing=control.pointing) if control.points else moves)
 
 

@@ -112,6 +112,7 @@ def by_direction(control: Sinumerik, words: Words) -> str:
         words.forms[LETTERS[index]] = "ac"
         words.axes |= 1 << index
     control.points = True
+    control.builder.says_the_way(sum(1 << index for index in columns))
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
     words.whole |= not even and stray(pointing, here, ways[0]) > FAR
     return ""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ncfix.program.dialect import Dialect
 from ncfix.program.moves import Kind, Kinematics, Rule, TcpState
 from ncfix.program.pointing import Pointing
-from ncfix.program.rs274 import tcp
+from ncfix.program.rs274 import rollover, tcp
 from ncfix.program.rs274.arc_motion import in_frame
 from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import AT_START, Control, Unknown
@@ -30,6 +30,7 @@ from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
 from ncfix.program.sinumerik.variables import Variables
+from ncfix.program.sinumerik.vocabulary import TURNING
 
 if TYPE_CHECKING:
     from ncfix.program.sinumerik.destination import End, Words
@@ -90,6 +91,8 @@ class Sinumerik(Control):
         super().__init__(setup, axes, rotary, dialect, kinematics)
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
+        rollover.watch(self)
+        self.builder.winding = rollover.Winding(np.zeros(len(axes), dtype=np.bool_))
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
@@ -259,7 +262,9 @@ class Sinumerik(Control):
         if settles is None:
             settles = 0 if passing else axes & ~mask_of(self._counted(words))
         self.lost, self.fresh_tool = end.lost, False
-        refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(end.target)
+        refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
+        sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
+        self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
         if not passing and not refusal:
             self.ask_for_length()
         self._note_heading(kind, end, arc, follows=not passing and not refusal)
@@ -324,10 +329,12 @@ class Sinumerik(Control):
 
         return Pointing.of((turning[0], turning[1]), ask)
 
-    def _passes_zero(self, target: Vector) -> bool:
-        """Whether DC, ACP or ACN leads an axis past a full turn: then pieces of the way would count otherwise."""
-        turn = 2 * math.pi
-        return any(not 0 <= place < turn for index in self.over for place in (self.position[index], target[index]))
+    def _passes_zero(self, words: Words, target: Vector) -> bool:
+        """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
+        turn, endless = 2 * math.pi, self.builder.endless
+        steps = [] if self.modal.incremental else [index for index in self._counted(words) if endless >> index & 1]
+        places = ((self.position[index], target[index]) for index in (*self.over, *steps))
+        return any(not 0 <= place < turn for pair in places for place in pair)
 
     def wrap(self) -> None:
         """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""

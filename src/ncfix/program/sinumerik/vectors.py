@@ -55,6 +55,7 @@ def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
     if count < SHORTEST:
         return 0
     control.points = True
+    control.builder.says_the_way(turning, count)
     take(control, stage.head(count), feed[:count], block, main)
     return count
 
