@@ -28,6 +28,7 @@ def test_a_shipped_program_is_corrected(root: Path, name: str) -> None:
     row = next(line for line in (root / "docs/dialects.md").read_text().splitlines() if f"`{name}`" in line)
     assert f"| {before:.1f} um | {after:.2f} um |" in row
     assert fixed.report.refused == ()
+    assert "NCF255" not in {message.code for message in fixed.report.warnings}
 
 
 def test_the_vectors_are_corrected_by_the_full_strategy(root: Path) -> None:

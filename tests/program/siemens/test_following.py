@@ -259,6 +259,13 @@ def test_a_work_offset_over_a_transformation_is_said() -> None:
         assert codes.count("NCF255") == count
 
 
+@pytest.mark.parametrize(("text", "count"), [("SUPA G0 Z9", 0), ("SUPA G0 Z9\nG0 X1 Y1 Z1", 1)])
+def test_machine_coordinates_do_not_ask_for_the_work_offset(text: str, count: int) -> None:
+    """SUPA leaves all frames out; the first motion that does not is where it matters."""
+    messages = follow(f"G54\nTRAORI\nTRAFOOF\n{text}", work_offsets={"G54": ZERO | {"X": 5.0}}).messages
+    assert [message.code for message in messages].count("NCF255") == count
+
+
 def test_a_modal_cycle_drills_behind_machine_positions_too() -> None:
     assert xs("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3\nMCALL\nG0 X4") == pytest.approx([0, 3, 3, 3, 4])
     assert last(follow("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3"))[2] == pytest.approx(5)

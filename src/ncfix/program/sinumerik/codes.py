@@ -37,7 +37,7 @@ SINUMERIK_CODES: dict[str, Code] = {
     "NCF255": Code(
         "Work offset over a transformation",
         "TRAORI or TRAFOOF stands between the work offset (G54) and a motion. Whether the control keeps the offset "
-        "depends on its machine data; here it stays.",
+        "depends on its machine data (MD10602: 0 takes it out, as G500 would); here it stays.",
         "Program the work offset anew after TRAORI and TRAFOOF.",
     ),
     "NCF257": Code(

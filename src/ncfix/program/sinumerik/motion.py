@@ -31,11 +31,12 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     if code in (0, 10):
         control.modal.straight = code
     take_up(control)
-    mind_carried(control)
+    machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
+    if not machine:
+        mind_carried(control)
     timed = control.modal.feed_mode == 93 and "F" not in words.values
     words.whole = timed or words.block in control.solitary or control.modes.modal_cycle is not None
     oriented(control, words)
-    machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if machine:
         to_machine_position(control, words, machine.upper())
     elif "meas" in special:
