@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from machine import chains
 from ncfix.machine import Effect, Machine, State, se3
-from ncfix.machine.linear import switched_on
 from ncfix.machine.piecewise import Table
 from ncfix.machine.smooth import Backlash, Fourier, Polynomial
 
@@ -133,4 +132,3 @@ def test_effects_that_are_zero_need_no_inputs_but_their_design_does() -> None:
     assert (machine.error(np.zeros(3)) == 0).all()
     with pytest.raises(UsageError, match="temp_spindle"):
         machine.design(np.zeros(3))
-    assert switched_on(effect).coefficients == (1.0,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from ncfix.diagnose.misfit import misfit
 from ncfix.diagnose.view import View
@@ -83,7 +83,7 @@ def agreeing(view: View, residual: Array, sigma: float) -> None:
             values = list(by_file.values())
             apart += (values[0] - values[1]) ** 2 / (2 * sigma**2)
             pairs += 1
-    if pairs > SPARE and float(stats.chi2.sf(apart, pairs)) < CONTRADICTION and apart > 4 * pairs:
+    if pairs > SPARE and float(chdtrc(pairs, apart)) < CONTRADICTION and apart > 4 * pairs:
         text = (
             f"{pairs} values were measured by two files and differ by {np.sqrt(2 * apart / pairs):.1f} times the noise"
         )

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from ncfix.diagnose.background import Background
 from ncfix.diagnose.view import View
@@ -47,7 +47,7 @@ def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
         most = max(gain for (gain, _), _, _ in gains)
         # simple ones come first: a product of which one factor stands still is no pattern of its own
         (best, size), text, column = next(each for each in gains if each[0][0] >= NEARLY * most)
-        p = min(1.0, len(offered) * float(stats.chi2.sf(best / sigma_um**2, 1)))
+        p = min(1.0, len(offered) * float(chdtrc(1, best / sigma_um**2)))
         if p > UNLIKELY:
             break
         left = without(basis, column[:, None])[:, 0]

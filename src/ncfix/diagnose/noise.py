@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, fdtrc
 
 from ncfix.diagnose.background import Background
 from ncfix.diagnose.view import View
@@ -105,9 +105,9 @@ def lack_of_fit(floor: Floor, residual: Array, parameters: float) -> float | Non
     if floor.source == "repeats":
         left = n - parameters - floor.freedom
         ratio = ((squares - floor.squares) / left) / (floor.squares / floor.freedom)
-        return float(stats.f.sf(ratio, left, floor.freedom)) if left > 0 else None
+        return float(fdtrc(left, floor.freedom, ratio)) if left > 0 else None
     if floor.source == "given":
-        return float(stats.chi2.sf(squares / floor.sigma_um**2, max(n - parameters, 1)))
+        return float(chdtrc(max(n - parameters, 1), squares / floor.sigma_um**2))
     return None
 
 

@@ -17,7 +17,7 @@ from ncfix.machine.axis import BASE_AXES, Axis, Tool, Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.effect import SPINDLE, Effect
 from ncfix.machine.se3 import Array
-from ncfix.machine.signals import Signal, axis_signal
+from ncfix.machine.signals import Signal, axis_signal, inputs_of
 from ncfix.machine.state import Poses
 
 
@@ -85,7 +85,7 @@ class ErrorModel:
     @property
     def inputs(self) -> frozenset[str]:
         """The state inputs that must be given."""
-        return frozenset(name for signal in self.signals for name in signal.inputs)
+        return inputs_of(self.signals)
 
     def small_motions(self, poses: Poses) -> Mapping[Slot, Array]:
         """The small motions at each slot, (6, n) or (6, 1): mm along, rad about."""
@@ -104,7 +104,7 @@ def compile_effects(axes: tuple[Axis, ...], tool: Tool, effects: Iterable[Effect
     together: dict[tuple[object, ...], list[Effect]] = {}
     for effect in effects:
         if effect.active:
-            key = (*signals_of(axes, effect), _direction_axis(axes, effect), effect.basis.family)
+            key = (*signals_of(axes, effect), direction_axis(axes, effect), effect.basis.family)
             together.setdefault(key, []).append(effect)
     return ErrorModel(tuple(_group(axes, tool, members) for members in together.values()))
 
@@ -121,7 +121,7 @@ def _group(axes: tuple[Axis, ...], tool: Tool, members: list[Effect]) -> Group:
         unit = unit_motion(axes, effect)
         gains[slots.index(slot_of(axes, tool, effect))][:, columns] += np.outer(unit, effect.coefficients)
     signal, factor = signals_of(axes, members[0])
-    return Group(basis, signal, factor, _direction_axis(axes, members[0]), slots, gains)
+    return Group(basis, signal, factor, direction_axis(axes, members[0]), slots, gains)
 
 
 def joint_index(axes: tuple[Axis, ...], effect: Effect) -> int:
@@ -171,7 +171,7 @@ def _plain(axes: tuple[Axis, ...], name: str) -> Signal:
     return axis_signal(axes, names.index(name)) if name in names else Signal(name)
 
 
-def _direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
+def direction_axis(axes: tuple[Axis, ...], effect: Effect) -> int:
     """The axis whose direction of motion counts: that of the input if it is an axis, else the effect's own."""
     names = [axis.name for axis in axes]
     if not effect.basis.needs_direction:

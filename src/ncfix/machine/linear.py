@@ -7,68 +7,115 @@ nearer to the foundation at zero; the joint's Jacobian wants it at its reference
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad
+from ncfix.machine.basis import Basis
 from ncfix.machine.effect import Effect
-from ncfix.machine.error_model import Slot, Sort, joint_index, signals_of, slot_of, unit_motion
+from ncfix.machine.error_model import Slot, Sort, direction_axis, joint_index, signals_of, slot_of, unit_motion
 from ncfix.machine.jacobian import joint_jacobian
 from ncfix.machine.se3 import Array
+from ncfix.machine.signals import Signal, inputs_of
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import advance, columns, cross
 
 
-def switched_on(effect: Effect) -> Effect:
-    """The effect with coefficients that are not zero."""
-    return replace(effect, coefficients=(1.0,) * effect.basis.size)
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How an error goes with the state, whichever component it is: functions of one signal, perhaps times another.
+
+    direction_axis  whose direction of motion the functions need; -1: none
+    """
+
+    basis: Basis
+    signal: Signal | None
+    factor: Signal | None
+    direction_axis: int
+
+    @property
+    def signals(self) -> frozenset[Signal]:
+        """Those that it needs."""
+        return frozenset(each for each in (self.signal, self.factor) if each is not None)
+
+    @property
+    def inputs(self) -> frozenset[str]:
+        """The state inputs that must be given."""
+        return inputs_of(self.signals)
+
+    def rows(self, poses: Poses) -> Array:
+        """The functions at these poses, times the factor: shape (k, n)."""
+        n = poses.positions.shape[1]
+        u = np.zeros(n) if self.signal is None else np.broadcast_to(self.signal.u(poses, self.basis.domain), (n,))
+        way = poses.direction[self.direction_axis] if self.direction_axis >= 0 else 0.0
+        found = self.basis.rows(u, np.broadcast_to(way, (n,)))
+        return found if self.factor is None else found * self.factor.u(poses, (-np.inf, np.inf))
+
+
+@dataclass(frozen=True)
+class Shared:
+    """The courses of many effects: each of them once, and the number of every effect's own."""
+
+    courses: tuple[Course, ...]
+    own: tuple[int, ...]
+
+    @staticmethod
+    def of(axes: tuple[Axis, ...], effects: Sequence[Effect]) -> Shared:
+        """Those of these effects."""
+        numbers: dict[object, int] = {}
+        own: list[int] = []
+        courses: list[Course] = []
+        for effect in effects:
+            key = _course_key(effect)
+            if key not in numbers:
+                numbers[key] = len(courses)
+                courses.append(course_of(axes, effect))
+            own.append(numbers[key])
+        return Shared(tuple(courses), tuple(own))
+
+    @property
+    def signals(self) -> frozenset[Signal]:
+        """All that they need."""
+        return frozenset().union(*(each.signals for each in self.courses))
+
+
+def course_of(axes: tuple[Axis, ...], effect: Effect) -> Course:
+    """How an effect goes with the state."""
+    return Course(effect.basis, *signals_of(axes, effect), direction_axis(axes, effect))
+
+
+def _course_key(effect: Effect) -> tuple[object, ...]:
+    """What the course depends on; cheaper to compare than a course is to make."""
+    e = effect
+    where = e.joint, e.input, e.range, e.center, e.scale, e.time_constant_s
+    return e.basis, *where, e.times, e.times_center, e.times_scale
 
 
 def joint_errors(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
     """See `Machine.joint_errors`; poses last: (n_joints, 6, n)."""
     errors = np.zeros((len(axes) + 1, 6, poses.positions.shape[1]))
     for effect in effects:
-        value = np.asarray(effect.coefficients) @ functions(axes, effect, poses)
+        value = np.asarray(effect.coefficients) @ course_of(axes, effect).rows(poses)
         errors[joint_index(axes, effect)] += unit_twist(axes, tool, effect, poses) * value
     return errors
 
 
-def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], poses: Poses) -> Array:
-    """See `Machine.design`; poses last: (6, k, n)."""
+def design(axes: tuple[Axis, ...], tool: Tool, effects: Sequence[Effect], shared: Shared, poses: Poses) -> Array:
+    """See `Machine.design`; `shared` are the courses of the effects; poses last: (6, k, n)."""
     n = poses.positions.shape[1]
     by_joint = joint_jacobian(axes, tool, poses)
     responses: dict[object, Array] = {}
-    curves: dict[object, Array] = {}
-    parts = [np.empty((6, 0, n))]
-    for effect in effects:
+    curves = [course.rows(poses) for course in shared.courses]
+    ends = np.cumsum([0, *(len(curves[k]) for k in shared.own)]).tolist()
+    found = np.empty((6, ends[-1], n))
+    for effect, own, start, end in zip(effects, shared.own, ends[:-1], ends[1:], strict=True):
         seen = (effect.name, effect.reference, effect.carried)
-        course = replace(effect, name=f"EX{effect.joint}", coefficients=())
         if seen not in responses:
             twist = np.broadcast_to(unit_twist(axes, tool, effect, poses), (6, n))
             responses[seen] = np.einsum("ijn,jn->in", by_joint[:, joint_index(axes, effect)], twist)
-        if course not in curves:
-            curves[course] = functions(axes, effect, poses)
-        parts.append(responses[seen][:, None] * curves[course])
-    return np.concatenate(parts, axis=1)
-
-
-def functions(axes: tuple[Axis, ...], effect: Effect, poses: Poses) -> Array:
-    """The effect's basis at these poses, times its factor: shape (k, n)."""
-    signal, factor = signals_of(axes, effect)
-    n = poses.positions.shape[1]
-    u = np.zeros(n) if signal is None else np.broadcast_to(signal.u(poses, effect.basis.domain), (n,))
-    rows = effect.basis.rows(u, _direction(axes, effect, poses))
-    return rows if factor is None else rows * factor.u(poses, (-np.inf, np.inf))
-
-
-def _direction(axes: tuple[Axis, ...], effect: Effect, poses: Poses) -> Array:
-    n = poses.positions.shape[1]
-    if not effect.basis.needs_direction:
-        return np.zeros(n)
-    names = [axis.name for axis in axes]
-    index = names.index(effect.input if effect.input in names else effect.joint)
-    return np.broadcast_to(poses.direction[index], (n,))
+        np.multiply(responses[seen][:, None], curves[own], out=found[:, start:end])
+    return found
 
 
 def unit_twist(axes: tuple[Axis, ...], tool: Tool, effect: Effect, poses: Poses) -> Array:

@@ -21,7 +21,7 @@ from ncfix.machine.forward import Chain, build_chain, carry
 from ncfix.machine.jacobian import Jacobians
 from ncfix.machine.route import Route, Turns, route_of
 from ncfix.machine.se3 import Array
-from ncfix.machine.signals import with_lags
+from ncfix.machine.signals import Signal, inputs_of, with_lags
 from ncfix.machine.state import Poses, State, flatten
 from ncfix.machine.steps import SMALL
 from ncfix.machine.transport import columns
@@ -298,10 +298,9 @@ class Machine:
         machine if not given, and may be any others of its joints.
         """
         effects = self.effects if effects is None else tuple(effects)
-        alike = {dataclasses.replace(effect, name=f"EX{effect.joint}", coefficients=()): effect for effect in effects}
-        model = compile_effects(self.axes, self.tool, [linear.switched_on(effect) for effect in alike.values()])
-        shape, poses = self._poses(q, state, model)
-        return _poses_first(linear.design(self.axes, self.tool, effects, poses), shape)
+        shared = linear.Shared.of(self.axes, effects)
+        shape, poses = self._with_signals(q, state, shared.signals)
+        return _poses_first(linear.design(self.axes, self.tool, effects, shared, poses), shape)
 
     @property
     def _active(self) -> tuple[Effect, ...]:
@@ -309,12 +308,14 @@ class Machine:
 
     def _poses(self, q: ArrayLike, state: State, model: ErrorModel | None) -> tuple[tuple[int, ...], Poses]:
         """The common leading shape, and the poses with all the signals that the model needs."""
-        if model is None:
-            return flatten(q, state, self.axes, frozenset())
-        if self.conditions:
+        return self._with_signals(q, state, model.signals if model is not None else frozenset())
+
+    def _with_signals(self, q: ArrayLike, state: State, signals: frozenset[Signal]) -> tuple[tuple[int, ...], Poses]:
+        """The same with these signals."""
+        if self.conditions and signals:
             state = dataclasses.replace(state, inputs={**self.conditions, **state.inputs})
-        shape, poses = flatten(q, state, self.axes, model.inputs)
-        return shape, with_lags(poses, model.signals)
+        shape, poses = flatten(q, state, self.axes, inputs_of(signals))
+        return shape, with_lags(poses, signals)
 
     def _tip(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
         route = self._perfect_route if model is None else self._route

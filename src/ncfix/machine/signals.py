@@ -66,6 +66,11 @@ class Signal:
         return turned_back(u, *domain, 360.0 / abs(self.scale)) if self.endless else u
 
 
+def inputs_of(signals: Iterable[Signal]) -> frozenset[str]:
+    """The state inputs that these are made of."""
+    return frozenset(name for signal in signals for name in signal.inputs)
+
+
 def axis_signal(axes: tuple[Axis, ...], index: int) -> Signal:
     """The position of an axis."""
     axis = axes[index]

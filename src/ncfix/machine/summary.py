@@ -10,7 +10,7 @@ from ncfix.machine import catalogue
 from ncfix.machine.axis import Axis
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of
-from ncfix.machine.linear import functions
+from ncfix.machine.linear import course_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
@@ -48,7 +48,7 @@ def at_the_ends(machine: Machine, effect: Effect) -> Array:
 
 def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
     _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
-    found: Array = np.asarray(effect.coefficients) @ functions(machine.axes, effect, poses)
+    found: Array = np.asarray(effect.coefficients) @ course_of(machine.axes, effect).rows(poses)
     return found
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of
-from ncfix.machine.linear import functions
+from ncfix.machine.linear import course_of
 from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
@@ -76,7 +76,7 @@ def drifts(machine: Machine, tool_length: float = 0.0) -> list[Drift]:
 
 def _curve(machine: Machine, effect: Effect, q: Array, axis: int, direction: int) -> Curve:
     _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
-    rows = functions(machine.axes, effect, poses)
+    rows = course_of(machine.axes, effect).rows(poses)
     value: Array = np.asarray(effect.coefficients) @ rows
     sigma = None
     if effect.covariance is not None:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.axis import Axis
+from ncfix.measure.halton import halton
 from ncfix.measure.measurement import Array, Measurement
 
 DECIMALS = 3
@@ -123,7 +123,7 @@ def _reached(machine: Machine, columns: Mapping[str, Array], room: Room) -> NDAr
 
 def _spread(axes: int, count: int, random: np.random.Generator) -> Array:
     """Shares of the ranges, (count, axes)."""
-    unit: Array = qmc.Halton(axes, rng=random).random(count)
+    unit = halton(count, axes, random)
     ends = random.random(count) < CORNERS
     near = random.choice([0.0, 0.5, 1.0], (int(ends.sum()), axes)) + NEAR * random.uniform(-1, 1, (ends.sum(), axes))
     unit[ends] = 1 - np.abs(1 - np.abs(near))

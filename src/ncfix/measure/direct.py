@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axis import Axis
-from ncfix.machine.error_model import compile_effects, unit_motion
-from ncfix.machine.linear import functions, switched_on
+from ncfix.machine.error_model import unit_motion
+from ncfix.machine.linear import course_of
 from ncfix.machine.signals import with_lags
 from ncfix.machine.state import State, flatten
 from ncfix.measure.checks import component_of
@@ -121,9 +121,9 @@ class DirectReading(Observation):
         shares = self._shares(effect)
         if not shares.any():
             return np.zeros((len(self.measurement), effect.basis.size))
-        model = compile_effects(self.machine.axes, self.machine.tool, [switched_on(effect)])
-        _, poses = flatten(self.q, self.state, self.machine.axes, model.inputs)
-        return shares[:, None] * functions(self.machine.axes, effect, with_lags(poses, model.signals)).T
+        course = course_of(self.machine.axes, effect)
+        _, poses = flatten(self.q, self.state, self.machine.axes, course.inputs)
+        return shares[:, None] * course.rows(with_lags(poses, course.signals)).T
 
     def _shares(self, effect: Effect) -> Array:
         """How much of an effect of size one is in each row's component, (n,)."""

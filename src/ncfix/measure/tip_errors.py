@@ -36,11 +36,11 @@ class TipErrors(Observation):
         self.held: Array = turned
         self.observed_turn = self._observed_turn()
 
-    def _observed_turn(self) -> Array:
-        """From workpiece axes to those in which the values are given, (n, 3, 3)."""
+    def _observed_turn(self) -> Array | None:
+        """From workpiece axes to those in which the values are given, (n, 3, 3); None where these are the same."""
         if self.measurement.header("frame") == "base":
             return base_from_workpiece(self.machine, self.q)
-        return np.broadcast_to(np.eye(3), (len(self.measurement), 3, 3))
+        return None
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -99,9 +99,12 @@ class TipErrors(Observation):
 
     def _picked(self, errors: Array) -> Array:
         """The components that were read, in the frame in which they were: (n, 6[, k]) -> (m[, k])."""
+        parts = [errors[:, :3], errors[:, 3:]] if self._turns else [errors[:, :3]]
+        if self.observed_turn is not None:
+            parts = [np.einsum("nij,nj...->ni...", self.observed_turn, part) for part in parts]
         seen = [(*SHIFTS, *TURNS).index(name) for name in self.components]
-        parts = [np.einsum("nij,nj...->ni...", self.observed_turn, errors[:, part]) for part in (slice(3), slice(3, 6))]
-        turned = np.concatenate(parts, axis=1)[:, seen]
+        every = np.concatenate(parts, axis=1) if self._turns else parts[0]
+        turned: Array = every[:, seen]
         return turned.reshape(turned.shape[0] * turned.shape[1], *errors.shape[2:])
 
     def _setup(self, unknowns: Array, turned: Array) -> Array:
