@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import eigh, solve_triangular
+from scipy.linalg import eigh, lapack, qr, solve_triangular
 
 from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
@@ -30,6 +30,8 @@ PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
 SOME = 0.35
 """The same while it is asked how much the instrument wanders."""
+BLOCK = 64
+"""Reflections that are carried out together."""
 WEAK = 1.0
 """Degrees of freedom of what is known of the noise where nothing is."""
 KNOWN = 200.0
@@ -91,18 +93,19 @@ def in_noise(covariance: Array, relative: Array) -> Array:
 def background(view: View, everything: Array, relative: Array) -> Background:
     """Estimate how much the instrument wanders and find the coordinates."""
     sigma, freedom = _noise(view)
-    left = _contrasts(view.base / relative[:, None])
+    contrasts = _contrasts(view.base / relative[:, None])
+    left = contrasts.columns
     slow, wander = _wandering(view, relative), 0.0
     little = in_noise(everything, relative)
-    inner = left.T @ little @ left
+    inner = contrasts.of(little)
     if slow is not None:
-        seen, own = left.T @ slow @ left, np.eye(left.shape[1]) + SOME**2 * inner
+        seen, own = contrasts.of(slow), np.eye(left.shape[1]) + SOME**2 * inner
         y = left.T @ (view.y / relative) / sigma
         wander = max(WANDER, key=lambda size: _likelihood(y, own + size**2 * seen, freedom))
     if wander and slow is not None:
         factor = np.linalg.cholesky(np.eye(left.shape[1]) + wander**2 * seen)
         left = solve_triangular(factor, left.T, lower=True).T
-        inner = left.T @ little @ left
+        inner = solve_triangular(factor, solve_triangular(factor, inner, lower=True).T, lower=True)
     spectrum, vectors = eigh(inner, driver="evd")
     rotation = (left @ vectors) / relative[:, None]
     return Background(view, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, wander, everything, slow)
@@ -114,13 +117,32 @@ def _noise(view: View) -> tuple[float, float]:
     return view.sigma, KNOWN if given else WEAK
 
 
-def _contrasts(base: Array) -> Array:
-    """An orthonormal basis of what is orthogonal to the base, (m, n)."""
+@dataclass(frozen=True, repr=False)
+class Contrasts:
+    """An orthonormal basis of what is orthogonal to the base: `columns` (m, n), and as the reflections that make it."""
+
+    columns: Array
+    reflections: tuple[Array, Array]
+
+    def of(self, covariance: Array) -> Array:
+        """The covariance (m, m) of values as one of contrasts, (n, n); far quicker by a few reflections."""
+        once = self._reflected(np.asfortranarray(covariance))
+        last = len(covariance) - self.columns.shape[1]
+        turned: Array = self._reflected(np.asfortranarray(once.T))[last:, last:]
+        return turned
+
+    def _reflected(self, columns: Array) -> Array:
+        turned: Array = lapack.dormqr("L", "T", *self.reflections, columns, BLOCK * len(columns))[0]
+        return turned
+
+
+def _contrasts(base: Array) -> Contrasts:
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
     basis = orthonormal(scaled)
-    contrasts: Array = np.linalg.qr(basis, mode="complete")[0][:, basis.shape[1] :]
-    return contrasts
+    reflections, _ = qr(basis, mode="raw", check_finite=False)
+    whole = lapack.dormqr("L", "N", *reflections, np.eye(len(basis), order="F"), BLOCK * len(basis))[0]
+    return Contrasts(whole[:, basis.shape[1] :], reflections)
 
 
 def everything_of(view: View, named: Sequence[Group]) -> Array:

@@ -40,6 +40,9 @@ LIKELIER = 10.0
 TURN_RAD = 6.6
 OFF_MM = 0.3
 """An axis point that is off by more was measured to the wrong face."""
+NOWHERE_MM = 0.1
+"""A first step that is smaller leads to none that is off: what it leaves is of second order."""
+PIVOT_STEPS = 3
 INCH = 25.4
 
 
@@ -164,11 +167,13 @@ def _pivot(data: tuple[Measurement, ...], machine: Machine, axis: Axis) -> Mista
     """The axis point moved to where the data have it."""
     located = [Effect(f"E{letter}0{axis.name}", (0.0,)) for letter in "XYZ"]
     moved, point = machine, np.asarray(axis.point)
-    for _ in range(3):
+    for _ in range(PIVOT_STEPS):
         shift = misfit(data, moved, located).coefficients
         way = np.asarray(axis.error_axes).T @ shift
         way -= np.asarray(axis.direction) * (way @ np.asarray(axis.direction))
         point = point + way
+        if np.linalg.norm(point - np.asarray(axis.point)) < NOWHERE_MM:
+            return None
         moved = _with(machine, replace(axis, point=tuple(float(x) for x in point)))  # type: ignore[arg-type]
     off = float(np.linalg.norm(point - np.asarray(axis.point)))
     if off < OFF_MM:
