@@ -7,7 +7,7 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnose.contest import COUNT, Contest, climbed, exchanged
-from ncfix.diagnose.next_poses import _beyond, _marked, _travels
+from ncfix.diagnose.next_poses import SURELY, TOLD, Proposal, _beyond, _marked, _new_tools, _one_more, _travels
 from ncfix.measure.program import skeleton
 from ncfix.measure.reader import reads
 from ncfix.measure.writer import dumps
@@ -66,3 +66,34 @@ def test_poses_beyond_the_travels_measured_are_marked_in_the_file() -> None:
     assert reads(text.replace(",\n", ",0\n").encode(), known).headers[-1][0] == "note"
     assert "(X BEYOND THE TRAVELS MEASURED SO FAR" in skeleton(_marked(poses, beyond), known)
     assert _marked(poses, ()) is poses
+
+
+def test_one_tool_more_differs_as_much_as_tools_do() -> None:
+    assert _one_more((114.0,)) == (114.0, 300.0)
+    assert _one_more((275.0,)) == (275.0, 100.0)
+    assert _one_more((114.0, 180.0)) == (114.0, 180.0, 300.0)
+    assert _one_more((90.0, 280.0)) == (90.0, 280.0)  # neither a short nor a long one would tell more
+    assert _one_more((0.0,)) == (0.0, 100.0)  # nobody said how long it is
+
+
+def test_a_tool_that_was_not_used_is_marked_in_the_file() -> None:
+    poses = plan(machine("three_axis"), "tcp", 20)
+    used = np.unique(poses.column("tool_length"))
+    assert _new_tools(poses, used) == ()
+    assert _new_tools(poses, used[:1]) == tuple(used[1:])
+    text = dumps(_marked(poses, ("X",), (300.0,)), ("dx",))
+    assert "mind the clearance; tool of 300 mm: or one that differs as much" in text
+
+
+def test_the_chance_of_one_name_is_that_of_odds_that_scatter() -> None:
+    random = np.random.default_rng(0)
+    for told in (TOLD, 12.0, SURELY):
+        # the log odds of two names whose predictions are told apart by t: half the difference of two sums of squares
+        apart = np.sqrt(told / 36) * np.ones(36)
+        noise = random.normal(size=(20_000, 36))
+        odds = ((noise - apart) ** 2 - noise**2).sum(axis=1) / 2
+        proposal = Proposal("EYZ", None, 0.0, told, "", ("EAZ",))
+        assert proposal.chance == pytest.approx(float((odds > np.log(20)).mean()), abs=0.015)  # 4 s of 20 000 draws
+    assert Proposal("EYZ", None, 0.0, SURELY, "", ()).chance == pytest.approx(0.95, abs=0.005)
+    assert Proposal("EYZ", None, 1.0, 11.0, "", ()).times == 2
+    assert Proposal("EYZ", None, 1.0, 25.0, "", ()).times == 1

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtr
 
 from ncfix.diagnose.contest import Contest, exchanged
 from ncfix.diagnose.evidence import Court
@@ -30,10 +31,14 @@ NEAR = 10.0
 RIVALS_MOST = 3
 FORMS = 3
 """Forms of a name that may imitate."""
-LONGER = 1.8
-"""A second tool, where only one was used, is so much longer."""
+LENGTHS = (100.0, 300.0)
+"""mm: a short tool, and one as long as a test mandrel; of these one more is used, that which differs most from any."""
+OTHER = 50.0
+"""mm: a tool that differs by less from one that is there is none more."""
 TOLD = 6.0
-"""Squared noise units from which on a rival is told apart."""
+"""Squared noise units from which on a rival may be told apart: then the odds are 20 to 1 in one of two measurements."""
+SURELY = 21.0
+"""The same for nineteen of twenty measurements."""
 BETTER = 1.2
 WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
@@ -59,8 +64,10 @@ class Proposal:
     plan     rows of kind tcp without values; None if no pose helps
     before   how well the worst rival can be told from the effect, squared noise units; after with the new poses
     reason   why the data so far do not tell them apart
-    rivals   the names that are told apart
+    rivals   the names that are told apart; where there is no plan, those that cannot be
+    alike    names that cannot be told from it by any of the poses, besides
     beyond   axes that have to go beyond the travels measured so far
+    tools    mm: lengths of tools that were not used so far
     """
 
     name: str
@@ -69,7 +76,23 @@ class Proposal:
     after: float
     reason: str
     rivals: tuple[str, ...]
+    alike: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
+    tools: tuple[float, ...] = ()
+
+    @property
+    def chance(self) -> float:
+        """How often the name that is right would afterwards be 20 to 1 likelier than the worst rival.
+
+        Log odds of what is told apart by t squared noise units scatter about t / 2 with a variance of t.
+        """
+        return float(ndtr((self.after / 2 - ALIKE) / np.sqrt(self.after))) if self.after > 0 else 0.0
+
+    @property
+    def times(self) -> int:
+        """How often each pose has to be measured so that this is nearly sure: what tells apart adds up."""
+        gained = self.after - self.before
+        return max(1, int(np.ceil((SURELY - self.before) / gained))) if gained > 0 else 1
 
 
 def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
@@ -100,35 +123,57 @@ def _side(scale: Scale, others: Members, name: str) -> Side:
 def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) -> Proposal:
     """The poses that tell `chosen` from the rivals, whichever of them is true.
 
-    Within the travels measured if that is enough; else within those of the machine, and that is said.
+    What is easy is enough if it tells them surely: the travels measured, and two tools. Else another tool more, and
+    the travels of the machine; and that is said.
     """
-    spans = court.background.view.reach.spans
-    near = _within(court, chosen, rivals, sigma, spans)
-    travels = _travels(court.background.view.machine, spans)
-    if near.after >= TOLD or travels == spans:
-        return near
-    far = _within(court, chosen, rivals, sigma, travels)
-    return far if far.plan is not None and far.after > BETTER * near.after else near
+    view = court.background.view
+    spans, tools = view.reach.spans, tuple(sorted(set(np.round(view.column("tool_length"), 4).tolist())))
+    more, travels = _one_more(tools), _travels(view.machine, spans)
+    ways = dict.fromkeys([(False, tools if len(tools) > 1 else more), (False, more), (travels != spans, more)])
+    best: Proposal | None = None
+    for far, lengths in ways:
+        found = _within(court, chosen, rivals, sigma, travels if far else spans, lengths)
+        if best is None or (found.plan is not None and found.after > BETTER * best.after):
+            best = found
+        if best.after >= SURELY:
+            break
+    assert best is not None
+    return best
 
 
-def _within(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ranges: Mapping[str, Span]) -> Proposal:
-    """The best poses of those that lie within these ranges."""
-    offered = _offered(court, ranges)
+def _one_more(tools: tuple[float, ...]) -> tuple[float, ...]:
+    """The lengths of the tools, mm, and of one that differs as much as tools do."""
+    if tools == (0.0,):
+        return (0.0, LENGTHS[0])
+    other = max(LENGTHS, key=lambda length: min(abs(length - own) for own in tools))
+    apart = min(abs(other - own) for own in tools)
+    return (*tools, other) if apart >= OTHER else tools
+
+
+def _within(
+    court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ranges: Mapping[str, Span], tools: Sequence[float]
+) -> Proposal:
+    """The best poses of those that lie within these ranges, with tools of these lengths."""
+    offered = _offered(court, ranges, tools)
     new = observe(offered, court.background.view.machine)
     pairs = [pair for rival in rivals for pair in ((chosen, rival), (rival, chosen))]
     contests = [_contest(court, new, true, other, sigma) for true, other in pairs]
-    names = tuple(dict.fromkeys(rival.group.owner.name for rival in rivals))
+    names = [pair[part].group.owner.name for pair, part in zip(pairs, (1, 0) * len(rivals), strict=True)]
     every = list(range(len(offered)))
-    useful = [each for each in contests if each.told(every) > TOLD]
+    told = [each.told(every) > TOLD for each in contests]
+    useful = [each for each, tells in zip(contests, told, strict=True) if tells]
     index, after = exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
     before = min(each.told([]) for each in useful or contests)
     plan = offered.rows(index) if useful and after > BETTER * before else None
     reason = _reason(court, chosen.group, [rival.group for rival in rivals])
+    name, every_rival = chosen.group.owner.name, tuple(dict.fromkeys(names))
     if plan is None:
-        return Proposal(chosen.group.owner.name, None, before, after, reason, names)
-    beyond = _beyond(plan, court.background.view.reach.spans)
-    marked = _marked(plan, beyond)
-    return Proposal(chosen.group.owner.name, marked, before, after, reason, names, beyond)
+        return Proposal(name, None, before, after, reason, every_rival)
+    able = tuple(dict.fromkeys(each for each, tells in zip(names, told, strict=True) if tells))
+    alike = tuple(each for each in every_rival if each not in able)
+    view = court.background.view
+    beyond, new = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
+    return Proposal(name, _marked(plan, beyond, new), before, after, reason, able, alike, beyond, new)
 
 
 def _travels(machine: Machine, spans: Mapping[str, Span]) -> dict[str, Span]:
@@ -151,19 +196,23 @@ def _beyond(plan: Measurement, spans: Mapping[str, Span]) -> tuple[str, ...]:
     )
 
 
-def _marked(plan: Measurement, beyond: Sequence[str]) -> Measurement:
-    """With a line that says which axes go further than before."""
-    if not beyond:
-        return plan
-    return plan.with_header("note", f"{', '.join(beyond)} beyond the travels measured so far, mind the clearance")
+def _new_tools(plan: Measurement, used: Array) -> tuple[float, ...]:
+    """Lengths of tools that were not used so far, mm."""
+    lengths = set(plan.column("tool_length").tolist())
+    return tuple(sorted(each for each in lengths if np.abs(used - each).min() > ROUNDED))
 
 
-def _offered(court: Court, ranges: Mapping[str, Span]) -> Measurement:
-    """Poses within these ranges, with the tools that there are and one more if there is one only."""
+def _marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = ()) -> Measurement:
+    """With lines that say which axes go further than before, and which tools are new."""
+    said = [f"{', '.join(beyond)} beyond the travels measured so far, mind the clearance"] if beyond else []
+    lengths = " and ".join(f"{each:g} mm" for each in tools)
+    said += [f"tool of {lengths}: or one that differs as much, with its own length in the file"] if tools else []
+    return plan.with_header("note", "; ".join(said)) if said else plan
+
+
+def _offered(court: Court, ranges: Mapping[str, Span], lengths: Sequence[float]) -> Measurement:
+    """Poses within these ranges, with these tools."""
     view = court.background.view
-    lengths = sorted(set(np.round(view.column("tool_length"), 4).tolist()))
-    if len(lengths) == 1:
-        lengths = [lengths[0], round(LONGER * lengths[0], 1) if lengths[0] > 0 else 100.0]
     loads = view.column("load_kg")
     inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
     room = Room(ranges=ranges, tool_lengths=lengths, inputs=inputs)

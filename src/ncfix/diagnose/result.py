@@ -80,8 +80,10 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
         "name": p.name,
         "rivals": p.rivals,
         "reason": p.reason,
-        "told_apart": {"now": p.before, "after": p.after},
+        "alike": p.alike,
+        "told_apart": {"now": p.before, "after": p.after, "chance": p.chance, "times_each": p.times},
         "beyond_travels_measured": list(p.beyond),
+        "new_tool_lengths": list(p.tools),
     }
 
 

@@ -94,20 +94,36 @@ def _next(found: Diagnosis) -> list[str]:
     if p.plan is None:
         alike = ", ".join((p.name, *p.rivals))
         return ["", f"{alike}: {p.reason}; no measurement of this kind would tell them apart"]
-    poses = (
-        f"{len(p.plan)} more poses raise what tells them apart from {p.before:.1f} to {p.after:.1f} squared noise units"
-    )
-    return [
-        "",
-        f"to tell {p.name} from {', '.join(p.rivals)} ({p.reason}): {poses}{beyond(p)}; --next FILE writes them",
-    ]
+    lines = ["", f"to tell {p.name} from {', '.join(p.rivals)} ({p.reason}):", f"  {hope(p)}; --next FILE writes them"]
+    lines += [f"  {said}" for said in (unusual(p), hopeless(p)) if said]
+    return lines
 
 
-def beyond(proposal: Proposal) -> str:
-    """That poses lie where nothing was measured yet."""
-    if not proposal.beyond:
-        return ""
-    return f", {', '.join(proposal.beyond)} beyond the travels measured so far (within those, none would)"
+def hope(proposal: Proposal) -> str:
+    """How far the poses would lead."""
+    assert proposal.plan is not None
+    said = f"{len(proposal.plan)} more poses leave one name in {_of_hundred(proposal.chance)}"
+    if proposal.times == 1:
+        return said
+    return f"{said}, and in nearly all if each is measured {proposal.times} times"
+
+
+def _of_hundred(chance: float) -> str:
+    return "nearly all cases" if chance > 0.95 else f"{max(round(20 * chance) * 5, 5)} of 100 cases"
+
+
+def unusual(proposal: Proposal) -> str:
+    """What has to be done that was not done so far."""
+    said = [f"{', '.join(proposal.beyond)} beyond the travels measured so far"] if proposal.beyond else []
+    if proposal.tools:
+        lengths = " and ".join(f"{each:g} mm" for each in proposal.tools)
+        said.append(f"a tool of {lengths}, or one that differs as much from those that were used")
+    return f"they need {'; and '.join(said)}" if said else ""
+
+
+def hopeless(proposal: Proposal) -> str:
+    """What no pose tells apart."""
+    return f"{', '.join(proposal.alike)}: no measurement of this kind would tell that apart" if proposal.alike else ""
 
 
 def why(found: Diagnosis, finding: Finding) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ncfix.diagnose.findings import Diagnosis, Finding
-from ncfix.diagnose.words import SAID, beyond, carried, constants, odd, rest, why
+from ncfix.diagnose.words import SAID, carried, constants, hope, hopeless, odd, rest, unusual, why
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
 RUNNERS = 6
@@ -114,7 +114,12 @@ def _next(found: Diagnosis) -> Section:
         return Section("To tell names apart", [head, Text(words)])
     names = [name for name in proposal.plan.columns if not name.startswith(("temp_", "time_s"))]
     rows = [[f"{proposal.plan.columns[name][k]:g}" for name in names] for k in range(len(proposal.plan))]
-    return Section("To tell names apart", [head, Text(f"These poses would{beyond(proposal)}:"), Table(names, rows)])
+    said = [
+        Text(f"{each[0].upper()}{each[1:]}.")
+        for each in (hope(proposal), unusual(proposal), hopeless(proposal))
+        if each
+    ]
+    return Section("To tell names apart", [head, *said, Table(names, rows)])
 
 
 def _unseen(found: Diagnosis) -> Section:
