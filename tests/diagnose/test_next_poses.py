@@ -59,6 +59,7 @@ def test_poses_beyond_the_travels_measured_are_marked_in_the_file() -> None:
     travels = _travels(known, measured)
     low, high = known.axes[known.axis_names.index("X")].range
     assert travels["X"] == (low, high)
+    assert _travels(known, measured, {"X"})["X"] == (100.0, 120.0)
     beyond = _beyond(poses, measured)
     assert beyond == ("X",)
     text = dumps(_marked(poses, beyond), ("dx",))

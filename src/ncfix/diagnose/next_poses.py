@@ -7,7 +7,7 @@ all rivals still imitates the effect, no measurement of this kind tells them apa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,11 +124,12 @@ def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) ->
     """The poses that tell `chosen` from the rivals, whichever of them is true.
 
     What is easy is enough if it tells them surely: the travels measured, and two tools. Else another tool more, and
-    the travels of the machine; and that is said.
+    the travels of the machine; and that is said. But nobody knows how an effect goes on along its own axis where that
+    was not measured: what would come of it tells no names apart.
     """
     view = court.background.view
     spans, tools = view.reach.spans, tuple(sorted(set(np.round(view.column("tool_length"), 4).tolist())))
-    more, travels = _one_more(tools), _travels(view.machine, spans)
+    more, travels = _one_more(tools), _travels(view.machine, spans, _signals([chosen, *rivals]))
     ways = dict.fromkeys([(False, tools if len(tools) > 1 else more), (False, more), (travels != spans, more)])
     best: Proposal | None = None
     for far, lengths in ways:
@@ -176,13 +177,19 @@ def _within(
     return Proposal(name, _marked(plan, beyond, new), before, after, reason, able, alike, beyond, new)
 
 
-def _travels(machine: Machine, spans: Mapping[str, Span]) -> dict[str, Span]:
-    """The ranges of the machine where it has them, else what was measured."""
+def _signals(sides: Sequence[Side]) -> frozenset[str]:
+    """What the effects go with."""
+    effects = [effect for side in sides for group, _ in side.forms for effect in group.owner.effects]
+    return frozenset(name for effect in effects for name in (effect.signal, effect.times) if name is not None)
+
+
+def _travels(machine: Machine, spans: Mapping[str, Span], kept: Collection[str] = ()) -> dict[str, Span]:
+    """The ranges of the machine where it has them, else what was measured; the latter also of axes that are kept."""
     found = {}
     for axis in machine.axes:
         low, high = (limit / axis.unit for limit in axis.range)
         first, last = spans[axis.name]
-        bounded = np.isfinite([low, high]).all()
+        bounded = np.isfinite([low, high]).all() and axis.name not in kept
         found[axis.name] = (min(low, first), max(high, last)) if bounded else (first, last)
     return found
 
