@@ -152,29 +152,34 @@ def _one_more(tools: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def _within(
-    court: Court, chosen: Side, rivals: Sequence[Side], sigma: float, ranges: Mapping[str, Span], tools: Sequence[float]
+    court: Court,
+    chosen: Side,
+    rivals: Sequence[Side],
+    sigma: float,
+    ranges: Mapping[str, Span],
+    lengths: Sequence[float],
 ) -> Proposal:
     """The best poses of those that lie within these ranges, with tools of these lengths."""
-    offered = _offered(court, ranges, tools)
+    offered = _offered(court, ranges, lengths)
     new = observe(offered, court.background.view.machine)
-    pairs = [pair for rival in rivals for pair in ((chosen, rival), (rival, chosen))]
-    contests = [_contest(court, new, true, other, sigma) for true, other in pairs]
-    names = [pair[part].group.owner.name for pair, part in zip(pairs, (1, 0) * len(rivals), strict=True)]
-    every = list(range(len(offered)))
-    told = [each.told(every) > TOLD for each in contests]
-    useful = [each for each, tells in zip(contests, told, strict=True) if tells]
-    index, after = exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for each in contests))
-    before = min(each.told([]) for each in useful or contests)
-    plan = offered.rows(index) if useful and after > BETTER * before else None
-    reason = _reason(court, chosen.group, [rival.group for rival in rivals])
-    name, every_rival = chosen.group.owner.name, tuple(dict.fromkeys(names))
-    if plan is None:
-        return Proposal(name, None, before, after, reason, every_rival)
-    able = tuple(dict.fromkeys(each for each, tells in zip(names, told, strict=True) if tells))
-    alike = tuple(each for each in every_rival if each not in able)
-    view = court.background.view
-    beyond, new = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
-    return Proposal(name, _marked(plan, beyond, new), before, after, reason, able, alike, beyond, new)
+    rounds = [
+        (rival.group.owner.name, _contest(court, new, true, other, sigma))
+        for rival in rivals
+        for true, other in ((chosen, rival), (rival, chosen))
+    ]
+    every, names = list(range(len(offered))), tuple(dict.fromkeys(name for name, _ in rounds))
+    able = [(name, each) for name, each in rounds if each.told(every) > TOLD]
+    useful = [each for _, each in able]
+    index, after = exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for _, each in rounds))
+    before = min(each.told([]) for each in useful or [each for _, each in rounds])
+    name, reason = chosen.group.owner.name, _reason(court, chosen.group, [rival.group for rival in rivals])
+    if not useful or after <= BETTER * before:
+        return Proposal(name, None, before, after, reason, names)
+    plan, view = offered.rows(index), court.background.view
+    told = tuple(dict.fromkeys(name for name, _ in able))
+    alike = tuple(each for each in names if each not in told)
+    beyond, tools = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
+    return Proposal(name, _marked(plan, beyond, tools), before, after, reason, told, alike, beyond, tools)
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:
