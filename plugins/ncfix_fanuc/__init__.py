@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from ncfix.tables.control import Control
 
 VERICUT = ("the subroutine language of VERICUT", rb"(?im)^[ \t]*CGTECH_MACRO\b")
-OKUMA = ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])")
-"""There G54 to G59 are tool lengths, and G15 H selects work offsets."""
-
 O_WORDS = (
     "LinuxCNC code",
     rb"(?im)^[ \t]*o[ \t]*(?:<[^>\n]+>|\d+)[ \t]*(?:sub|call|if|while|do|repeat)\b|#[ \t]*<[ \t]*_?\w",
@@ -33,8 +30,9 @@ FANUC = Dialect(
         rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:6[56][ \t]*P|5\.1[ \t]*Q|(?:66\.1|68\.2|43\.[45]|54\.1|53\.1)(?!\d))",
         rb"(?im)^[^(;\n]*(?<![A-Z])M[ \t]*98[ \t]*<",
         rb"(?im)^[^(;\n]*,[ \t]*[RCA][ \t]*[-+]?[\d.#\[]",
+        rb"(?m)^[ \t/]*(?:N\d+[ \t]*)?#[ \t]*\d+[ \t]*=[ \t]*[-+]?[ \t]*[\d.#][\d.# \t]*[-+*/]",
     ),
-    foreign=(*FOREIGN, VERICUT, OKUMA, O_WORDS),
+    foreign=(*FOREIGN, VERICUT, O_WORDS),
     upper_case=True,
     closure_mm=0.01,
     language="ncfix.program.fanuc.language:FANUC",

@@ -16,7 +16,7 @@ SIEMENS = Dialect(
         rb"(?im)^[^(;\n]*(?:\b[XYZABC]=(?:AC|IC|DC|ACP|ACN)[ \t]*\(|\b(?:CR|AR|[ABC]3)=[-+.\d])",
     ),
     foreign=(
-        *((family, pattern) for family, pattern in FOREIGN if not family.startswith("Siemens")),
+        *((family, pattern) for family, pattern in FOREIGN if family.startswith("Heidenhain")),
         ("Fanuc-like code (--dialect fanuc)", rb"\A\s*%[ \t]*\r?\n\s*O\d+"),
     ),
     comment="; {}",

@@ -99,6 +99,9 @@ def test_numbers_with_and_without_a_point_have_templates_of_their_own() -> None:
         (b"G154 P3\nG0X1.\n", "haas"),
         (b"O100 IF [#1 GT 2]\nO100 ENDIF\n", "linuxcnc"),
         (b"(IF [1] GOTO 5)\nG0X1\n", "iso"),
+        (b"N5 #1=#2/2\n", "fanuc"),
+        (b"#4 = 8. / 2. (RADIUS)\n", "fanuc"),
+        (b"#1=-5 #2=[#1+3]\n#3=5 (6-2)\n", "iso"),
     ],
 )
 def test_detection(source: bytes, expected: str) -> None:

@@ -54,6 +54,19 @@ def test_values_are_those_of_linuxcnc(expression: str, value: float) -> None:
     assert value_of(expression) == pytest.approx(value, abs=1e-9)
 
 
+@pytest.mark.parametrize("expression", [*PRINTED, "[#2/4]", "[10/2-1]", "[3*2]", "[[8]/2]", "[-#2*3/4]"])
+def test_division_is_no_block_skip_and_a_product_no_check_number(expression: str) -> None:
+    """ISO has both, and LinuxCNC neither where arithmetic may stand."""
+    value = last(follow(f"#2=8\nG0 X{expression}", dialect="iso"))[0]
+    assert value == pytest.approx(value_of(expression, "#2=8"), abs=1e-9)
+
+
+def test_block_skip_stands_behind_a_line_number_too_and_a_check_number_at_the_end() -> None:
+    skipped = follow("N10 /G0 X[8/2]\nN20 G0 Y[2*3]*71\n/2 Z5 *12 ; end", dialect="iso", block_skip=True)
+    assert last(skipped) == [0.0, 6.0, 0.0]
+    assert last(follow("N10 /G0 X[8/2]\nN20 G0 Y[2*3]*71", dialect="iso")) == [4.0, 6.0, 0.0]
+
+
 def test_case_and_blanks_mean_nothing() -> None:
     assert value_of("[ S I N [ 3 0 ] + 1 . 5 ]") == pytest.approx(2.0, abs=1e-9)
 

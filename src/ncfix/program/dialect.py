@@ -13,8 +13,12 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
         rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(?:DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|PROC[ \t]+\w"
         rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
     ),
+    ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
 )
-"""Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`."""
+"""Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
+
+With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets.
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,8 @@ HINTS = {
 }
 NUMERIC = frozenset("0123456789.")
 SIGNS = frozenset("+-")
+BARE = re.compile(r"#(\d+|<[^<>]*>)=[^=]+\Z")
+"""A parameter and its value, behind which an expression goes on that has no brackets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,12 @@ class Stop:
         return BlockError("NCF113", "the bracket is not closed", self.squeezed.places[opened], "close it with ]")
 
 
+def bare_expression(place: int) -> BlockError:
+    """An operator outside brackets."""
+    text = "in this dialect an expression stands in brackets [ ]"
+    return BlockError("NCF110", text, place, "--dialect fanuc, if the control takes it without them")
+
+
 def in_comment(stop: Stop) -> BlockError | None:
     """A comment without an end, without a start, or with another in it."""
     if stop.at == ")":
@@ -133,8 +141,10 @@ def in_number(stop: Stop) -> BlockError | None:
 
 
 def in_expression(stop: Stop) -> BlockError | None:
-    """An operator or a value that is missing, a function that is none, or one without its brackets."""
+    """An operator or a value that is missing, a function that is none, or an expression without its brackets."""
     done = stop.squeezed.code[: stop.position]
+    if stop.at in {*SIGNS, "*", "/"} and BARE.search(done) and not unmatched(done):
+        return bare_expression(stop.place())
     if stop.before in {*SIGNS, "*", "/"} and unmatched(done):
         return stop.fault("NCF114", f"there is no value after {stop.before!r}", back=1)
     if stop.before in SIGNS:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from math import isfinite
 
 from lark import UnexpectedInput
 
 from ncfix.program.build import Parsed, TooDeepError, build
 from ncfix.program.dialect import Dialect
-from ncfix.program.faults import BlockError, explain
-from ncfix.program.grammar import parse, squeeze
+from ncfix.program.faults import BlockError, bare_expression, explain
+from ncfix.program.grammar import Squeezed, parse, squeeze
 from ncfix.program.tree import Constant, Word
 
 MAY_REPEAT = frozenset("GM")
@@ -18,6 +19,9 @@ MAY_REPEAT = frozenset("GM")
 G_WITH_E = frozenset({700, 760})
 M_WITH_E = frozenset({660, 670, 680})
 """G70, G76, M66, M67, M68 take an E word, so that `H2E1` is two words there (LinuxCNC, "G codes" and "M codes")."""
+
+PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
+"""A parameter, and behind it outside brackets what a check number looks like."""
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
@@ -30,10 +34,17 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     except TooDeepError as error:
         place = squeezed.places[error.position]
         raise BlockError("NCF118", "the expression is nested too deep, or too long", place) from None
+    check_products(squeezed)
     check_numbers(parsed)
     check_exponents(parsed, text)
     check_repeats(parsed)
     return parsed
+
+
+def check_products(squeezed: Squeezed) -> None:
+    """Refuse `X#1*2`: it would be read as X#1 and a check number, which no program with parameters has."""
+    if found := PRODUCT.search(squeezed.code):
+        raise bare_expression(squeezed.places[found.start("operator")])
 
 
 def check_numbers(parsed: Parsed) -> None:
