@@ -39,6 +39,13 @@ def test_leaving_the_travel_is_a_finding(shop: Any, ncfix: Any, machine: str) ->
     assert "part.ngc:3: NCF405" in result.err
 
 
+def test_an_arc_that_begins_where_nobody_knows_is_told_once(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21 G90 G17\nG0 X#3012 Y0 Z0\nG2 X10. Y0 R10. F100.\nM30\n")
+    given = ("-m", shop.machine, "--assume-zero", "--dialect", "fanuc", "--no-point", "calculator")
+    found = ncfix("check", shop.program, *given, "--json").json()["files"][0]["findings"]
+    assert [each["code"] for each in found if each["line"] == 3] == ["NCF432"]
+
+
 def test_what_cannot_be_read_is_no_finding_but_an_error(shop: Any, ncfix: Any) -> None:
     shop.program.write_bytes(b"G21\nG1 X1,5\nM2\n")
     result = ncfix("check", shop.program, "--json")

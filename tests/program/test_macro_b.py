@@ -57,6 +57,10 @@ WORKED: dict[str, tuple[str, list[list[float]]]] = {
         "G0X[2+3*4]Y[[2+3]*4]Z[10/4-1]",
         [[14, 20, 1.5]],
     ),
+    "common variables of large memories": (
+        "#400=1.\n#900000=2.\n#907399=#900000+#400\n#98499=4.\nG0X#400Y#907399Z#98499",
+        [[1, 3, 4]],
+    ),
     "indirect variables": ("#1=101\n#101=7.\n#[#1+1]=8.\nG0X#[#1]Y##1Z#102", [[7, 7, 8]]),
     "variables on the left side in one block": ("#1=2.\n#1=#1*#1\nG0X#1", [[4, 0, 0]]),
     "ROUND in a word rounds to the least increment": ("#1=1.23456\nG0X[ROUND[#1]]Y#1", [[1.235, 1.23456, 0]]),
@@ -147,6 +151,15 @@ def test_where_the_control_stops(text: str) -> None:
 def test_what_depends_on_the_machine_is_refused(text: str, reason: str) -> None:
     found = follow(text, dialect="fanuc", no_point="calculator")
     assert reason in reasons(found)[-1]
+
+
+@pytest.mark.parametrize(("dialect", "number"), [("fanuc", 4014), ("haas", 4014), ("mitsubishi", 4012)])
+def test_the_work_offset_in_force_is_in_the_group_that_it_has_with_the_maker(dialect: str, number: int) -> None:
+    assert last(follow(f"G57\nG0X#{number}", dialect=dialect))[0] == 57.0
+
+
+def test_a_group_that_another_maker_counts_otherwise_is_no_number() -> None:
+    assert reasons(follow("G57\nG0X#4014", dialect="mitsubishi")) == ["where the axis X stands is known only at run time"]
 
 
 def test_reading_a_position_is_said() -> None:

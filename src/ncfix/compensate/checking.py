@@ -15,7 +15,7 @@ from ncfix.compensate.options import FixOptions
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine
 from ncfix.program import stamp
-from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.moves import Kind, Moves, Rule, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
@@ -90,7 +90,8 @@ def _refused(program: Program, found: Trace) -> tuple[Message, ...]:
 def _travel(program: Program, followed: Followed) -> tuple[Message, ...]:
     """Motions that leave the travel as they are programmed."""
     moves = followed.trace.moves
-    kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1)
+    adrift = (moves.kind == Kind.ARC) & ~np.isfinite(moves.centre).all(axis=1)
+    kept = (moves.rule == Rule.PASS) | ~np.isfinite(moves.end).all(axis=1) | adrift
     found = findings(followed.machine, moves, untouched(moves, kept).pieces)
     return tuple(message for finding in found for message in _messages(finding, program, moves))
 

@@ -140,6 +140,14 @@ def test_frames(body: str, end: list[float]) -> None:
     assert ends(body) == [end]
 
 
+@pytest.mark.parametrize("dwell", ["V.ZEIT 0.5", "V.ZEIT0,5", "DWELL 0.5", "V.IDO5", "TEMPO. 1"])
+def test_cycles_call_their_numbers_by_words_of_many_languages(dwell: str) -> None:
+    """`V.` is no axis, and `T.` no tool: an address has a number behind it."""
+    found = follow(f"CYCL DEF 9.0 VERWEILZEIT\nCYCL DEF 9 .1 {dwell}\nL X+1 Y.5 Z-,5")
+    assert [move for move in found.moves.reasons if move] == []
+    assert found.moves.end[-1].tolist()[:3] == [1.0, 0.5, -0.5]
+
+
 def test_projection_angles_are_spatial_angles_where_one_is_zero() -> None:
     by_angle = ends("PLANE SPATIAL SPA+0 SPB+30 SPC+0 STAY\nL X+1 Y+2 Z+3")
     assert ends("PLANE PROJECTED PROPR+30 PROMIN+0 ROT+0 STAY\nL X+1 Y+2 Z+3") == by_angle

@@ -11,7 +11,7 @@ from dataclasses import replace
 from ncfix.program.fanuc import data, dynamic, lengths, mirror, polar, references, scaling, tilt
 from ncfix.program.fanuc.arithmetic import compiled
 from ncfix.program.fanuc.cycles import cycle
-from ncfix.program.fanuc.variables import LASTING, is_system
+from ncfix.program.fanuc.variables import is_lasting, is_system
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.groups import ISO_G, Rules, grouped
 
@@ -92,7 +92,7 @@ FANUC = Rules(
     cycles=ALL_CYCLES,
     takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670}),
     system=is_system,
-    lasting=LASTING.__contains__,
+    lasting=is_lasting,
     compiled=compiled,
 )
 
@@ -130,8 +130,9 @@ MITSUBISHI = replace(
     steps={**FANUC.steps, **dict.fromkeys(MITSUBISHI_MADE, data.made)},
     takes=FANUC.takes | set(MITSUBISHI_MADE),
     scales_named=True,
+    offset_group=12,
 )
-"""Mitsubishi mills circles by itself, too."""
+"""Mitsubishi mills circles by itself, too, and counts the groups of modal codes otherwise."""
 
 RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
 """By `Dialect.semantics`."""

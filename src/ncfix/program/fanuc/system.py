@@ -81,7 +81,7 @@ def modes(control: MacroControl) -> dict[int, Getter]:
         7: lambda: float(control.modal.compensated or 40),
         8: lambda: control.modal.tool_code / 10,
         10: lambda: 99.0 if control.modal.retract_to_r else 98.0,
-        14: lambda: float(SYSTEM_CODES.get(control.modal.system, 54)),
+        control.rules.offset_group: lambda: float(SYSTEM_CODES.get(control.modal.system, 54)),
         109: lambda: 0.0 if math.isnan(control.modal.feed) else control.modal.feed / control.modal.unit,
         111: lambda: float(tools.offset or 0),
         119: lambda: control.modal.speed,

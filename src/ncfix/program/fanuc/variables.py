@@ -17,11 +17,13 @@ from ncfix.program.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, P
 LOCAL = range(1, 34)
 """#1 to #33 belong to the call level."""
 
-LASTING = range(500, 1000)
-"""Common variables that other programs find as this one has left them."""
+LASTING = (range(400, 1000), range(900_000, 907_400))
+"""Common variables that other programs find as this one has left them; #400 and #900000 on are Mitsubishi's."""
 
-COMMON = (range(100, 200), LASTING, range(98000, 98500))
+COMMON = (range(100, 200), *LASTING, range(98000, 98500))
 LAST = 149_999
+"""The control's own variables end here."""
+
 POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""
 
@@ -51,7 +53,7 @@ class Variables(Parameters):
         """The value of `#index`, vacant if it has none; raises `Fault`."""
         if index == 0:
             return VACANT
-        if not 0 < index <= LAST:
+        if not exists(index):
             raise Fault(OUT_OF_RANGE, f"there is no variable #{index}")
         store = self.store_of(index)
         if index in self.live:
@@ -66,7 +68,7 @@ class Variables(Parameters):
 
     def is_left_over(self, index: int) -> bool:
         """Whether a variable that the program has not set may have a value from another program."""
-        return any(index in numbers for numbers in COMMON) or (self.inherits and len(self.scopes) == 1)
+        return is_common(index) or (self.inherits and len(self.scopes) == 1)
 
     def from_control(self, index: int) -> float:
         """A value that the control computes; a position is not what it will be when the program is corrected."""
@@ -85,7 +87,7 @@ class Variables(Parameters):
         """Raise `Fault` if the program may not assign to the variable."""
         if key == 0 or not isinstance(key, int):
             raise Fault(READ_ONLY_FAULT, "#0 is always vacant and cannot be assigned to")
-        if not 0 < key <= LAST:
+        if not exists(key):
             raise Fault(OUT_OF_RANGE, f"there is no variable #{key}")
         if any(key in positions for positions in POSITIONS):
             raise Fault(READ_ONLY_FAULT, f"#{key} cannot be assigned to: it is where the machine stands")
@@ -103,6 +105,21 @@ class Variables(Parameters):
                 self.assigned(key)
 
 
+def is_common(index: int) -> bool:
+    """Whether all programs share a variable."""
+    return any(index in numbers for numbers in COMMON)
+
+
+def is_lasting(index: int) -> bool:
+    """Whether other programs find a variable as this one has left it."""
+    return any(index in numbers for numbers in LASTING)
+
+
+def exists(index: int) -> bool:
+    """Whether some control of the family has a variable."""
+    return 0 < index <= LAST or is_common(index)
+
+
 def is_system(index: Key) -> bool:
     """Whether a variable is one of the control's own."""
-    return isinstance(index, int) and index not in LOCAL and not any(index in numbers for numbers in COMMON)
+    return isinstance(index, int) and index not in LOCAL and not is_common(index)

@@ -105,6 +105,7 @@ class Rules:
     takes       G codes that take the axis words of their block for themselves, besides those of `plans`
     adds_rotations  in G91 the angle of G68 is added to that in force
     scales_named  scaling (G51) acts on the axes only that its block names
+    offset_group  the group of the work offsets' codes: 14 where #4014 tells which is in force
     system      whether a numbered parameter is one of the control's own, so that setting it does something
     lasting     whether a numbered parameter keeps its value when the program is over
     compiled    (expression, the address it stands behind) -> the function that computes it
@@ -120,6 +121,7 @@ class Rules:
     takes: frozenset[int] = frozenset()
     adds_rotations: bool = False
     scales_named: bool = False
+    offset_group: int = 14
     system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
     lasting: Callable[[int], bool] = lambda number: False
     compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
