@@ -265,3 +265,16 @@ def test_an_angle_of_as_many_digits_as_a_control_takes_leads_to_the_end(radius: 
     off = radius * 1e-4 * np.pi / 360 if abs(degrees) > 180 else 0.0
     assert np.hypot(*(text.end - end)[:2]) < 2e-4 + off
     assert np.hypot(*(text.centre - middle)[:2]) * (1 - np.cos(turn / 2)) < 3e-4
+
+
+def test_rounded_ends_of_a_nearly_full_circle_do_not_lead_its_pole_astray() -> None:
+    """Ends on 0.001 mm are equally far only from a place 2.3 um aside, which would lead the other side off by twice that.
+
+    Half a step along both axes, 0.71 um, is what each end may be off; the pole gives about as much to either side.
+    """
+    begin, end = np.array([-79.002, -59.446, 3.001]), np.array([-78.390, -58.062, 1.237])
+    middle = np.array([-81.72646, -57.41652, 3.0])
+    arc = PieceOfArc(begin, end, middle, (0, 1, 2), (0, 1, 2), True, np.radians(-334.27), np.full(3, 3))
+    text = arc_text(arc, Style())
+    assert 2 * np.hypot(*(text.centre - middle)[:2]) < 1e-3
+    assert np.hypot(*(text.end - end)[:2]) < 1e-3

@@ -129,13 +129,13 @@ def written_pole(arc: PieceOfArc, middle: FloatArray, style: Style, digits: int)
 
 
 def helix(arc: PieceOfArc, style: Style, sense: str) -> ArcText:
-    """CP with IPA about a pole that is equally far from both ends; the control works the end out.
+    """CP with IPA about a pole that is about equally far from both ends; the control works the end out.
 
     The angle is put on its digits before the pole is: about a far one that leads nearer to the end. About a near one
     it is better found again from the pole as it is written.
     """
     begin, end = arc.begin[arc.columns], arc.end[arc.columns]
-    wanted = equally_far(begin, end, arc.middle)
+    wanted = between(begin, end, arc.middle, turned_by(arc, arc.middle, begin, end))
     first = on_digits(turned_by(arc, wanted, begin, end), style)
     fitting = seen_under(begin, end, math.radians(value_of(first)))
     if float(np.hypot(*(fitting - wanted))) * (1 - math.cos(math.radians(value_of(first)) / 2)) < ASIDE:
@@ -166,6 +166,20 @@ def swung(begin: FloatArray, pole: FloatArray, angle: float) -> FloatArray:
     c, s = math.cos(angle), math.sin(angle)
     found: FloatArray = pole + np.array([c * x - s * y, s * x + c * y])
     return found
+
+
+def between(begin: FloatArray, end: FloatArray, middle: FloatArray, angle: float) -> FloatArray:
+    """A centre moved towards where it is equally far from both ends, as far as the rest of the arc suffers no more
+    than its end gains: of nearly full circles, rounded ends are equally far only from a place far aside.
+    """
+    goal = equally_far(begin, end, middle)
+    aside = float(np.hypot(*(goal - middle)))
+    uneven = abs(float(np.hypot(*(begin - middle))) - float(np.hypot(*(end - middle))))
+    if aside == 0:
+        return middle
+    bulge = 2.0 if abs(angle) > math.pi else 1 - math.cos(angle)
+    result: FloatArray = middle + uneven / (uneven + bulge * aside) * (goal - middle)
+    return result
 
 
 def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> FloatArray:
