@@ -1,6 +1,18 @@
-"""`python -m ncfix`."""
+"""The command `ncfix`, and `python -m ncfix`: nothing is imported before an interruption would be caught."""
 
-from ncfix.cli.main import main
+import sys
+
+
+def main() -> None:
+    """The console script; Ctrl-C while it starts ends it as it does later on."""
+    try:
+        from ncfix.cli.main import main as run
+
+        run()
+    except KeyboardInterrupt:
+        sys.stderr.write("NCF012: interrupted\n")
+        sys.exit(130)
+
 
 if __name__ == "__main__":
     main()

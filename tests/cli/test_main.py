@@ -15,6 +15,7 @@ import click
 import pytest
 
 from ncfix import __version__, plugins
+from ncfix.__main__ import main as console_script
 from ncfix.cli import console, main
 from ncfix.diagnostics import ExitCode, Place, RefusedError
 from ncfix.plugins import Plugin, Plugins
@@ -140,6 +141,17 @@ def test_ctrl_c(ncfix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.code == 128 + signal.SIGINT
     assert "NCF012" in result.err
     assert "Traceback" not in result.err
+
+
+def test_ctrl_c_while_it_starts(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(main, "main", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        console_script()
+    assert ended.value.code == main.INTERRUPTED
+    assert capsys.readouterr().err == "NCF012: interrupted\n"
 
 
 def test_a_reader_that_goes_away_is_no_fault() -> None:

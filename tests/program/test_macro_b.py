@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from ncfix.diagnostics import SourceError
@@ -134,7 +136,7 @@ def test_where_the_control_stops(text: str) -> None:
 
     program = read(f"{text}\nM30\n".encode(), "part", "fanuc")
     with pytest.raises(SourceError) as caught:
-        tracing.trace(program, KNOWN, ("X", "Y", "Z"), frozenset(), max_blocks=2000)
+        tracing.trace(program, replace(KNOWN, most_blocks=2000), ("X", "Y", "Z"), frozenset())
     assert caught.value.messages[0].code == STOPS[text]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from ncfix.diagnostics import SourceError
@@ -57,7 +59,7 @@ COUNTING = {
 
 def moves_of(dialect: str, text: str) -> Moves:
     program = read(text.encode(), "part", dialect)
-    return trace(program, SETUP, ("X", "Y", "Z"), frozenset(), max_blocks=20_000).moves
+    return trace(program, replace(SETUP, most_blocks=20_000), ("X", "Y", "Z"), frozenset()).moves
 
 
 @pytest.mark.parametrize("name", ENDLESS)

@@ -24,6 +24,7 @@ variables."#<depth>" = -4
 tcp = true
 assume_zero = false
 block_skip = true
+most_blocks = 20_000_000
 """
 
 
@@ -38,6 +39,7 @@ def test_everything() -> None:
         tcp=True,
         assume_zero=False,
         block_skip=True,
+        most_blocks=20_000_000,
     )
 
 
@@ -58,6 +60,7 @@ workpiece_offset = [1, 2]
 references.G29 = { X = inf }
 variables.depth = 1
 tcp = 1
+most_blocks = 0
 """
     with pytest.raises(ConfigError) as caught:
         loads(text, "part.toml")
@@ -78,6 +81,7 @@ tcp = 1
         (10, "NCF383", "references.G29.X: expected a number of 1e+12 at most, found inf", ""),
         (11, "NCF382", "variables.depth: no parameter", 'they are written "#100" or "#<name>"'),
         (12, "NCF383", "tcp: expected true or false, found 1", ""),
+        (13, "NCF383", "most_blocks: expected a whole number above zero, found 0", ""),
     ]
     assert str(caught.value).splitlines()[:3] == [
         "part.toml:2:1: NCF383: ncfix: schema version 2, this ncfix reads 1",

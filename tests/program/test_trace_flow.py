@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from ncfix.diagnostics import SourceError
@@ -193,8 +195,14 @@ def test_a_file_that_ends_inside_its_subprogram() -> None:
 def test_endless_programs_end() -> None:
     program = read(b"o1 while [1]\n#1=[#1+1]\no1 endwhile\nM2\n", "part.ngc")
     with pytest.raises(SourceError) as caught:
-        trace(program, KNOWN, ("X",), frozenset(), max_blocks=1000)
+        trace(program, replace(KNOWN, most_blocks=1000), ("X",), frozenset())
     assert caught.value.code == "NCF233"
+    assert "more than 1,000 blocks" in str(caught.value)
+
+
+def test_a_program_is_not_endless_for_being_long() -> None:
+    program = read(b"G21 G90 G54 G1 F100\n" + b"X1\nX0\n" * 600 + b"M2\n", "part.ngc")
+    assert len(trace(program, replace(KNOWN, most_blocks=100), ("X",), frozenset()).moves) == 1200
 
 
 def test_a_line_that_cannot_be_read_is_an_error_only_where_the_control_gets_to_it() -> None:

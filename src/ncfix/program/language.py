@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
 
-MAX_BLOCKS = 10_000_000
-"""Blocks that are executed before a program counts as endless."""
-
 
 class BlockLayout(Protocol):
     """Where things stand in a motion block; what else there is, only the family's own renderer knows."""
@@ -84,8 +81,11 @@ class Run:
     axes: tuple[str, ...]
     rotary: frozenset[str]
     resolve: Resolve | None = None
-    max_blocks: int = MAX_BLOCKS
     kinematics: Kinematics | None = None
+
+    def budget(self, program: Program) -> int:
+        """Blocks that may be executed before a program, or a part of one, counts as endless."""
+        return self.setup.most_blocks + len(program.blocks)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,14 @@ MOST = 100_000
 """Jumps that are remembered; from different calls, one jump is another."""
 
 
+def too_many(blocks: int) -> tuple[str, str]:
+    """What is said, and what can be done, where more than so many blocks were executed beyond those of the text."""
+    return (
+        f"the program seems to be endless: more than {blocks:,} blocks were executed",
+        "if it does end, most_blocks = ... in the setup file allows more",
+    )
+
+
 @dataclass(slots=True)
 class Recurrence:
     """The jumps back that a program has made: what had changed by then, as a count."""

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+MOST_BLOCKS = 4_000_000
+"""Blocks that are executed beyond those of a program's own text before it counts as endless: under a minute."""
+
 
 class Increments(NamedTuple):
     """The least increments of a control's input: mm, inch, degree."""
@@ -50,6 +53,7 @@ class Setup:
     assume_zero       what is not given is zero (named in warnings and in the stamp), else it is an error
     no_point          what numbers without a decimal point mean to controls that tell: "calculator" (X50 is 50 mm), or
                       an increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
+    most_blocks       blocks that may be executed beyond those of the text; with more the program counts as endless
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 
@@ -63,5 +67,6 @@ class Setup:
     tcp: bool = False
     assume_zero: bool = False
     block_skip: bool = False
+    most_blocks: int = MOST_BLOCKS
     no_point: str = ""
     named_tools: Mapping[str, Tool] = field(default_factory=dict)

@@ -90,6 +90,7 @@ class Reading:
             "assume_zero": self.flag,
             "block_skip": self.flag,
             "no_point": self.no_point,
+            "most_blocks": self.count,
         }
         if key not in readers:
             close = get_close_matches(key, readers, 1)
@@ -134,6 +135,13 @@ class Reading:
         if value not in (CALCULATOR, *POINTLESS):
             self.fault(WRONG_VALUE, key, f"expected {CALCULATOR} or {', '.join(POINTLESS)}, found {value!r}")
         return str(value)
+
+    def count(self, key: str, value: Any) -> int:
+        """A whole number above zero."""
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            self.fault(WRONG_VALUE, key, f"expected a whole number above zero, found {value!r}")
+            return 1
+        return value
 
     def triple(self, key: str, value: Any) -> tuple[float, float, float]:
         """Three numbers."""

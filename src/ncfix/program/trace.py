@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ncfix.diagnostics import UsageError
-from ncfix.program.language import MAX_BLOCKS, Run, language_of
+from ncfix.program.language import Run, language_of
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.moves import Kinematics, Trace
 from ncfix.program.setup import Setup
@@ -20,7 +20,6 @@ def trace(
     axes: tuple[str, ...],
     rotary: frozenset[str],
     resolve: Callable[[str], bytes | None] | None = None,
-    max_blocks: int = MAX_BLOCKS,
     kinematics: Kinematics | None = None,
 ) -> Trace:
     """The motions of a program, in commands in mm and rad with all offsets in, in the order of execution.
@@ -36,4 +35,4 @@ def trace(
     strangers = [axis for axis in axes if axis not in AXIS_LETTERS]
     if strangers:
         raise UsageError.of(NO_LETTER, f"the axis {strangers[0]} has no letter that a program can move")
-    return language_of(program.dialect).follow(program, Run(setup, axes, rotary, resolve, max_blocks, kinematics))
+    return language_of(program.dialect).follow(program, Run(setup, axes, rotary, resolve, kinematics))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -204,7 +205,7 @@ def test_where_the_control_would_stop(body: str, code: str) -> None:
     from program.klartext.tnc import program
 
     with pytest.raises(SourceError) as error:
-        trace(read(program(body), "t.h"), KNOWN, ("X", "Y", "Z"), frozenset(), max_blocks=1000)
+        trace(read(program(body), "t.h"), replace(KNOWN, most_blocks=1000), ("X", "Y", "Z"), frozenset())
     assert error.value.code == code
     assert error.value.messages[0].place is not None
     assert error.value.messages[0].place.line >= 2

@@ -268,7 +268,7 @@ def test_an_angle_of_as_many_digits_as_a_control_takes_leads_to_the_end(radius: 
 
 
 def test_rounded_ends_of_a_nearly_full_circle_do_not_lead_its_pole_astray() -> None:
-    """Ends on 0.001 mm are equally far only from a place 2.3 um aside, which would lead the other side off by twice that.
+    """Ends on 0.001 mm are equally far only from a place 2.3 um aside; that takes the other side off by twice as much.
 
     Half a step along both axes, 0.71 um, is what each end may be off; the pole gives about as much to either side.
     """

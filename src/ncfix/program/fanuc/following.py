@@ -130,7 +130,7 @@ class MacroFollower(PartFollower):
 
     def begin(self, program: Program) -> PartMacroInterpreter:
         """What goes through the program, of which this is the first part."""
-        return PartMacroInterpreter(self.control, program, self.resolve, self.max_blocks)
+        return PartMacroInterpreter(self.control, program, self.resolve, self.budget(program))
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""

@@ -38,7 +38,7 @@ def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
 def following(program: Program, run: Run) -> MacroInterpreter:
     """The control's walk through a program, before its first step."""
     control = MacroControl(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
-    return MacroInterpreter(control, program, run.resolve, run.max_blocks)
+    return MacroInterpreter(control, program, run.resolve, run.budget(program))
 
 
 def follow(program: Program, run: Run) -> Trace:

@@ -102,7 +102,7 @@ class KlartextFollower(PartFollower):
 
     def begin(self, program: Program) -> PartInterpreter:
         """What goes through the program, of which this is the first part."""
-        return PartInterpreter(self.control, program, self.resolve, self.max_blocks)
+        return PartInterpreter(self.control, program, self.resolve, self.budget(program))
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""

@@ -27,7 +27,7 @@ from ncfix.program.klartext.unread import unread_line
 from ncfix.program.language import Resolve
 from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
@@ -159,7 +159,7 @@ class Interpreter:
         """Count blocks that are executed; raises `Fault` when there are too many."""
         self.budget -= blocks
         if self.budget < 0:
-            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     def is_skipped(self) -> bool:
         """Whether blocks with `/` are passed over."""

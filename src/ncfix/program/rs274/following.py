@@ -80,7 +80,7 @@ class PartFollower(ABC):
     def __init__(self, control: Control, run: Run) -> None:
         self.control = control
         self.resolve = run.resolve
-        self.max_blocks = run.max_blocks
+        self.budget = run.budget
         self.interpreter: Walk | None = None
 
     @abstractmethod
@@ -104,7 +104,7 @@ class PartFollower(ABC):
         else:
             self.interpreter.next_part(program)
         self.control.builder.clear()
-        self.interpreter.run_part(last, self.max_blocks)
+        self.interpreter.run_part(last, self.budget(program))
         moves = self.control.builder.moves()
         rollover.say(self.control, program)
         return moves
@@ -140,4 +140,4 @@ class RS274Follower(PartFollower):
 
     def begin(self, program: Program) -> Walk:
         """What goes through the program, of which this is the first part."""
-        return PartInterpreter(self.control, program, self.resolve, self.max_blocks)
+        return PartInterpreter(self.control, program, self.resolve, self.budget(program))

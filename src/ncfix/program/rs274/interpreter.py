@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
@@ -140,7 +140,7 @@ class Interpreter:
         """Count executed blocks; raises `Fault` when there are too many."""
         self.budget -= blocks
         if self.budget < 0:
-            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     def at_end_of_text(self) -> None:
         """The text is over without M2, M30 or `%`."""

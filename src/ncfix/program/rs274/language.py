@@ -27,7 +27,7 @@ def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
     rollover.watch(control)
-    return Interpreter(control, program, run.resolve, run.max_blocks)
+    return Interpreter(control, program, run.resolve, run.budget(program))
 
 
 def follow(program: Program, run: Run) -> Trace:

@@ -99,7 +99,7 @@ class SinumerikFollower(PartFollower):
 
     def begin(self, program: Program) -> PartInterpreter:
         """What goes through the program, of which this is the first part."""
-        walk = PartInterpreter(self.control, program, self.resolve, self.max_blocks)
+        walk = PartInterpreter(self.control, program, self.resolve, self.budget(program))
         if len(walk.units) > 1:
             raise NotInPartsError("the text holds several programs")
         return walk

@@ -13,7 +13,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence
+from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.places import mask_of
@@ -177,7 +177,7 @@ class Interpreter:
         """Count executed blocks; raises `Fault` when there are too many."""
         self.budget -= blocks
         if self.budget < 0:
-            raise Fault(ENDLESS, "the program seems to be endless", "more blocks were executed than ncfix follows")
+            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     # -- one block ----------------------------------------------------------------------------------------------------
 

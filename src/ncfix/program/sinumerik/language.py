@@ -35,7 +35,7 @@ SPATIAL = frozenset("XYZ")
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
     control = Sinumerik(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
-    return Interpreter(control, program, run.resolve, run.max_blocks)
+    return Interpreter(control, program, run.resolve, run.budget(program))
 
 
 def follow(program: Program, run: Run) -> Trace:
