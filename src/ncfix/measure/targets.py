@@ -7,18 +7,18 @@ s how the instrument stands. Places and stand are unknown. Three or more targets
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ncfix.machine import Effect, Machine, State, se3
-from ncfix.measure.geometry import TOOL, WORKPIECE, best_rotation, branch
+from ncfix.measure.geometry import TOOL, WORKPIECE, branch
 from ncfix.measure.measurement import Array, Measurement, groups
 from ncfix.measure.observation import Observation, Unknowns
+from ncfix.measure.stands import Sights, first_guess
 
 READ = ("x", "y", "z")
-ROUNDS = 200
-"""Steps of the first guess of stand and places, each nearer than the one before."""
 STOOD = 0.02
 """rad: how far the instrument may be turned against the base, in simulations."""
 
@@ -36,6 +36,7 @@ class Targets(Observation):
         self.poses = self._base_from_body(self.body.nominal(self.own, 0.0))
         self.names, self.index = groups(measurement.labels["target"])
         self.set_names, self.set_index = groups(measurement.sets)
+        self.sights = Sights(self.poses, self.index, self.set_index)
         self.stands, self.places = self._first_guess()
 
     def _other_axes(self) -> dict[str, Array]:
@@ -64,10 +65,8 @@ class Targets(Observation):
         places, shifts, turns = self._parts(unknowns)
         body, _ = branch(machine, self.side)
         poses = self._base_from_body(body.actual(self.own, self.own_state))
-        base = np.einsum("nij,nj->ni", poses[:, :3, :3], places[self.index]) + poses[:, :3, 3]
         turned = se3.rotation(turns) @ self.stands[:, :3, :3]
-        seen: Array = np.einsum("nij,nj->ni", turned[self.set_index], base) + shifts[self.set_index]
-        return seen.ravel()
+        return replace(self.sights, poses=poses).seen(places, turned, shifts).ravel()
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`; the errors of the other branch are not seen."""
@@ -81,19 +80,8 @@ class Targets(Observation):
 
     def unknown_design(self, unknowns: Array) -> Array:
         """See `Observation`."""
-        n, t, s = len(self.measurement), len(self.names), len(self.set_names)
         places, _, turns = self._parts(unknowns)
-        turned = (se3.rotation(turns) @ self.stands[:, :3, :3])[self.set_index]
-        base = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.index]) + self.poses[:, :3, 3]
-        arms = -se3.skew(np.einsum("nij,nj->ni", turned, base))
-        columns, each = np.zeros((n, 3, 3 * (t + 2 * s))), np.arange(n)
-        carried = turned @ self.poses[:, :3, :3]
-        for k in range(3):
-            columns[each, :, 3 * self.index + k] = carried[:, :, k]
-            columns[each, k, 3 * (t + self.set_index) + k] = 1.0
-            columns[each, :, 3 * (t + s + self.set_index) + k] = arms[:, :, k]
-        result: Array = columns.reshape(3 * n, -1)
-        return result
+        return self.sights.design(places, se3.rotation(turns) @ self.stands[:, :3, :3])
 
     def _parts(self, unknowns: Array) -> tuple[Array, Array, Array]:
         t, s = len(self.names), len(self.set_names)
@@ -125,38 +113,14 @@ class Targets(Observation):
 
     def _first_guess(self) -> tuple[Array, Array]:
         """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
-        places = np.zeros((len(self.names), 3))
+        places, known = np.zeros((len(self.names), 3)), np.zeros(len(self.names), bool)
         for text in self.measurement.all_headers("target"):
             name, *numbers = text.split()
             if name in self.names:
                 places[self.names.index(name)] = [float(each) for each in numbers]
-        stands = np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy()
+                known[self.names.index(name)] = True
         if not all(name in self.measurement.columns for name in READ):
-            return stands, places
-        seen = self.measurement.stacked(*READ)
-        for _ in range(ROUNDS):
-            before = places
-            stands = self._stands(seen, places)
-            places = self._placed(seen, stands)
-            if np.abs(places - before).max() < 1e-6:
-                break
-        return stands, places
-
-    def _stands(self, seen: Array, places: Array) -> Array:
-        """How the instrument stands, for targets that are there."""
-        base = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places[self.index]) + self.poses[:, :3, 3]
-        stands = np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy()
-        for k in range(len(self.set_names)):
-            rows = self.set_index == k
-            middle, center = seen[rows].mean(0), base[rows].mean(0)
-            if self.measurement.header("frame") != "base":
-                stands[k, :3, :3] = best_rotation(seen[rows] - middle, base[rows] - center)
-            stands[k, :3, 3] = middle - stands[k, :3, :3] @ center
-        return stands
-
-    def _placed(self, seen: Array, stands: Array) -> Array:
-        """Where the targets are, for an instrument that stands like this."""
-        local = np.einsum("nji,nj->ni", stands[self.set_index][:, :3, :3], seen - stands[self.set_index][:, :3, 3])
-        body = np.einsum("nji,nj->ni", self.poses[:, :3, :3], local - self.poses[:, :3, 3])
-        counts = np.bincount(self.index)
-        return np.stack([np.bincount(self.index, body[:, k]) / counts for k in range(3)], axis=-1)
+            return np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy(), places
+        along_base = self.measurement.header("frame") == "base"
+        found = first_guess(self.sights, self.measurement.stacked(*READ), places, known, along_base)
+        return found.stands, found.places

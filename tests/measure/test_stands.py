@@ -1,0 +1,49 @@
+"""A tracker may stand anywhere, any way round; targets may sit anywhere on the table or the head."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from measure.poses import machine, plan
+from ncfix.machine import se3
+from ncfix.measure.observe import observe
+from ncfix.measure.synthetic import Faults, simulate
+
+PLACES = np.array([[0.0, 0.0, 0.0], [180.0, 30.0, -60.0], [-90.0, 165.0, 30.0]])
+
+
+def seen_from(turn: np.ndarray, shift: np.ndarray, side: str, name: str, targets: tuple[tuple[str, str], ...] = ()):
+    """What a perfect machine shows an instrument that stands like this, with targets at PLACES, and the machine."""
+    clean = machine(name).replace(effects=())
+    aim = replace(plan(clean, "tool" if side == "tool" else "table", 90), headers=(("carried_by", side), *targets))
+    rows = simulate(aim, clean, Faults(setup=0.0), seed=1)
+    sights = observe(aim, clean).sights
+    stands = np.broadcast_to(turn, (len(sights.poses), 3, 3))
+    read = np.einsum("nij,nj->ni", stands, sights.base(PLACES)) + shift
+    return replace(rows, columns={**rows.columns, **{axis: read[:, k] for k, axis in enumerate("xyz")}}), clean
+
+
+@pytest.mark.parametrize("name", ["wCBXFZYSt", "wCAYFXZSt", "dmu50"])
+@pytest.mark.parametrize("side", ["tool", "workpiece"])
+def test_no_stand_of_a_tracker_is_missed(name, side):
+    random = np.random.default_rng(7)
+    for _ in range(3):
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        turn = turn * np.linalg.det(turn)
+        data, clean = seen_from(turn, random.uniform(-3000, 3000, 3), side, name)
+        seen = observe(data, clean)
+        left = seen.values - seen.predict(clean, seen.unknowns.start)
+        assert np.abs(left).max() < 1e-6  # mm; the readings are exact, positions of some metres have 13 digits
+
+
+def test_what_the_readings_leave_open_stays_where_the_header_says():
+    """A tool branch of linear axes shows no place of a target, only how targets lie to each other."""
+    turn = se3.rotation(np.array([0.3, -2.0, 1.1]))
+    targets = tuple(("target", f"{k + 1} " + " ".join(map(str, place))) for k, place in enumerate(PLACES))
+    data, clean = seen_from(turn, np.array([800.0, -900.0, 300.0]), "tool", "wCBXFZYSt", targets)
+    seen = observe(data, clean)
+    assert np.abs(seen.places - PLACES).max() < 1e-6
+    assert np.abs(seen.stands[0, :3, :3] - turn).max() < 1e-9
