@@ -112,6 +112,15 @@ def test_wrong_use(shop: Any, ncfix: Any, options: list[str], code: str) -> None
     assert not (shop.folder / "t").exists()
 
 
+def test_a_range_may_be_written_with_a_comma_or_a_colon(shop: Any, ncfix: Any) -> None:
+    found = []
+    for form in ("X=100,200", "X=100:200"):
+        folder = shop.folder / form[5]
+        assert ncfix("export", "linuxcnc", "-m", shop.machine, "-o", folder, "--range", form).code == 0
+        found.append((folder / "joint_0_X.comp").read_bytes())
+    assert found[0] == found[1]
+
+
 def test_corrections_beyond_what_the_machine_allows(shop: Any, ncfix: Any) -> None:
     """2 um per mm: a correction of 1 mm at the end, where half a millimetre is allowed."""
     shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-3"))

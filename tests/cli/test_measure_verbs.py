@@ -118,6 +118,18 @@ def test_ball_bars_and_direct_readings_have_figures_of_their_standards(ncfix, ro
         assert "sigma of the tip error over the travels" in done.err
 
 
+def test_the_sigma_over_the_travels_says_if_anything_is_held(ncfix, root, tmp_path):
+    """A measurement with B at zero says nothing of where its axis lies; that of the linear axes it says."""
+    path, known = root / "examples" / "machines" / "wCBXFZYSt.toml", machine("wCBXFZYSt")
+    poses = plan(known, "tcp", 120)
+    poses = poses.with_columns({name: 0.0 * poses.columns[name] for name in "BC"})
+    data = tmp_path / "tcp.csv"
+    data.write_text(dumps(simulate(poses, known, Faults(noise_um=1.0))))
+    for effects, held in (("EC0Y", False), ("EC0Y,EX0B", True)):
+        done = ncfix("calibrate", data, "-m", path, "-o", tmp_path / "m.toml", "--effects", effects, "--force")
+        assert ("um rms; what is held counts as known" in done.err) is held
+
+
 def test_knots_and_time_constants_are_options(ncfix, measured, tmp_path):
     path, _, data = measured
     options = ("-m", path, "-o", tmp_path / "m.toml", "--force")

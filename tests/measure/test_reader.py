@@ -13,6 +13,8 @@ from ncfix.measure.writer import dumps
 
 HEAD = "# ncfix-measurement: 1\n# kind: tcp\n# noise_um: 1.5\n"
 GOOD = HEAD + "set,X,Y,Z,dir_X,time_s,tool_length,dx,dy,dz\n1,100.0,50.0,-20.0,1,0.0,160.0,0.0012,-0.0003,0.0041\n"
+GAUGE = "# ncfix-measurement: 1\n# kind: length\nax,ay,az,bx,by,bz,length\n"
+PROBE = "# ncfix-measurement: 1\n# kind: probe\n# distance: 1 2 304.7 0.001\n"
 THREE = machine("three_axis")
 FIVE = machine("wCBXFZYSt")
 
@@ -90,6 +92,14 @@ BAD = {
     "two kinds": (GOOD.replace("# noise_um: 1.5", "# kind: tcp6"), ("NCF602", 3, 3)),
     "no such number": (GOOD.replace("100.0", "1e200"), ("NCF608", 5, 3)),
     "empty file": ("", ("NCF600", 0, 0)),
+    "late header": (GOOD + "# noise_um: 3\n", ("NCF602", 6, 1)),
+    "negative length": (GAUGE + "0,0,0,100,0,0,-100\n", ("NCF612", 4, 0)),
+    "no length": (GAUGE + "0,0,0,100,0,0,0\n", ("NCF612", 4, 0)),
+    "no way": (GAUGE + "50,0,0,50,0,0,1\n", ("NCF612", 4, 0)),
+    "no radius": (GAUGE.replace("ax,ay,az,bx,by,bz", "cx,cy,cz,radius") + "0,0,0,0,100\n", ("NCF612", 4, 0)),
+    "axis beside its ends": (GAUGE.replace("ax,", "X,ax,") + "5,0,0,0,100,0,0,100\n", ("NCF604", 3, 1)),
+    "axis beside its reading": (PROBE + "ball,mx,my,mz,Y\n1,0,0,0,0\n", ("NCF604", 4, 15)),
+    "negative distance": (PROBE.replace("304.7", "-304.7") + "ball,mx,my,mz\n1,0,0,0\n", ("NCF603", 3, 13)),
 }
 
 
@@ -97,6 +107,14 @@ BAD = {
 def test_a_fault_is_named_with_its_place(name):
     text, expected = BAD[name]
     assert expected in faults(text)
+
+
+def test_the_line_is_shown_with_what_cannot_be_in_it():
+    with pytest.raises(ConfigError) as caught:
+        reads(GOOD.replace("-20.0,1,", "-20.0,0.5,").encode(), THREE, "m.csv")
+    place = caught.value.messages[0].place
+    assert place is not None
+    assert place.text.startswith("1,100.0,50.0,-20.0,0.5,")
 
 
 def test_a_file_with_semicolons_has_one_fault():

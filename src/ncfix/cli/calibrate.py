@@ -144,7 +144,9 @@ def _print(found: Calibration, over: Prediction) -> None:
         _say_bar(bar)
     for row in _positioning(found):
         _say_positioning(row)
-    console.say(f"sigma of the tip error over the travels: {over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms")
+    held = "; what is held counts as known" if any(sigma != sigma for sigma in found.sigma.tolist()) else ""
+    figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
+    console.say(f"sigma of the tip error over the travels: {figures}{held}")
     console.say(f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; {_noise(found)}")
 
 

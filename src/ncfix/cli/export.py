@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="How much correction may be lost between the points of a table.",
 )
-@click.option("--range", "ranges", metavar="X=LOW:HIGH", multiple=True, help="Cover less than the travel; mm, degree.")
+@click.option("--range", "ranges", metavar="X=LOW,HIGH", multiple=True, help="Cover less than the travel; mm, degree.")
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control.")
 @click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
 @click.option("--program", metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables.")
@@ -96,15 +96,15 @@ def export(
 
 
 def given_ranges(machine: Machine, texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-    """Axis -> range in mm or rad, from X=LOW:HIGH in mm or degree; raises `UsageError` NCF483."""
+    """Axis -> range in mm or rad, from X=LOW,HIGH or X=LOW:HIGH in mm or degree; raises `UsageError` NCF483."""
     units = {axis.name: axis.unit for axis in machine.axes}
     found = {}
     for text in texts:
-        name, value = _pair(text, "--range X=LOW:HIGH")
+        name, value = _pair(text, "--range X=LOW,HIGH")
         try:
-            low, high = (float(part) * units.get(name, 1.0) for part in value.split(":"))
+            low, high = (float(part) * units.get(name, 1.0) for part in value.replace(":", ",").split(","))
         except ValueError as error:
-            hint = "--range X=LOW:HIGH, mm or degree"
+            hint = "--range X=LOW,HIGH, mm or degree"
             raise UsageError.of("NCF483", f"{text!r} is not a range", hint=hint) from error
         found[name] = (low, high)
     return found

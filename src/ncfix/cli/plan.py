@@ -114,10 +114,10 @@ def _room(
 
 
 def _limits(texts: tuple[str, ...], option: str) -> dict[str, tuple[float, float]]:
-    """NAME=LOW,HIGH."""
+    """NAME=LOW,HIGH or NAME=LOW:HIGH."""
     found = {}
     for text in texts:
-        name, (low, high) = _named(text, 2, option)
+        name, (low, high) = _named(text.replace(":", ","), 2, option)
         if low >= high:
             raise click.BadParameter(f"{text!r} is an empty range", param_hint=option)
         found[name] = (low, high)

@@ -10,6 +10,7 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
 from ncfix.machine.effect import COMPONENTS, NAME
+from ncfix.measure.kinds import ENDS
 from ncfix.measure.measurement import Array, Measurement, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
@@ -19,18 +20,34 @@ BEYOND = 1e-6
 """How far outside its range a position may be, for numbers that were rounded: mm, rad."""
 
 
-def checked(measurement: Measurement, machine: Machine) -> Measurement:
-    """The measurement with its remarks; raises `ConfigError` with all of NCF610 ... NCF612."""
-    faults = [*_directions(measurement), *_clock(measurement), *_named(measurement, machine)]
+def checked(measurement: Measurement, machine: Machine, lines: Sequence[str] = ()) -> Measurement:
+    """The measurement with its remarks; raises `ConfigError` with all of NCF610 ... NCF612.
+
+    lines  those of its file, to be shown with a message
+    """
+    faults = [
+        *_directions(measurement),
+        *_clock(measurement),
+        *_named(measurement, machine),
+        *_lengths(measurement),
+    ]
     if faults:
-        raise ConfigError.collected(faults)
+        raise ConfigError.collected([_shown(fault, lines) for fault in faults])
     remarks = [
         *_twice(measurement),
         *_radians(measurement, machine),
         *_ranges(measurement, machine),
         *_micrometres(measurement),
     ]
-    return replace(measurement, remarks=(*measurement.remarks, *remarks))
+    return replace(measurement, remarks=(*measurement.remarks, *(_shown(each, lines) for each in remarks)))
+
+
+def _shown(message: Message, lines: Sequence[str]) -> Message:
+    """The message with the line that it is about."""
+    place = message.place
+    if place is None or not 0 < place.line <= len(lines):
+        return message
+    return replace(message, place=replace(place, text=lines[place.line - 1]))
 
 
 def _directions(measurement: Measurement) -> Iterator[Message]:
@@ -66,6 +83,20 @@ def _named(measurement: Measurement, machine: Machine) -> Iterator[Message]:
         elif component_of(axis, component) is None:
             text = f"{component!r} is no error motion of {axis}"
             yield Message("NCF612", text, measurement.place(row), f"for example E{COMPONENTS[0]}{axis}")
+
+
+def _lengths(measurement: Measurement) -> Iterator[Message]:
+    """What is said to be a distance and cannot be one."""
+    if measurement.kind != "length":
+        return
+    for name in ("length", "nominal", "radius"):
+        for row in np.flatnonzero(measurement.columns.get(name, np.ones(0)) <= 0):
+            text = f"{name} is {measurement.columns[name][row]:g} mm, a distance is above zero"
+            yield Message("NCF612", text, measurement.place(int(row)))
+    if set(ENDS) <= measurement.columns.keys():
+        way = measurement.stacked(*ENDS[3:]) - measurement.stacked(*ENDS[:3])
+        for row in np.flatnonzero((way == 0).all(axis=1)):
+            yield Message("NCF612", "both ends of this length are the same position", measurement.place(int(row)))
 
 
 def component_of(axis: str, component: str) -> str | None:
@@ -148,4 +179,5 @@ def _micrometres(measurement: Measurement) -> Iterator[Message]:
             size = float(np.median(np.abs(measurement.columns[name])))
             if size > limit:
                 text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
-                yield Message("NCF616", text, measurement.place(0), "divide by 1000?")
+                hint = "divide by 1000?" if unit == "mm" else "are they in degrees, or in mrad?"
+                yield Message("NCF616", text, measurement.place(0), hint)

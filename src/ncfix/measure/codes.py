@@ -16,8 +16,8 @@ CODES = {
     "NCF601": Code("an unknown kind of measurement", "`# kind:` says what was measured; this kind is none.", FORMATS),
     "NCF602": Code(
         "an unknown header line",
-        "A header line that ncfix does not know would be ignored in silence. Free notes go under instrument, date, "
-        "origin, operator or note.",
+        "A header line that ncfix does not know, or that is there twice or below the columns, would be ignored in "
+        "silence. Free notes go under instrument, date, origin, operator or note.",
         FORMATS,
     ),
     "NCF603": Code("a header line that cannot be read", "Its value is not of the form that the key asks for.", FORMATS),
@@ -53,8 +53,9 @@ CODES = {
         "Give a set of its own to what was measured after the clock was set back.",
     ),
     "NCF612": Code(
-        "a label that is none",
-        "Axis, component, ball or target of a row does not exist, or a direction is none of -1, 0 and 1.",
+        "a label, direction or distance that is none",
+        "Axis, component, ball or target of a row does not exist, a direction is none of -1, 0 and 1, or a distance is "
+        "not above zero.",
     ),
     "NCF613": Code(
         "a pose was measured twice",

@@ -30,6 +30,15 @@ def read(text: Text) -> list[tuple[Cell, Cell]]:
     return pairs
 
 
+def stray(text: Text, start: int, kind: str) -> None:
+    """Note header lines after the first `start` lines: there they would be taken for a comment."""
+    for number, line in enumerate(text.lines[start:], start + 1):
+        key, colon, _ = line.removeprefix("#").partition(":")
+        if line.startswith("#") and colon and key.strip() in (*COMMON, *KINDS[kind].headers):
+            hint = "header lines stand above the columns"
+            text.note("NCF602", f"header line {key.strip()!r} below the columns", number, 1, hint)
+
+
 def kind_of(text: Text, pairs: list[tuple[Cell, Cell]]) -> str:
     """The kind; what is wrong with version and kind is noted."""
     found = {key.text: value for key, value in pairs}
@@ -82,6 +91,8 @@ def _named(text: Text, value: Cell, key: str, names: int, numbers: int) -> None:
     if len(parts) != names + numbers or any(_number(part) is None for part in parts[names:]):
         wanted = f"{names} names and {numbers} numbers"
         text.note("NCF603", f"{key} is {wanted}, not {value.text!r}", value.line, value.column)
+    elif key == "distance" and min(float(part) for part in parts[names:]) <= 0:
+        text.note("NCF603", "a distance and its uncertainty are above zero", value.line, value.column)
 
 
 def _number(text: str) -> float | None:

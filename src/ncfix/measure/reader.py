@@ -52,7 +52,7 @@ def reads(source: bytes, machine: Machine, path: str = "<measurement>", plan: bo
             return found
     lines = Text(path, text.splitlines())
     measurement = _measurement(lines, machine, plan)
-    return checks.checked(measurement, machine)
+    return checks.checked(measurement, machine, lines.lines)
 
 
 def _decoded(source: bytes, path: str) -> str:
@@ -77,6 +77,7 @@ def _measurement(text: Text, machine: Machine, plan: bool) -> Measurement:
         text.note("NCF609", "there are no columns and no rows", len(text.lines))
         text.stop()
     assert start is not None
+    headers.stray(text, start, kind)
     names = _cells(text.lines[start], start + 1)
     if _separated_otherwise(names):
         text.note("NCF604", "the columns are not separated by commas", start + 1, 0, SEPARATED)
@@ -114,6 +115,8 @@ def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, pl
             _unknown_name(text, name, known, form, machine)
     if form.name == "length":
         _check_length_form(text, seen, names[0].line)
+    if form.name == "probe" or (form.name == "length" and "ax" in seen):
+        _check_named_once(text, names, form)
     wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
     for missing in [each for each in wanted if each not in seen]:
         text.note("NCF605", f"kind {form.name} has a column {missing!r}", names[0].line)
@@ -148,6 +151,14 @@ def _check_length_form(text: Text, seen: set[str], line: int) -> None:
         return
     forms = "ax,ay,az,bx,by,bz,length[,nominal] or cx,cy,cz,radius,length"
     text.note("NCF605", f"kind length has the columns {forms}", line)
+
+
+def _check_named_once(text: Text, names: list[Cell], form: Kind) -> None:
+    """Note columns of linear axes where other columns say how these stand."""
+    instead = "mx, my, mz" if form.name == "probe" else "ax, ay, az and bx, by, bz"
+    for name in names:
+        if name.text in ("X", "Y", "Z"):
+            text.note("NCF604", f"column {name.text!r} beside {instead}, which say it", name.line, name.column)
 
 
 def _rows(text: Text, names: list[Cell], start: int) -> list[list[Cell]]:

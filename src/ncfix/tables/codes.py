@@ -24,7 +24,7 @@ CODES = {
     "NCF483": Code(
         "a range that tables cannot cover",
         "The range of an axis is empty, beyond its travel, of an axis that is not there, or nowhere given.",
-        "Give ranges in the machine file, or `--range X=LOW:HIGH` (mm or degree).",
+        "Give ranges in the machine file, or `--range X=LOW,HIGH` (mm or degree).",
     ),
     "NCF484": Code(
         "more than the format can hold",

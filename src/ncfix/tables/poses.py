@@ -29,13 +29,13 @@ def ranges_of(machine: Machine, given: Ranges | None = None) -> Array:
         index = machine.axis_names.index(name)
         low, high = machine.ranges[index]
         if not limits[0] < limits[1]:
-            raise wrong_range(f"the range of {name} is empty", "LOW:HIGH, the lower first")
+            raise wrong_range(f"the range of {name} is empty", "LOW,HIGH, the lower first")
         if limits[0] < low - 1e-9 or limits[1] > high + 1e-9:
             raise wrong_range(f"the range of {name} goes beyond its travel", "the machine file has the travel")
         space[index] = limits
     for name, limits in zip(machine.axis_names, space, strict=True):
         if not np.isfinite(limits).all():
-            raise wrong_range(f"the machine file gives no range of {name}", f"--range {name}=LOW:HIGH")
+            raise wrong_range(f"the machine file gives no range of {name}", f"--range {name}=LOW,HIGH")
     return space
 
 
