@@ -82,7 +82,7 @@ class Left:
 def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
     """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves."""
     moves, known = settled.moves, settled.plan.known
-    if moves.placed is None or known is None or moves.placed.all():
+    if known is None or moves.all_placed:
         return {}
     off = np.abs(known.end - moves.end - settled.shift)
     if known.beside is not None:

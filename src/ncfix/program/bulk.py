@@ -224,7 +224,7 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
 
 def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     """(n,) motions in which axes that must get no word stand where the program believes them to be."""
-    if moves.placed is None or moves.placed.all():
+    if moves.all_placed:
         return np.ones(len(moves), dtype=np.bool_)
     last = first_piece[1:] - 1
     fine: Mask = ~(moves.wordless & (pieces.end[last] != moves.end)).any(axis=1)

@@ -132,6 +132,7 @@ class Moves:
                  only then may it get a word that its block lacks (see `rs274.places`). None: all are
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
+    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`). None: none
     angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
                  may count from 0 to 360 degrees; NaN for others. None: none
     """
@@ -166,6 +167,7 @@ class Moves:
     placed: NDArray[np.bool_] | None = None
     fixed_centre: NDArray[np.bool_] | None = None
     counted: NDArray[np.bool_] | None = None
+    resting: NDArray[np.bool_] | None = None
     angles: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
@@ -173,11 +175,19 @@ class Moves:
 
     @property
     def wordless(self) -> NDArray[np.bool_]:
-        """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand."""
+        """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand.
+
+        Those that rest have one, which must lead them nowhere else.
+        """
         if self.placed is None:
             return np.zeros(self.end.shape, dtype=bool)
         wordless: NDArray[np.bool_] = ~(self.placed | self.programmed)
-        return wordless
+        return wordless if self.resting is None else wordless | self.resting
+
+    @property
+    def all_placed(self) -> bool:
+        """Whether every axis may have a word wherever it needs one."""
+        return self.placed is None or (self.resting is None and bool(self.placed.all()))
 
     @property
     def increments(self) -> NDArray[np.bool_]:

@@ -20,8 +20,8 @@ from ncfix.program.klartext.lines import FLAT
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.builder import Stretch
+from ncfix.program.rs274.contour import plane_of, resting_of_many
 from ncfix.program.rs274.lane import LONGEST, SHORTEST, before_placing, filled, followed, followed_compiled
-from ncfix.program.rs274.places import mask_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -134,9 +134,11 @@ def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
         mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
         styles = styles_of(control, stage.motion[moving], stage.side[moving])
         control.places.begun = True
-        plane = 1 << control.modal.plane.first | 1 << control.modal.plane.second
-        still = (stage.side[moving] != 0) & (mask & plane == 0)
-        adrift = control.places.adrift | np.where(still, plane & mask_of(control.machine), 0)
+        sided = stage.side[moving] != 0
+        if sided.any():
+            control.builder.many_rest(np.where(sided, resting_of_many(control, mask, starts, ends), 0))
+        plane = plane_of(control)
+        adrift = control.places.adrift | np.where(sided & (mask & plane == 0), plane, 0)
         control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
         control.position = ends[-1].tolist()
         keep_tangent(control, stage.path)

@@ -123,6 +123,7 @@ class Builder:
         self._arcs: dict[int, Arc] = {}
         self._approaches: dict[int, Vector] = {}
         self._counted: dict[int, int] = {}
+        self._resting: dict[int, int] = {}
         self.rolls: NDArray[np.bool_] | None = None
         self.winding: Winding | None = None
         self._said: list[tuple[int, int, int]] = []
@@ -191,6 +192,16 @@ class Builder:
         """The motion that is added next has words that count from where it starts for these axes, and only these."""
         self._counted[self.count] = axes
 
+    def rests(self, axes: int) -> None:
+        """The motion that is added next must leave these axes where they stand, though it names some of them."""
+        if axes:
+            self._resting[self.count] = axes
+
+    def many_rest(self, axes: IntArray) -> None:
+        """The same of many motions that are added next, (n,)."""
+        rows = np.flatnonzero(axes)
+        self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
+
     def says_the_way(self, axes: int, motions: int = 1) -> None:
         """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
         self._said.append((self.count, self.count + motions, axes))
@@ -249,6 +260,7 @@ class Builder:
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
             angles=angles,
+            resting=self._mask_column(self._resting, np.zeros(programmed.shape, dtype=np.bool_)),
             **styles,
         )
 
@@ -256,7 +268,7 @@ class Builder:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
         self.overturned = self.brought_back = None
-        self._said = []
+        self._said, self._resting = [], {}
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
@@ -321,13 +333,15 @@ class Builder:
         return column
 
     def _counted_column(self, incremental: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        if not self._counted:
+        return self._mask_column(self._counted, np.repeat(incremental[:, None], len(self.columns), axis=1))
+
+    def _mask_column(self, masks: dict[int, int], otherwise: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+        """(n, n_axes) from bit masks of some motions; None if there are none."""
+        if not masks:
             return None
-        column = np.repeat(incremental[:, None], len(self.columns), axis=1)
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
-        masks = np.array(list(self._counted.values()), dtype=np.int64)
-        column[list(self._counted)] = (masks[:, None] & bits) != 0
-        return column
+        otherwise[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
+        return otherwise
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         centre, normal, sweep = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)

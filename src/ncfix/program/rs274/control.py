@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
 from ncfix.program.moves import Kind, Kinematics, Rule
+from ncfix.program.rs274 import contour
 from ncfix.program.rs274.builder import Arc, Builder, Style
 from ncfix.program.rs274.coordinates import (
     DEGREE,
@@ -284,6 +285,8 @@ class Control:
         self.whole, self.beside = whole, self.beside & ~axes
         if arc is not None:
             self.builder.arc(arc)
+        elif not passing and kind != Kind.DWELL:
+            self.builder.rests(contour.resting(self, axes, target, unknown))
         start, end = self.position, target
         if self.unknown:
             start = blanked(start, self.unknown)
@@ -304,12 +307,9 @@ class Control:
         return adrift
 
     def still_beside(self, axes: int) -> int:
-        """Axes of the plane that get no word in a motion across it while the control offsets the contour.
-
-        The least way in the plane would be offset by the radius, in whatever direction it leads.
-        """
-        plane = 1 << self.modal.plane.first | 1 << self.modal.plane.second
-        return plane & mask_of(self.machine) if self.modal.compensated and not axes & plane else 0
+        """Axes of the plane that get no word in a motion across it, see `contour`."""
+        plane = contour.plane_of(self) if self.modal.compensated else 0
+        return 0 if axes & plane else plane
 
     def end_compensation(self) -> None:
         """Where the axes of the plane stand after the contour the control knows, until they are named."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.builder import Stretch
+from ncfix.program.rs274.contour import resting_of_many
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.coordinates import N_LETTERS
 from ncfix.program.rs274.feeds import INVERSE_TIME, PER_REVOLUTION
@@ -189,6 +190,8 @@ def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: boo
     control.places.begun = True
     plane = control.still_beside(0)
     adrift = control.places.adrift | np.where(stage.mask[rows] & plane != 0, 0, plane)
+    if plane:
+        control.builder.many_rest(resting_of_many(control, stage.mask[rows], starts, ends))
     control.builder.extend(Stretch(blocks, stage.mask[rows], styles, feeds[rows], starts, ends, adrift))
     control.position = ends[-1].tolist()
     modal.cycle.initial = None
