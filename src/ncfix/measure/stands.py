@@ -16,7 +16,7 @@ import numpy as np
 
 from ncfix.machine import se3
 from ncfix.measure.geometry import best_rotation
-from ncfix.measure.measurement import Array
+from ncfix.measure.measurement import Array, Index
 
 STEPS = 40
 """Gauss-Newton steps from one start; a good one takes some ten."""
@@ -37,8 +37,8 @@ class Sights:
     """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set."""
 
     poses: Array
-    target: Array
-    sets: Array
+    target: Index
+    sets: Index
 
     def base(self, places: Array) -> Array:
         """Where the targets are in the base frame, places (t, 3) -> (n, 3)."""
@@ -64,7 +64,7 @@ class Sights:
         result: Array = columns.reshape(3 * n, -1)
         return result
 
-    def of_set(self, number: int) -> tuple[Sights, Array]:
+    def of_set(self, number: int) -> tuple[Sights, Index]:
         """Some readings of one set, as if there were no other, and which these are."""
         rows = np.flatnonzero(self.sets == number)
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, ENOUGH).astype(int))]
