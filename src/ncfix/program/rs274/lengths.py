@@ -41,7 +41,10 @@ def change_tool(control: Control, block: Block, code: int) -> None:
 
 
 def tool_offset(control: Control, block: Block, code: int) -> None:
-    """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49."""
+    """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49.
+
+    An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells.
+    """
     tool, number = zeros(), None
     if code in (431, 432):
         tool, number = offset_by_words(control, block, added=code == 432)
@@ -57,7 +60,7 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     if on or control.tcp:
         tcp.switch(control, tool, on)
     control.places.shift(mask_of((X, Y, Z) if on else (Z,)))
-    control.offsets.tool, control.tools.offset = tool, number
+    control.offsets.tool, control.tools.offset = tool, number if any(tool) or on else None
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()
 
