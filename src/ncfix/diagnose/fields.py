@@ -1,6 +1,6 @@
 """Whatever depends smoothly on pose or time, or on from where the axes came: rivals at the tool tip.
 
-Gaussian processes of three independent components, along the base or along the workpiece.
+Gaussian processes of three independent components, along the tool, the base or the workpiece.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ncfix.diagnose.groups import Group
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
 from ncfix.machine.effect import SPINDLE
+from ncfix.measure.geometry import base_from_workpiece
 from ncfix.measure.measurement import Array
 
 UNNAMED = "unnamed"
@@ -49,14 +50,20 @@ def fields(view: View) -> Iterator[Group | None]:
 
 
 def _frames(view: View, tip: Array) -> tuple[Array, ...]:
-    """What a shift of the tip along base axes, and along those of the workpiece, shows, (m, 3) each."""
-    if not any(axis.rotary and axis.workpiece_side for axis in view.machine.axes):
-        return (tip,)
-    turned = np.concatenate(
-        [each.machine.nominal(each.q, each.state.tool_length) for each in view.problem.observations]
-    )
-    own = turned[np.maximum(view.row, 0), :3, :3]
-    return tip, np.einsum("mj,mkj->mk", tip, own)
+    """What a shift of the tip along axes of the tool, of the base and of the workpiece shows, (m, 3) each.
+
+    Those that are one are there once: tool and base where nothing turns the tool, base and workpiece where nothing
+    turns the workpiece.
+    """
+    sides = [axis.workpiece_side for axis in view.machine.axes if axis.rotary]
+    found, row = [tip], np.maximum(view.row, 0)
+    observed = view.problem.observations
+    turned = np.concatenate([each.machine.nominal(each.q, each.state.tool_length)[:, :3, :3] for each in observed])
+    if not all(sides):
+        found.append(np.einsum("mj,mkj->mk", tip, (base_from_workpiece(view.machine, view.q) @ turned)[row]))
+    if any(sides):
+        found.append(np.einsum("mj,mkj->mk", tip, turned[row]))
+    return tuple(found)
 
 
 def _kernels(view: View) -> Iterator[tuple[Candidate, Array]]:
