@@ -41,6 +41,8 @@ SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
 WARMER = 5.0
 """K: unit of temperature."""
+BESIDE = 0.3
+"""Size of what goes another way with a course of its own, against what leads."""
 WARM_UP = "warm up before measuring and cutting"
 Parts = Sequence[tuple[str, Mapping[str, Any]]]
 
@@ -130,7 +132,11 @@ def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
 
 
 def _driven(name: str, title: str, axis: str, places: Sequence[Parts], drive: Drive, family: str = "heat") -> Candidate:
-    """Components that follow temperatures, lagged and not, and a course of time; at one of several places."""
+    """Components that follow temperatures, lagged and not, and a course of time; at one of several places.
+
+    Of several components at a place one leads, whichever: one heat moves a body one way, and hardly any other way with
+    a course of its own. What walks all ways at once is no body that warms.
+    """
     effects = zero(
         [Effect(part, (), **each, **options) for place in places for part, options in place for each in drive.options]
     )
@@ -138,10 +144,11 @@ def _driven(name: str, title: str, axis: str, places: Sequence[Parts], drive: Dr
     for form in drive.forms:
         rows = 0
         for place in places:
-            block = stacked(*[form] * len(place))
-            whole = np.zeros((count, block.shape[1]))
-            whole[rows : rows + len(block)] = block
-            loadings.append(whole)
+            for leads in range(len(place)):
+                block = stacked(*(form if part == leads else BESIDE * form for part in range(len(place))))
+                whole = np.zeros((count, block.shape[1]))
+                whole[rows : rows + len(block)] = block
+                loadings.append(whole)
             rows += len(block)
     needs = tuple(dict.fromkeys(each["input"] for each in drive.options))
     return Candidate(name, title, axis, family, effects, tuple(loadings), needs, WARM_UP)
