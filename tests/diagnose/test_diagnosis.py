@@ -9,9 +9,11 @@ import pytest
 
 from measure.poses import machine, perfect, plan
 from ncfix.diagnose import result, words
+from ncfix.diagnose.background import background
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.checks import remarks
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
+from ncfix.diagnose.gapmap import patterns
 from ncfix.diagnose.view import view
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
@@ -223,3 +225,14 @@ def test_a_file_worse_than_none_is_refused(known: Machine) -> None:
     bad = known.replace(effects=tuple(wild))
     bent = perfect(known).replace(effects=(Effect("EXX", (0.06,), Backlash()),))
     refused("NCF655", [measured(bent, 80)], bad)
+
+
+def test_patterns_are_judged_by_what_the_others_leave(known: Machine) -> None:
+    """Beside a large drift that no single pattern shows, none of hundreds fits a little and is taken for real."""
+    plain = measured(known, noise_um=0.5)
+    random = np.random.default_rng(3)
+    # each pose is off by itself: 20 um, forty times the noise
+    shaken = {name: plain.column(name) + 0.02 * random.normal(size=len(plain)) for name in ("dx", "dy", "dz")}
+    seen = view([plain.with_columns(shaken)], known)
+    everything = np.zeros((len(seen.y), len(seen.y)))
+    assert patterns(background(seen, everything, seen.relative), 0.5) == []

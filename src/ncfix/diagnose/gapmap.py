@@ -35,7 +35,11 @@ class Pattern:
 
 
 def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
-    """The largest ones, those that explain the same left out."""
+    """The largest ones, those that explain the same left out.
+
+    Each is judged by what the others leave, noise or not: beside a large error of another shape some pattern fits a
+    little by chance, however small the noise.
+    """
     view = ground.view
     weight = 1 / ground.relative
     basis = orthonormal(view.base * weight[:, None])
@@ -47,7 +51,8 @@ def patterns(ground: Background, sigma_um: float) -> list[Pattern]:
         most = max(gain for (gain, _), _, _ in gains)
         # simple ones come first: a product of which one factor stands still is no pattern of its own
         (best, size), text, column = next(each for each in gains if each[0][0] >= NEARLY * most)
-        p = min(1.0, len(offered) * float(chdtrc(1, best / sigma_um**2)))
+        usual = max(sigma_um**2, float(y @ y) / max(len(y) - basis.shape[1], 1))
+        p = min(1.0, len(offered) * float(chdtrc(1, best / usual)))
         if p > UNLIKELY:
             break
         left = without(basis, column[:, None])[:, 0]

@@ -8,6 +8,8 @@ from ncfix.diagnose.findings import Diagnosis, Finding
 from ncfix.diagnose.next_poses import Proposal
 from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
 
+SHOWN = 0.05
+"""um and urad: what is smaller is not there."""
 SAID = {
     NOTHING: "nothing is missing that stands out of the noise",
     FOUND: "the model lacks something that has a name",
@@ -15,14 +17,21 @@ SAID = {
     UNKNOWN: "the model lacks something that is not in the catalogue",
 }
 
+NOISE = {
+    "repeats": "from repeats",
+    "given": "as the files state it",
+    "neighbours": "estimated from neighbouring poses",
+}
+"""Where it comes from."""
+
 
 def text(found: Diagnosis) -> str:
     """The report for a terminal."""
     gap = found.gap
     lines = [
         f"verdict: {found.verdict}: {SAID[found.verdict]}",
-        f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um ({found.floor.source}); "
-        f"held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
+        f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um "
+        f"({NOISE[found.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
     for finding in found.findings:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(found, finding)}"]
@@ -32,7 +41,11 @@ def text(found: Diagnosis) -> str:
     if found.unknown_um:
         lines += ["", rest(found)]
     if found.patterns:
-        lines += ["", "where:", *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns)]
+        lines += [
+            "",
+            "where machine file and data disagree most:",
+            *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns),
+        ]
     if found.moved:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
         lines += [f"  {constant(each)}" for each in found.moved]
@@ -54,10 +67,11 @@ def constants(finding: Finding) -> str:
     judged = finding.judgement
     if judged is None:
         return ""
-    size, bounds = judged.largest, judged.bounds
-    usual = [f"{bound:g} {unit}" for bound, unit in zip(bounds or (), ("um", "urad"), strict=False) if bound]
+    units = ("um", "urad")
+    usual = [f"{bound:g} {unit}" for bound, unit in zip(judged.bounds or (), units, strict=False) if bound]
     limit = f" (machines have up to {', '.join(usual)})" if usual else ""
-    return f"the joint's own error reaches {size[0]:.1f} um and {size[1]:.1f} urad where it was measured{limit}"
+    reached = [f"{size:.1f} {unit}" for size, unit in zip(judged.largest, units, strict=True) if size >= SHOWN]
+    return f"the joint's own error reaches {' and '.join(reached)} where it was measured{limit}" if reached else ""
 
 
 def odd(finding: Finding) -> str:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from ncfix.diagnose.findings import Diagnosis, Finding
-from ncfix.diagnose.words import SAID, carried, constants, hope, hopeless, odd, rest, unusual, why
+from ncfix.diagnose.words import NOISE, SAID, carried, constant, constants, hope, hopeless, odd, rest, unusual, why
+from ncfix.machine import Effect
+from ncfix.measure.measurement import Array
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
+HOUR = 3600.0
+CURVES = 4
+"""Components of an effect that are drawn."""
+LEAST = 1e-99
+"""Chances below this are none."""
 RUNNERS = 6
 """Names that did not win which are shown."""
 EXTREME = 0.995
@@ -31,7 +38,7 @@ def _verdict(found: Diagnosis) -> Section:
         ("poses held out", f"{gap.holdout_before:.2f}", f"{gap.holdout_after:.2f}", f"{gap.floor:.2f}"),
     ]
     files = ", ".join(dict.fromkeys(each.path for each in found.view.measurements))
-    noise = f"noise {found.floor.sigma_um:.2f} um a value, from {found.floor.source}"
+    noise = f"noise {found.floor.sigma_um:.2f} um a value, {NOISE[found.floor.source]}"
     parts: list[Part] = [
         Text(f"{found.verdict}: {SAID[found.verdict]}."),
         Text(f"{found.view.count} rows of {files}; {noise}."),
@@ -39,7 +46,28 @@ def _verdict(found: Diagnosis) -> Section:
     ]
     if found.unknown_um:
         parts.append(Text(f"{rest(found).capitalize()}."))
-    return Section("Verdict", parts)
+    return Section("Verdict", [*parts, *_chances(found), *_moved(found)])
+
+
+def _chances(found: Diagnosis) -> Iterator[Part]:
+    """Whether the gap is more than noise."""
+    if found.p_lack is None or found.p_left is None:
+        yield Text("Whether what is left is more than noise cannot be said: there are no repeats and no stated noise.")
+        return
+    yield Text(
+        f"Noise alone would leave a gap as large as before with p = {_p(found.p_lack)}, after {_p(found.p_left)}."
+    )
+
+
+def _p(value: float) -> str:
+    return f"{value:.1g}" if value > LEAST else f"less than {LEAST:g}"
+
+
+def _moved(found: Diagnosis) -> Iterator[Part]:
+    """What the file says otherwise of where axes lie, and of gains."""
+    if found.moved:
+        yield Text("Constants of the machine file that the data put elsewhere (the gap before is after that):")
+        yield Table((), [(constant(each),) for each in found.moved])
 
 
 def _finding(found: Diagnosis, finding: Finding) -> Section:
@@ -61,15 +89,23 @@ def _runners(found: Diagnosis, finding: Finding) -> Iterator[Part]:
     if runners:
         best = sorted(runners, key=lambda each: -runners[each])[:RUNNERS]
         rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners[each]:.1f}") for each in best)]
-        yield Text(f"Evidence, log odds, best of {len(found.case.considered)}:")
+        yield Text(f"Evidence, log odds, best of {len(found.case.considered)} (3 less is 20 times less likely):")
         yield Table(("name", "log odds"), rows)
 
 
 def _curve(found: Diagnosis, finding: Finding) -> Iterator[Part]:
-    """The first component over its axis, with a band of two standard deviations."""
-    effect = next(iter(finding.effects), None)
-    span = None if effect is None else found.view.reach.spans.get(effect.signal or "")
-    if effect is None or effect.covariance is None or span is None:
+    """Every component over its axis, with a band of two standard deviations; of what warms, what it shows in time."""
+    for effect in finding.effects[:CURVES]:
+        yield from _component(found, effect)
+    if any((effect.signal or "").startswith(("temp_", "time_s")) for effect in finding.effects):
+        names = np.array(found.view.names)
+        shown = {each: np.where(names == each, finding.shown, np.nan) for each in dict.fromkeys(names[found.case.kept])}
+        yield from _in_time(found, "what it shows, um", shown)
+
+
+def _component(found: Diagnosis, effect: Effect) -> Iterator[Part]:
+    span = found.view.reach.spans.get(effect.signal or "")
+    if effect.covariance is None or effect.times is not None or span is None:
         return
     x = np.linspace(*span, 121)
     design = effect.basis.design((x - effect.center) / effect.scale, 1.0)
@@ -81,7 +117,7 @@ def _curve(found: Diagnosis, finding: Finding) -> Iterator[Part]:
 
 
 def _where(found: Diagnosis) -> Section:
-    rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{pattern.p_value:.1g}") for pattern in found.patterns]
+    rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{_p(pattern.p_value)}") for pattern in found.patterns]
     return Section("Where", [Table(("pattern", "um rms", "p by chance"), rows)] if rows else [])
 
 
@@ -92,8 +128,8 @@ def _residuals(found: Diagnosis) -> Section:
 def _maps(found: Diagnosis) -> Iterator[Part]:
     """Residuals of all components over each axis that moved."""
     view = found.view
-    inside = (view.row >= 0) & ~found.case.outlying[np.maximum(view.row, 0)]
-    sides = {"before": found.before[inside], "after": found.after[inside]}
+    inside, every = found.case.kept, {"before": found.before, "after": found.after}
+    sides = {label: values[inside] for label, values in every.items()}
     if not inside.any():
         return
     limit = float(np.quantile(np.abs(sides["before"]), EXTREME)) or 1.0
@@ -102,6 +138,18 @@ def _maps(found: Diagnosis) -> Iterator[Part]:
             x = view.q[view.row[inside], index] / axis.unit
             dots = [Dots(x, np.clip(values, -limit, limit), label) for label, values in sides.items()]
             yield Plot(f"um over {axis.name}", dots)
+    yield from _in_time(found, "um", {label: np.clip(each, -limit, limit) for label, each in every.items()})
+
+
+def _in_time(found: Diagnosis, what: str, values: Mapping[str, Array]) -> Iterator[Part]:
+    """Values (m,) over the time at which they were measured; nothing without a clock."""
+    time = found.view.column("time_s")
+    if np.ptp(time) > 0:
+        kept = found.case.kept
+        hours = (time - time.min()) / HOUR
+        known = {label: kept & np.isfinite(each) for label, each in values.items()}
+        dots = [Dots(hours[found.view.row[at]], values[label][at], label) for label, at in known.items()]
+        yield Plot(f"{what}, over time, h", dots)
 
 
 def _next(found: Diagnosis) -> Section:
