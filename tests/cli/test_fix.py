@@ -263,3 +263,14 @@ def test_the_readme_shows_what_its_first_command_does(root: Path, ncfix: Any, tm
     for before, after in shown:
         assert f"\n{before}\n" in original
         assert f"\n{after}\n" in corrected
+
+
+def test_what_was_written_elsewhere_is_verified_with_the_subprograms_of_the_original(shop: Any, ncfix: Any) -> None:
+    program, out = shop.folder / "main.nc", shop.folder / "out" / "main.nc"
+    program.write_bytes(b"%\nO1\nG21G90G54G0X0.Y0.Z5.\nM98P77\nG0X20.Y0.Z5.\nM30\n%\n")
+    (shop.folder / "O77.nc").write_bytes(b"%\nO77\nG1X10.Y5.F100.\nM99\n%\n")
+    given = ("-m", shop.machine, "--assume-zero", "--dialect", "fanuc", "--no-point", "calculator")
+    out.parent.mkdir()
+    ncfix("fix", program, *given, "-o", out, "--allow-refused")
+    result = ncfix("verify", program, out, *given, "--tolerance-um", "1000")
+    assert result.code == ExitCode.DONE, result.err

@@ -70,6 +70,11 @@ def flat(text: str, dialect: str, **options: object) -> str:
             "G0 Z5\nF9 G91 G81 X1 Z-2 R-1 L2\nG80\nM2\n",
             "G0 Z5\nF9 G81 G90 X1. Y0. Z2. R4.\nX2. Y0.\nG91\nG80\nM2\n",
         ),
+        (
+            "linuxcnc",
+            "G0 X2 Y0 Z5\nF9 G91 G81 ^90 Z-2 R-1 L2\nG90 @3 Z1 R2\nG80\nM2\n",
+            "G0 X2 Y0 Z5\nF9 G81 G90 X0. Y2. Z2. R4.\nX-2. Y0.\nG91\nG90 X-3. Y0. Z1. R2.\nG80\nM2\n",
+        ),
         ("linuxcnc", "G0 X#5221\nM2\n", "G0 X0.\nM2\n"),
         ("iso", "M98 P5\nM30\nO5\nG0 X1\nM99\n", "G0 X1\nM30\n"),
     ],

@@ -161,7 +161,9 @@ def test_the_work_offset_in_force_is_in_the_group_that_it_has_with_the_maker(dia
 
 
 def test_a_group_that_another_maker_counts_otherwise_is_no_number() -> None:
-    assert reasons(follow("G57\nG0X#4014", dialect="mitsubishi")) == ["where the axis X stands is known only at run time"]
+    assert reasons(follow("G57\nG0X#4014", dialect="mitsubishi")) == [
+        "where the axis X stands is known only at run time"
+    ]
 
 
 def test_reading_a_position_is_said() -> None:

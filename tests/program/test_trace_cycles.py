@@ -52,6 +52,13 @@ def test_increments_and_repeats() -> None:
     assert holes("G91 G81 X1 Y1 R-2 Z-1 L3\nX1") == [[1, 1, 7], [2, 2, 7], [3, 3, 7], [4, 3, 7]]
 
 
+def test_holes_by_radius_and_angle() -> None:
+    """As `rs274` has them: in G91 every repeat adds the angle and the radius, and X and Y stand at the last hole."""
+    circle = holes("X4 Y0\nG81 ^90 Z-3 R2\n^180\n@2\nG91 ^90 @1 R0 L2\nG80\nG90 G81 X9 Z-3 R2")
+    expected = [[0, 4, -3], [-4, 0, -3], [-2, 0, -3], [0, -3, 7], [4, 0, 7], [9, 0, -3]]
+    assert np.allclose(circle, expected, atol=1e-9)
+
+
 def test_incremental_r_counts_from_where_the_series_began() -> None:
     """LinuxCNC 2.9: also where G99 has left the tool lower."""
     assert holes("G99 G90 G81 X1 R2 Z-1\nG91 X1\nG90 X1") == [[1, 0, -1], [2, 0, 11], [1, 0, -1]]

@@ -107,7 +107,7 @@ class Following:
         from ncfix.compensate.wordless import left_in_cuts
 
         program, machine, meant = self._on_machine(original)
-        other, _, done = self._on_machine(fixed, like=program)
+        other, _, done = self._on_machine(fixed, original, like=program)
         there, back = compare(machine, meant, done)
         before = error_of(machine, meant)
         lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
@@ -134,13 +134,17 @@ class Following:
         except SourceError:
             return self.read(path)
 
-    def _on_machine(self, path: str, like: Program | None = None) -> tuple[Program, Machine, Moves]:
-        """A program as this machine follows it; `like`: one in whose dialect it is, if its text does not forbid it."""
+    def _on_machine(self, path: str, *others: str, like: Program | None = None) -> tuple[Program, Machine, Moves]:
+        """A program as this machine follows it.
+
+        others  programs beside which its subprograms may be, too: `fix` writes the program alone
+        like    one in whose dialect it is, if its text does not forbid it
+        """
         from ncfix.compensate.following import follow
 
         assert self.machine is not None
         program = self.read(path) if like is None else self._read_like(path, like)
-        found = follow(program, self.machine, self.setup, subprograms(path))
+        found = follow(program, self.machine, self.setup, subprograms(path, *others))
         return program, found.machine, found.trace.moves
 
 

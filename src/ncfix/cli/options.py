@@ -128,21 +128,22 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Finds the files of subprograms in a folder, by their name with or without a suffix."""
+    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix."""
 
-    folder: str
+    folders: tuple[str, ...]
 
     def __call__(self, name: str) -> bytes | None:
         """The text of a subprogram; None if there is none."""
         if os.path.basename(name) != name:
             return None
-        for suffix in SUBPROGRAM_SUFFIXES:
-            candidate = os.path.join(self.folder, name + suffix)
-            if os.path.isfile(candidate):
-                return read(candidate)
+        for folder in self.folders:
+            for suffix in SUBPROGRAM_SUFFIXES:
+                candidate = os.path.join(folder, name + suffix)
+                if os.path.isfile(candidate):
+                    return read(candidate)
         return None
 
 
-def subprograms(path: str) -> Callable[[str], bytes | None]:
-    """Finds the files of subprograms: beside the program."""
-    return Beside("." if path == STREAM else os.path.dirname(path) or ".")
+def subprograms(*paths: str) -> Callable[[str], bytes | None]:
+    """Finds the files of subprograms: beside the program, and beside the one that it was made of if that is named."""
+    return Beside(tuple("." if path == STREAM else os.path.dirname(path) or "." for path in paths))

@@ -141,6 +141,15 @@ def test_frames(body: str, end: list[float]) -> None:
     assert ends(body) == [end]
 
 
+def test_a_tool_that_is_called_by_name_is_asked_for_as_one_by_number_is() -> None:
+    called = 'TOOL CALL "Drill" Z\nL X+1'
+    with pytest.raises(UsageError) as caught:
+        follow(called)
+    assert [message.hint for message in caught.value.messages] == ['--tool "Drill"=LENGTH or --assume-zero']
+    assert follow(called, assume_zero=True).assumed == ("length of tool Drill",)
+    assert follow(called, named_tools={"DRILL": Tool(80.0)}).messages == ()
+
+
 @pytest.mark.parametrize("dwell", ["V.ZEIT 0.5", "V.ZEIT0,5", "DWELL 0.5", "V.IDO5", "TEMPO. 1"])
 def test_cycles_call_their_numbers_by_words_of_many_languages(dwell: str) -> None:
     """`V.` is no axis, and `T.` no tool: an address has a number behind it."""
@@ -170,7 +179,6 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("L X+Q1", "known only at run time"),
         ("FC DR+ R5 X+10", "free contour"),
         ("TOOL CALL 1 Y\nL X+1", "tool axis is Y"),
-        ('TOOL CALL "DRILL" Z\nL X+1', "DRILL"),
         ("L X+1 F100\nG91 G28 Z0", "no Klartext"),
         ("LN X1 Y2 Z3 TX0 TY0 TZ1", "works out the rotary axes"),
         ("CC X+0 Y+0\nL X+10 Y+0 F1\nC X+0 Y+10.1 DR+", "does not close"),

@@ -12,7 +12,6 @@ from ncfix.program.rs274.coordinates import Z, zeros
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Tool
 
-BY_NAME = "the length of the tool {} is not given"
 NAMED = -1
 """The number that stands for a tool that is called by name."""
 
@@ -38,9 +37,6 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     if isinstance(tool, float) and not tool.is_integer():
         tool = f"{tool:g}"
     axis = next((letter for letter in "xyuvw" if letter in flags), None)
-    named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
-    if isinstance(tool, str) and (named is None or named.length is None):
-        control.suspended[TOOL] = BY_NAME.format(tool)
     if axis is not None:
         control.suspended[TOOL] = OTHER_AXIS.format(axis.upper())
     if "DL" in words.runtime:
@@ -54,8 +50,7 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))
-    known = 0.0 if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
-    length = known if named is None or named.length is None else named.length
+    length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
     set_length(control, length + words.values.get("DL", 0.0) * control.unit)
 
 
@@ -76,6 +71,15 @@ def set_length(control: Control, length: float) -> None:
         tcp.switch(control, tool, True)
     control.offsets.tool = tool
     control.refresh()
+
+
+def length_by_name(control: Control, name: str) -> float:
+    """The length of a tool that is called by its name, mm; zero if it is lacking."""
+    named = control.setup.named_tools.get(name.upper())
+    if named is not None and named.length is not None:
+        return named.length
+    control.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')
+    return 0.0
 
 
 def length_of(control: Control, number: int) -> float:

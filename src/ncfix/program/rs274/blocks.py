@@ -11,6 +11,7 @@ from ncfix.program.build import Parsed, TooDeepError, build
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError, bare_expression, explain
 from ncfix.program.grammar import Squeezed, parse, squeeze
+from ncfix.program.rs274.groups import TOOL_CHANGE
 from ncfix.program.tree import Constant, Word
 
 MAY_REPEAT = frozenset("GM")
@@ -37,7 +38,7 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
     check_products(squeezed)
     check_numbers(parsed)
     check_exponents(parsed, text)
-    check_repeats(parsed)
+    check_repeats(parsed, standby=dialect.semantics != "linuxcnc")
     return parsed
 
 
@@ -69,11 +70,12 @@ def check_exponents(parsed: Parsed, text: str) -> None:
             raise BlockError("NCF116", "the number has an exponent", start, hint)
 
 
-def check_repeats(parsed: Parsed) -> None:
-    """Refuse a word that stands twice."""
+def check_repeats(parsed: Parsed, standby: bool = True) -> None:
+    """Refuse a word that stands twice; with `standby` not the tool that M6 has brought besides the one it changes."""
     seen: set[str] = set()
+    may = MAY_REPEAT | {"T"} if standby and TOOL_CHANGE in parsed.template.m_codes else MAY_REPEAT
     for word in parsed.template.words:
-        if word.address in seen and word.address not in MAY_REPEAT:
+        if word.address in seen and word.address not in may:
             raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
         seen.add(word.address)
 

@@ -55,12 +55,14 @@ class Block:
     values   the values of its words by address, in program units
     runtime  addresses whose value is known only at run time
     axes     bit mask of the axis words, by letter
+    turn     of a cycle: the angle by which each hole lies further round the origin of the plane, degrees
     """
 
     index: int
     values: dict[str, float]
     runtime: frozenset[str]
     axes: int
+    turn: float | None = None
 
     def get(self, letter: str, default: float = 0.0) -> float:
         """The value of a word."""

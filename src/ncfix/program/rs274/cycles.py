@@ -6,14 +6,16 @@ counts from where the series of holes began, and a block without R or Z repeats 
 
 from __future__ import annotations
 
+import math
+
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, dot
+from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.feeds import INVERSE_TIME
 from ncfix.program.rs274.systems import check_system
-from ncfix.program.rs274.targets import unknown_after, unnamed
+from ncfix.program.rs274.targets import by_radius_and_angle, unknown_after, unnamed
 
 BAD_CYCLE = "NCF226"
 NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
@@ -97,9 +99,19 @@ def repeats(control: Control, block: Block) -> int:
 
 def place_hole(control: Control, block: Block, program: Vector) -> None:
     """Move `program` over the next hole."""
-    across = control.modal.plane.across
+    plane, unit = control.modal.plane, control.modal.unit
+    given = {plane.across}
+    if block.values.keys() & {"@", "^"}:
+        place = by_radius_and_angle(control, block, program[X] / unit, program[Y] / unit)
+        program[X], program[Y] = unit * place[0], unit * place[1]
+    if block.turn is not None:
+        turn = math.radians(block.turn)
+        first, second = program[plane.first], program[plane.second]
+        program[plane.first] = first * math.cos(turn) - second * math.sin(turn)
+        program[plane.second] = first * math.sin(turn) + second * math.cos(turn)
+        given |= {plane.first, plane.second}
     for index, letter in enumerate(LETTERS):
-        if index != across and letter in block.values:
+        if index not in given and letter in block.values:
             step = program[index] if control.modal.incremental else 0.0
             program[index] = step + control.scale[index] * block.values[letter]
 

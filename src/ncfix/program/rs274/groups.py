@@ -90,6 +90,9 @@ LINUXCNC_M = grouped(
     CALL=(980, 990),
 )
 
+TOOL_CHANGE = 60
+"""M6. Of two tools that Mazak names with it, the first is changed, and the second only brought for the next change."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rules:

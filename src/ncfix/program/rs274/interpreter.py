@@ -78,7 +78,7 @@ class Interpreter:
     def find(self, name: str) -> Unit | None:
         """The file of a subprogram."""
         if name not in self.files:
-            names = (name, f"O{name:0>4}") if name.isdigit() else (name,)
+            names = (name, f"O{name:0>4}", f"O{name}") if name.isdigit() else (name,)
             found = ((each, self.resolve(each)) for each in names if self.resolve)
             dialect: Dialect = self.main.program.dialect
             units = (self.unit_of(read(source, each, dialect), each) for each, source in found if source)

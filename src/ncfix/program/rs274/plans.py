@@ -12,7 +12,7 @@ from ncfix.program.rs274 import groups
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.groups import Rules
+from ncfix.program.rs274.groups import TOOL_CHANGE, Rules
 from ncfix.program.rs274.modal import NO_MOTION
 from ncfix.program.rs274.order import Step, steps_of
 from ncfix.program.tree import (
@@ -136,10 +136,16 @@ class Plan:
     checked: set[int | None] = field(default_factory=set)
 
 
+def words_of(words: Sequence[Word], address: str) -> list[Word]:
+    """The words of an address."""
+    return [word for word in words if word.address == address]
+
+
 def plan_of(template: Template, rules: Rules) -> Plan:
     """The plan for a shape."""
     words = template.words
-    values = [word for word in words if word.address not in NO_WORDS]
+    standby = words_of(words, "T")[1:] if TOOL_CHANGE in template.m_codes else []
+    values = [word for word in words if word.address not in NO_WORDS and word not in standby]
     code_words = [word for word in words if word.address in "GM"]
     plan = Plan(template)
     plan.literals = tuple((w.address, w.value.slot) for w in values if isinstance(w.value, Literal))

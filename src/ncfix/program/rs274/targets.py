@@ -107,25 +107,30 @@ def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknow
 
 def cartesian(control: Control, block: Block) -> Block:
     """A block with polar words `@` (radius) and `^` (angle), in X and Y of the program's frame, absolute."""
+    program = [control.coordinate(index) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)]
+    x, y = by_radius_and_angle(control, block, program[X], program[Y])
+    others = {letter: value for letter, value in block.values.items() if letter not in "@^"}
+    if control.modal.incremental:
+        others |= {letter: value + program[INDEX[letter]] for letter, value in others.items() if letter in INDEX}
+    ends = {"X": 2.0 * x if control.modal.diameter else x, "Y": y}
+    runtime = block.runtime | {"X", "Y"} if block.runtime & {"@", "^"} else block.runtime
+    return Block(block.index, others | ends, runtime, block.axes)
+
+
+def by_radius_and_angle(control: Control, block: Block, x: float, y: float) -> tuple[float, float]:
+    """Where polar words lead from a place, in program units; what a block does not say stays, or is added in G91."""
     if control.modal.plane.code != 170:
         raise Fault(POLAR, "polar coordinates are for the plane G17 only")
     if block.values.keys() & {"X", "Y"}:
         raise Fault(POLAR, "a block has either polar coordinates or X and Y")
-    program = [control.coordinate(index) if index in (X, Y) or block.axes >> index & 1 else 0.0 for index in range(9)]
-    radius, angle = math.hypot(program[X], program[Y]), math.degrees(math.atan2(program[Y], program[X]))
-    incremental = control.modal.incremental
-    if radius == 0.0 and (incremental or "^" not in block.values):
+    radius, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
+    if radius == 0.0 and (control.modal.incremental or "^" not in block.values):
         raise Fault(POLAR, "at the origin a polar coordinate needs both radius and angle, absolute")
-    others = {letter: value for letter, value in block.values.items() if letter not in "@^"}
-    if incremental:
-        others |= {letter: value + program[INDEX[letter]] for letter, value in others.items() if letter in INDEX}
+    if control.modal.incremental:
         radius, angle = radius + block.get("@"), angle + block.get("^")
     else:
         radius, angle = block.get("@", radius), block.get("^", angle)
-    doubled = 2.0 if control.modal.diameter else 1.0
-    ends = {"X": doubled * radius * math.cos(math.radians(angle)), "Y": radius * math.sin(math.radians(angle))}
-    runtime = block.runtime | {"X", "Y"} if block.runtime & {"@", "^"} else block.runtime
-    return Block(block.index, others | ends, runtime, block.axes)
+    return radius * math.cos(math.radians(angle)), radius * math.sin(math.radians(angle))
 
 
 def machine_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:

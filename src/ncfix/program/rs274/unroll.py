@@ -108,12 +108,12 @@ class Recorder:
         made = [change for change in changes if change is not None]
         made += self.absent(unit, index, plan, block)
         motion = self.control.modal.motion if codes.motion is None else codes.motion
-        if block.values.keys() & POLAR:
-            self.polar(unit, index, block, made)
-            return
         drills = holes and motion in self.control.rules.cycles and not codes.takes
-        if drills and (len(holes) > 1 or self.control.modal.incremental):
+        polar = bool(block.values.keys() & POLAR)
+        if drills and (polar or len(holes) > 1 or self.control.modal.incremental):
             self.cycle(unit, index, plan, block, made, holes)
+        elif polar:
+            self.polar(unit, index, block, made)
         else:
             self.put(unit, index, made)
 
@@ -263,7 +263,8 @@ class Recorder:
         over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
         named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
         letters = over + named.replace(LETTERS[plane.across], "") + LETTERS[plane.across]
-        first = (" G90" if incremental else "") + self.place(holes[0], letters) + " R" + self.number_at("R", level)
+        mode = " G90" if incremental or any(is_distance(word) for word in drop) else ""
+        first = mode + self.place(holes[0], letters) + " R" + self.number_at("R", level)
         self.put(unit, index, [*kept, Change(stop, stop, first)])
         for hole in holes[1:]:
             self.write(self.place(hole, over).strip())
@@ -349,7 +350,9 @@ def is_place(word: Word, control: Control) -> bool:
     """Whether a word of a cycle says where its holes are, how many, or in which mode: that is written anew."""
     if word.address in "GM":
         return is_distance(word)
-    return word.address in INDEX or word.address == "R" or word.address in control.rules.repeats
+    return (
+        word.address in INDEX or word.address in POLAR or word.address == "R" or word.address in control.rules.repeats
+    )
 
 
 def inside(change: Change, spans: set[tuple[int, int]]) -> bool:
