@@ -25,6 +25,11 @@ def curves(request: Request) -> dict[str, tuple[Grid, ...]]:
     return found
 
 
+def at_zero(tables: tuple[Grid, ...]) -> float:
+    """The correction at the reference position, mm or rad: what increments cannot say."""
+    return float(np.mean([table.at(np.zeros((1, 1)))[0, 0] for table in tables]))
+
+
 def pitch_of(
     request: Request, axis: str, tables: tuple[Grid, ...], sense: int, units: tuple[float, float], number: int
 ) -> Pitch | None:
@@ -62,7 +67,7 @@ def _with_cells(
     places = np.arange(first, last + 1) * interval * described.unit
     inside = _turned(places, request.space[column]) if turn else np.clip(places, *request.space[column])
     mean = np.mean([table.at(inside[:, None])[:, 0] for table in tables], axis=0)
-    curve: Array = mean - float(np.mean([table.at(np.zeros((1, 1)))[0, 0] for table in tables]))
+    curve: Array = mean - at_zero(tables)
     if turn:
         curve[-1] = curve[0]
     increments, magnification = diffused(sense * curve / units[int(described.rotary)])

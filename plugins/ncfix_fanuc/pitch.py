@@ -15,7 +15,7 @@ from ncfix.tables.control import Assumption, Control, Files, Option, Properties,
 from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.settings import choice
-from ncfix_fanuc.increments import curves, pitch_of
+from ncfix_fanuc.increments import at_zero, curves, pitch_of
 from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
 from ncfix_fanuc.pitch_text import MOST, NUMBERS, Pitch, parameter_text, pitch_text
 from ncfix_fanuc.units import SIGN, SIGNS, UNITS, sense_of, units_of
@@ -92,6 +92,8 @@ class FanucPitch(Control):
             if made is not None:
                 found.append(made)
                 notes.append(_said(made, units))
+            elif axis in tables:
+                notes.append(_unsaid(axis, at_zero(tables[axis])))
         files = {f"pitch_{each.axis}.csv": pitch_text(each) for each in found}
         files[PARAMETERS] = parameter_text(_parameters(found, axes))
         words = (settings["sign"], settings["detection_unit_um"], settings["detection_unit_deg"], "".join(axes))
@@ -120,6 +122,16 @@ def _said(pitch: Pitch, units: tuple[float, float]) -> str:
     return (
         f"{pitch.axis}: points {pitch.first} to {pitch.last}, magnification {pitch.magnification}: a sum is rounded by "
         f"up to {half:.4g} {unit}, however many increments it has."
+    )
+
+
+def _unsaid(axis: str, correction: float) -> str:
+    """Why an axis that errs has no points."""
+    rotary = axis in TURNING
+    size = f"{correction / DEGREE:.4g} degree" if rotary else f"{1000 * correction:.1f} um"
+    return (
+        f"{axis}: no points. Increments count from machine zero, where the correction is {size}, and without that they "
+        f"take nothing off. A reference position that is shifted by it, and an axis that is measured again, help."
     )
 
 

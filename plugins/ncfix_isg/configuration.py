@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
-from ncfix_isg.leadscrew import MARK
+from ncfix_isg.leadscrew import MARK, bare
 
 LETTERS = "XYZABC"
 HEAD = {"workpiece_axes": "0"}
@@ -70,7 +70,7 @@ TRUTH = {"1": "TRUE", "0": "FALSE"}
 def _entries(remarks: Remarks) -> Entries:
     found: Entries = {}
     for number, row in enumerate(remarks.rows, 1):
-        words = row.split("#", 1)[0].split(None, 1)
+        words = bare(row).split(None, 1)
         if len(words) == 1:
             remarks.refuse(number, f"{words[0]!r} has no value")
         elif words:

@@ -30,6 +30,7 @@ HEAD = {"interval": "0", "unit": "1", "bilateral": "1"}
 LARGE = 10_000
 """1 mm: no machine has so much."""
 POINT = re.compile(r"kw\.ssfk\.table\[(\d{1,6})\]\.(setpoint|pos|neg)")
+NOTE = re.compile(r"/\*.*?\*/|#.*")
 WHOLE = re.compile(r"[-+]?\d{1,12}")
 
 
@@ -61,6 +62,11 @@ def read_leadscrews(files: Files, numbers: Mapping[str, str]) -> tuple[list[Term
     return terms, remarks
 
 
+def bare(row: str) -> str:
+    """A line of a list without its notes, `# ...` and `/* ... */`."""
+    return NOTE.sub("", row)
+
+
 def _terms(remarks: Remarks, numbers: Mapping[str, str]) -> Iterator[Term]:
     entries = _entries(remarks)
     axis = _axis(remarks, entries, numbers)
@@ -80,7 +86,7 @@ def _terms(remarks: Remarks, numbers: Mapping[str, str]) -> Iterator[Term]:
 def _entries(remarks: Remarks) -> dict[str, tuple[int, str]]:
     found: dict[str, tuple[int, str]] = {}
     for number, row in enumerate(remarks.rows, 1):
-        words = row.split("#", 1)[0].split(None, 1)
+        words = bare(row).split(None, 1)
         if len(words) == 1:
             remarks.refuse(number, f"{words[0]!r} has no value")
         elif words:

@@ -115,6 +115,7 @@ def test_what_only_an_offset_would_help_is_left() -> None:
     made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 50)
     assert "pitch_X.csv" not in made.native
     assert (made.left.after == made.left.before).all()
+    assert any(note.startswith("X: no points.") and "-10.0 um" in note for note in made.notes)
 
 
 FILES = long_screw()

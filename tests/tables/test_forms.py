@@ -135,6 +135,8 @@ VARIED = {
     "hexagon": b"STARTX\n10.0 = 10.002\n\nEND\n",
     "centroid": b"24 -1448819  0 -32\t-38\n\n",
     "rtl": b"TARGET DATA::\nTarget-count:2\nTargets:\n0.000\t50.000 \n",
+    "isg-list ": b"/* made by hand */\nkw.ssfk.unit  1  /* 0: increments, 1: metric */ \nkopf.log_achs_name  X_AXIS\n",
+    "comp": b"\xef\xbb\xbf0 0 0\n1 0.1 0.2\n",
     "ini": b"  # note\n[JOINT_0]\nCOMP_FILE=x.dat\nCOMMENT =\n",
 }
 
@@ -142,6 +144,12 @@ VARIED = {
 @pytest.mark.parametrize("form", VARIED)
 def test_what_a_form_allows_is_kept(form: str) -> None:
     content = VARIED[form]
-    document, remarks = read(BY_NAME[form], "x", content)
+    document, remarks = read(BY_NAME[form.strip()], "x", content)
     assert not remarks.wrong, remarks.wrong
     assert document.content() == content
+
+
+@pytest.mark.parametrize("content", [b"\n0 0 0\n1 0.1 0.2\n", b"; a note\n\n", b"// a note\n", b"Run-count: 3\n0 1\n"])
+def test_what_no_form_has_is_no_file_of_one(content: bytes) -> None:
+    """LinuxCNC would not read past the blank line; numbers and notes alone are nobody's file."""
+    assert recognised("x", content) is None

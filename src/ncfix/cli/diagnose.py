@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.argument("measured", nargs=-1, required=True)
 @machine_option
 @click.option("-o", "--output", metavar="FILE", help="Where to write the machine with the effects added (TOML).")
-@click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered; repeatable.")
+@click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered (repeatable).")
 @click.option("--next", "next_path", metavar="FILE", help="Write the poses to be measured next: CSV, else a program.")
 @click.option("--report", metavar="FILE", help="Write a report with figures (HTML or Markdown).")
 @click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")

@@ -37,8 +37,14 @@ if TYPE_CHECKING:
     show_default=True,
     help="How much correction may be lost between the points of a table.",
 )
-@click.option("--range", "ranges", metavar="X=LOW,HIGH", multiple=True, help="Cover less than the travel; mm, degree.")
-@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control.")
+@click.option(
+    "--range",
+    "ranges",
+    metavar="X=LOW,HIGH",
+    multiple=True,
+    help="Cover less than the travel; mm, degree (repeatable).",
+)
+@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control (repeatable).")
 @click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
 @click.option("--program", metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables.")
 @force_option

@@ -25,7 +25,11 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Replace an existing output; correct a program that carries a stamp.")
 @click.option("--resume", is_flag=True, help="Go on with a batch where it stopped: what is done in -o DIR stays.")
 @click.option(
-    "--strategy", default="rotary-then-linear", show_default=True, metavar="NAME", help="Or position, or full."
+    "--strategy",
+    default="rotary-then-linear",
+    show_default=True,
+    metavar="NAME",
+    help="rotary-then-linear, position or full.",
 )
 @click.option("--thesis", is_flag=True, help="Ellingsdalen's printed algorithm, without the corrections to it.")
 @tolerance_option

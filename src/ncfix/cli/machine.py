@@ -25,7 +25,10 @@ def machine() -> None:
 @click.argument("file")
 @json_option
 def check(file: str, as_json: bool) -> None:
-    """Check that FILE describes a machine; every fault of the file is named."""
+    """Check that FILE describes a machine.
+
+    Every fault of the file is named at once.
+    """
     found = load_machine(file)
     remarks = _remarks(found, shown(file))
     console.tell(*remarks)
@@ -51,7 +54,10 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
 @click.argument("file")
 @json_option
 def show(file: str, as_json: bool) -> None:
-    """Print the chain from workpiece to tool, and the errors with their size over the travel."""
+    """Print the chain and the errors of a machine.
+
+    The chain goes from workpiece to tool; the errors have their size over the travel.
+    """
     found = load_machine(file)
     if as_json:
         console.put_json(path=shown(file), **_as_dict(found))

@@ -26,9 +26,15 @@ KINDS = ("tcp", "tcp6", "probe", "length")
 @click.option("--existing", metavar="FILE", help="A measurement that the new poses complete.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
 @click.option("--tool-length", "lengths", multiple=True, type=Length(), metavar="MM", help="A tool (repeatable).")
-@click.option("--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands (kind probe).")
-@click.option("--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z.")
-@click.option("--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg.")
+@click.option(
+    "--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands, kind probe (repeatable)."
+)
+@click.option(
+    "--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z (repeatable)."
+)
+@click.option(
+    "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
+)
 @click.option("--gcode", metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
 @table_option

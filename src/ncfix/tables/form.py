@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
-from ncfix.tables.lines import Remarks
+from ncfix.tables.lines import BYTE_ORDER, Remarks
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 N = f"({NUMBER})"
@@ -36,17 +36,18 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A file of a known form. `eol` after each line; `last` whether also after the last."""
+    """A file of a known form. `eol` after each line; `last` whether also after the last; `start` a byte order mark."""
 
     form: str
     lines: tuple[Line, ...]
     eol: str = "\n"
     last: bool = True
+    start: str = ""
 
     def content(self) -> bytes:
         """The file."""
         text = self.eol.join(line.written() for line in self.lines)
-        return (text + (self.eol if self.last else "")).encode("latin-1")
+        return (self.start + text + (self.eol if self.last else "")).encode("latin-1")
 
     def rows(self, kind: str) -> list[tuple[float, ...]]:
         """The numbers of all lines of a kind."""
@@ -74,12 +75,16 @@ Check = Callable[[Document, Remarks], None]
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them."""
+    """What lines a kind of file has: name -> pattern, whose groups are numbers; and what must hold between them.
+
+    needs  the kinds of lines that tell it: no file of the form is without one of each
+    """
 
     name: str
     title: str
     kinds: Mapping[str, str]
     check: Check = lambda document, remarks: None
+    needs: tuple[str, ...] = ()
 
 
 def read(form: Form, path: str, content: bytes) -> tuple[Document, Remarks]:
@@ -87,9 +92,12 @@ def read(form: Form, path: str, content: bytes) -> tuple[Document, Remarks]:
     remarks = Remarks.of(path, content)
     eol = "\r\n" if b"\r\n" in content else "\n"
     lines = [_line(form, remarks, number, row) for number, row in enumerate(remarks.rows, 1)]
-    document = Document(form.name, tuple(lines), eol, bool(END.search(content[-2:])))
+    start = BYTE_ORDER if content.startswith(BYTE_ORDER.encode("latin-1")) else ""
+    document = Document(form.name, tuple(lines), eol, bool(END.search(content[-2:])), start)
     if not lines:
         remarks.refuse(0, "is empty")
+    for kind in {*form.needs} - {line.kind for line in lines}:
+        remarks.refuse(0, f"no line of the sort {kind!r}")
     if not remarks.wrong:
         form.check(document, remarks)
     return document, remarks

@@ -82,9 +82,10 @@ def _headed(document: Document, remarks: Remarks) -> None:
 BLANK = r"[ \t]*"
 NOTES = {"comment": rf"{BLANK}(?:;|//|#).*", "blank": BLANK}
 """Lines that say nothing, where a form may have them."""
-LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}(?:#.*)?", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}(?:#.*)?"}
+ASIDE = r"(?:#.*|/\*.*\*/[ \t]*)?"
+LIST = {"entry": rf"[\w.\[\]]+{GAP}{N}{BLANK}{ASIDE}", "word": rf"[\w.\[\]]+{GAP}\S+{BLANK}{ASIDE}"}
 FORMS = (
-    Form("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row")),
+    Form("comp", "LinuxCNC's .comp", {"row": rf"{BLANK}{N}{GAP}{N}{GAP}{N}{BLANK}"}, _ascending("row"), ("row",)),
     Form(
         "ini",
         "an ini file",
@@ -95,6 +96,7 @@ FORMS = (
             "comment": rf"{BLANK}[#;].*",
             "blank": BLANK,
         },
+        needs=("section",),
     ),
     Form(
         "tnc306",
@@ -132,7 +134,12 @@ FORMS = (
         },
         _headed,
     ),
-    Form("isg-list", "an ISG list", {**LIST, "comment": rf"{BLANK}#.*", "blank": BLANK}),
+    Form(
+        "isg-list",
+        "an ISG list",
+        {**LIST, "comment": rf"{BLANK}(?:#.*|/\*.*\*/{BLANK})", "blank": BLANK},
+        needs=("entry",),
+    ),
     Form(
         "etalon",
         "the Etalon exchange format",
@@ -145,6 +152,7 @@ FORMS = (
             "close": rf"{BLANK}\}}{BLANK}(?://.*)?",
             "blank": BLANK,
         },
+        needs=("section",),
     ),
     Form(
         "elmo",
@@ -196,7 +204,7 @@ FORMS = (
         },
         _framed("start", "end"),
     ),
-    Form("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}),
+    Form("centroid", "Centroid's .tab", {"row": BLANK + GAP.join([N] * 5) + BLANK, "blank": BLANK}, needs=("row",)),
     Form(
         "rtl",
         "Renishaw's .rtl",
@@ -209,6 +217,7 @@ FORMS = (
             "blank": BLANK,
         },
         _runs,
+        ("section",),
     ),
 )
 BY_NAME = {form.name: form for form in FORMS}
