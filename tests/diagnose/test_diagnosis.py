@@ -64,6 +64,7 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert set(found["gap_um"]) == {"before", "after", "floor", "holdout_before", "holdout_after"}
     wanted = {"name", "title", "axis", "why", "coefficients", "sigma", "p_value", "aliases"}
     assert wanted <= set(found["effects"][0])
+    assert found["findable_um"]["backlash X"] <= 3.0  # 150 poses, 2 um of noise
     assert found["effects"][0]["plausible"]["is"]
     assert found["effects"][0]["targets"] == ["fix", "export linuxcnc", "export fanuc-pitch", "export siemens"]
     assert result.with_provenance(backlash).provenance["added"] == "backlash X"
@@ -236,3 +237,12 @@ def test_patterns_are_judged_by_what_the_others_leave(known: Machine) -> None:
     seen = view([plain.with_columns(shaken)], known)
     everything = np.zeros((len(seen.y), len(seen.y)))
     assert patterns(background(seen, everything, seen.relative), 0.5) == []
+
+
+def test_a_noise_that_repeats_deny_is_said(known: Machine) -> None:
+    poses = plan(known, "tcp", 40).rows(np.repeat(np.arange(40), 3))
+    seen = simulate(poses, known, Faults(NOISE_UM), 5)
+    honest, wrong = seen.with_header("noise_um", "2"), seen.with_header("noise_um", "0.2")
+    assert remarks(view([honest], known), ()) == []
+    (said,) = remarks(view([wrong], known), ())
+    assert (said.code, said.text[:31]) == ("NCF659", "the files state 0.2 um of noise")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtrc
 
+from ncfix.diagnose import noise
 from ncfix.diagnose.misfit import misfit
 from ncfix.diagnose.view import View
 from ncfix.diagnostics import Message, UsageError
@@ -25,6 +26,8 @@ WORSE = 1.3
 AS_IT_STANDS_UM = 0.01
 """Constants are not refitted where the file itself is judged."""
 CONTRADICTION = 1e-6
+MISSTATED = 2.0
+"""Times by which repeats may scatter more or less than the noise that is stated."""
 
 
 def before(measurements: Sequence[Measurement], machine: Machine) -> None:
@@ -90,6 +93,17 @@ def agreeing(view: View, residual: Array, sigma: float) -> None:
         raise UsageError.of("NCF656", text, hint="diagnose the files one by one")
 
 
+def _misstated(view: View) -> list[Message]:
+    """A noise that the files state and that repeats deny."""
+    squares, freedom = noise.repeats(view, view.row >= 0)
+    if freedom < noise.ENOUGH or any(each.noise[0] is None for each in view.measurements):
+        return []
+    seen = float(np.sqrt(squares / freedom))
+    if 1 / MISSTATED < seen / view.sigma < MISSTATED:
+        return []
+    return [Message("NCF659", f"the files state {view.sigma:.2g} um of noise, repeats scatter by {seen:.2g} um")]
+
+
 def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
     """What the user should know: directions that never change or are not said, names that do not exist."""
     found = []
@@ -103,5 +117,6 @@ def remarks(view: View, unheard_of: Sequence[str]) -> list[Message]:
     if fixed:
         text = f"{', '.join(fixed)} came from one side only: backlash and play of {'it' if len(fixed) == 1 else 'them'}"
         found.append(Message("NCF653", f"{text} cannot show"))
+    found += _misstated(view)
     found += [Message("NCF657", f"there is no effect {name!r} in the catalogue of this machine") for name in unheard_of]
     return found

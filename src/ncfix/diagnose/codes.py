@@ -55,4 +55,10 @@ CODES = {
         "on the direction would be wrong for that file's rows, so it is not looked for.",
         "Give that file the column `dir_` of the axis, or diagnose the others without it.",
     ),
+    "NCF659": Code(
+        "repeats deny the noise that is stated",
+        "Values taken at one state one after another scatter by more than twice the noise in the header, or by less than "
+        "half of it. The repeats are believed where there are enough; the header is wrong, or a unit is.",
+        "Correct the line `# noise_um:`, or the unit of the values.",
+    ),
 }

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ncfix.diagnose import addition, checks, gapmap, gates, holdout, next_poses, noise, plausible, verdict
+from ncfix.diagnose import addition, checks, gapmap, gates, holdout, next_poses, noise, plausible, power, verdict
 from ncfix.diagnose.addition import Joint
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.fields import scaled
@@ -51,6 +51,7 @@ def concluded(case: Case, scale: Scale, selected: Selected) -> Diagnosis:
             gapmap.clustering(court.background, joint.after, places),
         ),
         moved=addition.surely_moved(court, joint),
+        findable=power.findable(scale),
         proposal=next_poses.proposed(scale, selected, sigma) if told else None,
     )
 

@@ -189,6 +189,11 @@ class Court:
                 whole[last, own] = size * weighed.T @ self.columns[:, part]
         return whole, seen
 
+    def strength(self, group: int, share: float) -> Array:
+        """Squares that independent parts of a form show at 1 um, over the variance of noise and background, (w,)."""
+        squares: Array = np.maximum(np.linalg.eigvalsh(self._pair(share, group, group)), 0.0)
+        return squares
+
     def _products(self, share: float, group: int) -> Array:
         """The inner products of a group's columns with all, (w, p); computed once."""
         key = share, group

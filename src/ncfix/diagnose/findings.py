@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,7 @@ class Diagnosis:
     before, after  (m,) residuals with the constants alone and with the findings, um; p_lack, p_left by chance
     clustering     how much neighbouring residuals are alike, before and after
     moved          constants of the machine file that the data put elsewhere; the gap before is after that
+    findable       name -> um rms from which on an effect would be found in these data; inf: never
     """
 
     case: Case
@@ -102,6 +104,7 @@ class Diagnosis:
     patterns: tuple[gapmap.Pattern, ...]
     clustering: tuple[float, float]
     moved: tuple[addition.Moved, ...]
+    findable: Mapping[str, float]
     proposal: next_poses.Proposal | None = None
     mistake: mistakes.Mistake | None = None
 

@@ -28,6 +28,7 @@ def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
         "noise": {"sigma_um": found.floor.sigma_um, "source": found.floor.source, "freedom": found.floor.freedom},
         "lack_of_fit": {"before": found.p_lack, "after": found.p_left},
         "invisible": [{"name": c.name, "visible_share": share} for c, share in found.case.gathered.invisible],
+        "findable_um": {name: size if np.isfinite(size) else None for name, size in found.findable.items()},
         "considered": len(found.case.considered),
         "outliers": _outliers(found),
         "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in found.moved],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ncfix.diagnose import power
 from ncfix.diagnose.addition import Moved
 from ncfix.diagnose.carriers import carriers, conditions
 from ncfix.diagnose.findings import Diagnosis, Finding
@@ -49,10 +50,19 @@ def text(found: Diagnosis) -> str:
     if found.moved:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
         lines += [f"  {constant(each)}" for each in found.moved]
+    if found.verdict == NOTHING:
+        lines += ["", *silence(found)]
     lines += _next(found)
     if found.case.outlying.any():
         lines += ["", f"{int(found.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
+
+
+def silence(found: Diagnosis) -> list[str]:
+    """What it means that nothing was found."""
+    count = len(found.case.considered)
+    lines = ["these data can show hardly anything"] if power.blind(found.findable, count) else []
+    return [*lines, power.said(found.findable, count)]
 
 
 def constant(moved: Moved) -> str:
@@ -148,4 +158,6 @@ def why(found: Diagnosis, finding: Finding) -> str:
     if not runners:
         return said
     best = max(runners, key=lambda each: runners[each])
-    return f"{said}; next best of {len(found.case.considered)}: {best}, {finding.odds - runners[best]:.0f} less"
+    less = finding.odds - runners[best]
+    beside = f"{abs(less):.0f} {'less' if less >= 0 else 'more'}"
+    return f"{said}; next best of {len(found.case.considered)}: {best}, {beside}"

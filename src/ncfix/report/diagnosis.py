@@ -7,7 +7,21 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ncfix.diagnose.findings import Diagnosis, Finding
-from ncfix.diagnose.words import NOISE, SAID, carried, constant, constants, hope, hopeless, odd, rest, unusual, why
+from ncfix.diagnose.verdict import NOTHING
+from ncfix.diagnose.words import (
+    NOISE,
+    SAID,
+    carried,
+    constant,
+    constants,
+    hope,
+    hopeless,
+    odd,
+    rest,
+    silence,
+    unusual,
+    why,
+)
 from ncfix.machine import Effect
 from ncfix.measure.measurement import Array
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
@@ -46,6 +60,7 @@ def _verdict(found: Diagnosis) -> Section:
     ]
     if found.unknown_um:
         parts.append(Text(f"{rest(found).capitalize()}."))
+    parts += [Text(f"{each[0].upper()}{each[1:]}.") for each in (silence(found) if found.verdict == NOTHING else [])]
     return Section("Verdict", [*parts, *_chances(found), *_moved(found)])
 
 
