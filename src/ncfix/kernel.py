@@ -36,6 +36,9 @@ OPTIONS: dict[str, Any] = {
 }
 """Of numba: divisions as numpy does them, and nothing that needs Python or numba when it runs."""
 NUMBERS = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
+DATA = object.__basicsize__
+"""Where an array has the address of its numbers: the first thing behind what every object has (numpy's C interface).
+To ask the array for it takes longer than to hand over all the rest."""
 
 
 @dataclass(slots=True)
@@ -49,10 +52,11 @@ class Kernel:
     arguments: tuple[Argument, ...]
     library: Library
     code: Callable[..., int] | None = field(default=None, init=False)
-    kinds: tuple[tuple[str, int], ...] = field(init=False)
+    kinds: tuple[tuple[np.dtype[Any], int], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.kinds = tuple((each[:2], each.count(":")) for each in flat(self.arguments) if isinstance(each, str))
+        named = (each for each in flat(self.arguments) if isinstance(each, str))
+        self.kinds = tuple((np.dtype(each[:2]), each.count(":")) for each in named)
 
     def __call__(self, *given: Any) -> int:
         """Run it. Raises TypeError for other arguments than those declared."""
@@ -62,11 +66,10 @@ class Kernel:
         values: list[Any] = []
         for value, (kind, dimensions) in zip(flat(given), self.kinds, strict=True):
             if dimensions:
-                if value.dtype.str[1:] != kind or value.ndim != dimensions or not value.flags.c_contiguous:
-                    raise TypeError(f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind}")
-                values += (None, None, value.size, value.itemsize, value.__array_interface__["data"][0])
-                values += value.shape
-                values += value.strides
+                if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
+                    raise TypeError(f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind.str[1:]}")
+                address = ctypes.c_void_p.from_address(id(value) + DATA).value
+                values += (None, None, value.size, kind.itemsize, address, *value.shape, *value.strides)
             else:
                 values.append(value)
         result, trouble = ctypes.c_int64(), ctypes.c_void_p()
@@ -82,7 +85,7 @@ class Kernel:
                 types += [ctypes.c_void_p] * 2 + [ctypes.c_int64] * 2
                 types += [ctypes.c_void_p] + [ctypes.c_int64] * (2 * dimensions)
             else:
-                types.append(NUMBERS[kind])
+                types.append(NUMBERS[kind.str[1:]])
         self.code = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(address)
 
 
@@ -205,13 +208,15 @@ def keep(source: str, kind: str, data: bytes) -> None:
             return
 
 
-def flat(nested: Any) -> Iterator[Any]:
+def flat(nested: Any) -> list[Any]:
     """What tuples in tuples hold."""
+    found: list[Any] = []
     for each in nested:
         if isinstance(each, tuple):
-            yield from flat(each)
+            found += flat(each)
         else:
-            yield each
+            found.append(each)
+    return found
 
 
 def typed(arguments: tuple[Argument, ...], types: Any) -> Any:
