@@ -67,7 +67,9 @@ class Kernel:
         for value, (kind, dimensions) in zip(flat(given), self.kinds, strict=True):
             if dimensions:
                 if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
-                    raise TypeError(f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind.str[1:]}")
+                    raise TypeError(
+                        f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind.str[1:]}"
+                    )
                 address = ctypes.c_void_p.from_address(id(value) + DATA).value
                 values += (None, None, value.size, kind.itemsize, address, *value.shape, *value.strides)
             else:

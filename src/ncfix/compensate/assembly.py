@@ -11,6 +11,7 @@ from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import offsets, owners, places, sums
+from ncfix.compensate.rows import picked
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
 
@@ -64,8 +65,9 @@ def assembled(
     if parts is not None:
         counts[rows] = parts.counts
     move = owners(counts)
-    fraction, end, arc = np.ones(len(move)), real.end[move], real.arc[move]
-    centre = np.where(arc[:, None], real.centre[move], np.nan)
+    fraction, end, arc = np.ones(len(move)), picked(real.end, move), real.arc[move]
+    centre = np.full((len(move), 3), np.nan)
+    centre[arc] = real.centre[move[arc]]
     if parts is not None:
         at = np.repeat(offsets(counts)[:-1][rows], parts.counts) + places(parts.counts)
         fraction[at], end[at], arc[at], centre[at] = parts.fraction, parts.end, parts.arc, parts.centre

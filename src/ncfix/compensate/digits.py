@@ -12,6 +12,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rows import picked, some
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 from ncfix.program.number_style import decimals_for
@@ -27,7 +28,7 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces, among: Index | Non
     if not rows.size:
         return pieces
     move = pieces.move[rows]
-    commands = pieces.end[rows].copy()
+    commands = picked(pieces.end, rows)
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame[move]][:, moves.rotary]
     commands[:, moves.rotary] = offset + _rounded(commands[:, moves.rotary] - offset, machine)
     solved, arrived = Intent(machine, moves, State()).aimed(move, pieces.fraction[rows], commands)
@@ -39,7 +40,7 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces, among: Index | Non
 
 def _newly_written(moves: Moves, pieces: Pieces, among: Index) -> Index:
     """Straight pieces with a rotary position that the program does not have as a number of its own."""
-    turned = (pieces.end[among] != moves.end[pieces.move[among]])[:, moves.rotary].any(axis=1)
+    turned = some((picked(pieces.end, among) != picked(moves.end, pieces.move[among]))[:, moves.rotary])
     rows: Index = among[turned & ~pieces.kept[among] & ~pieces.arc[among]]
     return rows
 

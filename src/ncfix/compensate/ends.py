@@ -13,7 +13,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.ragged import slices
 from ncfix.compensate.rates import Path
-from ncfix.compensate.rows import finite
+from ncfix.compensate.rows import chosen, finite, picked, put
 from ncfix.compensate.standing import standing
 from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
@@ -46,12 +46,12 @@ def corrected(intent: Intent, strategy: Strategy, rows: Index) -> Ends:
     ones = np.ones(len(rows))
     q = intent.joints_at(rows, ones)
     lengths = np.broadcast_to(intent.lengths(rows), len(rows))
-    named = finite(moves.end[rows])
+    named = finite(picked(moves.end, rows))
     fit = finite(q) & np.isfinite(lengths)
-    good = rows[fit]
-    result = _solved(intent, strategy, good, q[fit])
+    good, q = rows[fit], chosen(q, fit)
+    result = _solved(intent, strategy, good, q)
     wanted = moves.end.copy()
-    wanted[good] = as_commands(intent, good, moves.end[good], q[fit], result.q)
+    put(wanted, good, as_commands(intent, good, picked(moves.end, good), q, result.q))
     failed, oriented = np.zeros(len(moves), dtype=bool), np.zeros(len(moves), dtype=bool)
     failed[rows[~fit]] = failed[good[~result.converged]] = True
     oriented[good] = result.oriented

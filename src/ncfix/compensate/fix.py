@@ -20,6 +20,7 @@ from ncfix.compensate.following import Resolve, placed, traced, with_tool_length
 from ncfix.compensate.left import left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
+from ncfix.compensate.rows import lengths
 from ncfix.compensate.settle import Settled, increments, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
@@ -199,5 +200,5 @@ def refusals(program: Program, account: Account) -> list[Refusal]:
 
 def largest_correction(moves: Moves, settled: Settled, own: Mask | None = None) -> float:
     """The largest shift of a linear command, mm; of motions `own` (n,) if given."""
-    shift = settled.shift[~settled.kept if own is None else own & ~settled.kept][:, ~moves.rotary]
-    return float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)) if len(shift) else 0.0
+    done = ~settled.kept if own is None else own & ~settled.kept
+    return float(np.nanmax(lengths(settled.shift[:, ~moves.rotary])[done], initial=0.0)) if done.any() else 0.0

@@ -12,6 +12,7 @@ from ncfix.compensate.held import with_rotary_held
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import batches, offsets, owners, places, sums
 from ncfix.compensate.round import RoundGrid
+from ncfix.compensate.rows import picked
 from ncfix.compensate.sampling import MOST, bends, crossed, even, merged, reversals
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
@@ -115,7 +116,7 @@ def taken(parts: Split, order: Index) -> Split:
     """The motions of `parts` in another order."""
     counts = parts.counts[order]
     take = np.repeat(offsets(parts.counts)[order], counts) + places(counts)
-    ends, centres = (parts.fraction[take], parts.end[take]), (parts.arc[take], parts.centre[take])
+    ends, centres = (parts.fraction[take], picked(parts.end, take)), (parts.arc[take], parts.centre[take])
     return Split(counts, *ends, *centres, parts.worst[order])
 
 
@@ -128,7 +129,7 @@ def _split(intent: Intent, real: Segments, rows: Index, nodes: Index, cutter: Cu
     first = np.append(0, last[:-1])
     opens = offsets(counts)[:-1]
     first[opens] = offsets(grid.counts)[:-1]
-    return Split(counts, grid.fraction[last], grid.command[last], *cut.shape(first, last), worst)
+    return Split(counts, grid.fraction[last], picked(grid.command, last), *cut.shape(first, last), worst)
 
 
 def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: Strategy) -> Grid:
@@ -151,7 +152,9 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     command = _as_they_stand(intent, real, move, fraction, command)
     use = result.converged | bounds
     counts = sums(use.astype(np.intp), counts).astype(np.intp)
-    return Grid(counts, fraction[use], command[use], _follow(intent, move[use], command[use], strategy))
+    if not use.all():
+        move, fraction, command = move[use], fraction[use], command[use]
+    return Grid(counts, fraction, command, _follow(intent, move, command, strategy))
 
 
 def _as_they_stand(intent: Intent, real: Segments, move: Index, fraction: Array, command: Array) -> Array:

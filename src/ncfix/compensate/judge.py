@@ -9,7 +9,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import largest, owners, slices
-from ncfix.compensate.rows import every, lengths, some
+from ncfix.compensate.rows import every, farthest, lengths, picked, some
 from ncfix.compensate.sampling import interior, merged, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
@@ -67,8 +67,9 @@ def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
         return most
     chosen = slice(None) if plain.all() else plain
     on = rows[chosen]
-    start, end, linear = real.start[on], real.end[on], ~intent.machine.rotary
-    shifts = (start - intent.moves.start[on])[:, linear], (end - intent.moves.end[on])[:, linear]
+    start, end, linear = picked(real.start, on), picked(real.end, on), ~intent.machine.rotary
+    meant = picked(intent.moves.start, on), picked(intent.moves.end, on)
+    shifts = (start - meant[0])[:, linear], (end - meant[1])[:, linear]
     most[chosen] = straight_bounds(bow, start, end, shifts, intent.lengths(on), linear)
     return most
 
@@ -77,8 +78,8 @@ def straight_bounds(
     bow: Bow, start: Array, end: Array, shifts: tuple[Array, Array], tool_lengths: Array, linear: Mask
 ) -> Array:
     """As `bounds`, of straight motions (k, n_axes) between corrected ends, with `shifts` of their linear axes there."""
-    farthest = np.maximum(np.abs(start).max(axis=0), np.abs(end).max(axis=0))
-    least, angle = bow.of(np.abs(end - start), farthest, float(np.abs(tool_lengths).max()), ~linear)
+    most_far = np.maximum(farthest(start), farthest(end))
+    least, angle = bow.of(np.abs(end - start), most_far, float(np.abs(tool_lengths).max()), ~linear)
     before, after = shifts
     sizes = [lengths(each) for each in (before, after, after - before)]
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
@@ -90,7 +91,7 @@ def _passes_kink(intent: Intent, real: Segments, rows: Index) -> Mask:
     """Motions (k,) on the way of which the error has a kink or a jump."""
     found = np.zeros(len(rows), dtype=bool)
     if intent.kinks:
-        found[passed(intent, real.start[rows], real.end[rows])[0]] = True
+        found[passed(intent, picked(real.start, rows), picked(real.end, rows))[0]] = True
     return found
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.rows import greatest, picked
 from ncfix.compensate.written import Written
 
 TURNED = 1e-12
@@ -39,8 +40,8 @@ class Known:
         before = self.before[move]
         if ways is None:
             return np.zeros(len(piece), dtype=bool), before, before
-        off = pieces.end[piece] - self.end[move]
-        turned = np.abs(off[:, machine.rotary]).max(axis=1, initial=0.0)
+        off = picked(pieces.end, piece) - picked(self.end, move)
+        turned = greatest(np.abs(off[:, machine.rotary]))
         here = np.isfinite(before) & (pieces.fraction[piece] == 1) & ~intent.curved[move] & (turned <= TURNED)
         shift = off[:, intent.columns] @ ways.T
         return here, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))

@@ -82,12 +82,13 @@ class Left:
 def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
     """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves."""
     moves, known = settled.moves, settled.plan.known
-    if known is None or moves.all_placed:
+    wordless = moves.wordless
+    if known is None or not wordless.any():
         return {}
     off = np.abs(known.end - moves.end - settled.shift)
     if known.beside is not None:
         off = np.maximum(off, known.beside)
-    lacking = moves.wordless & (off >= steps / 2) & ~settled.kept[:, None]
+    lacking = wordless & (off >= steps / 2) & ~settled.kept[:, None]
     if own is not None:
         lacking &= own[:, None]
     found = {}

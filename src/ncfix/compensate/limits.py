@@ -10,7 +10,7 @@ from ncfix.compensate.excursion import surely_within
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import distinct
-from ncfix.compensate.rows import finite, lengths
+from ncfix.compensate.rows import finite, greatest, lengths
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
@@ -109,7 +109,7 @@ def too_large(written: Written) -> Finding:
     machine = written.intent.machine
     shift = written.correction
     linear = lengths(shift[:, ~machine.rotary]) / machine.max_correction[0]
-    rotary = np.abs(shift[:, machine.rotary]).max(axis=1, initial=0.0) / machine.max_correction[1]
+    rotary = greatest(np.abs(shift[:, machine.rotary])) / machine.max_correction[1]
     share = np.maximum(linear, rotary)
     over = (share > 1 + FUZZ) & ~written.pieces.kept
     rows, values = _worst(written.pieces.move[over], share[over])

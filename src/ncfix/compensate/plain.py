@@ -24,7 +24,7 @@ from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import Demands, in_pieces
 from ncfix.compensate.ragged import distinct, offsets, owners, places
-from ncfix.compensate.rows import lengths, some
+from ncfix.compensate.rows import farthest, lengths, picked, some
 from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import rounding
@@ -141,8 +141,8 @@ class Planner:
             )
         from ncfix.compensate import plain_kernels
 
-        farthest = np.maximum(np.abs(real.start).max(axis=0), np.abs(real.end).max(axis=0))
-        constants = bow.shift, bow.turn, bow.arm(farthest, float(tool_length), ~linear), MORE, CORNER
+        most_far = np.maximum(farthest(real.start), farthest(real.end))
+        constants = bow.shift, bow.turn, bow.arm(most_far, float(tool_length), ~linear), MORE, CORNER
         bound = np.empty(len(real))
         bends = bow.slopes, bow.curvatures
         plain_kernels.bounds(real.start, real.end, shift, linear, bends, constants, CLOSE, bound)
@@ -226,7 +226,7 @@ def pieces_of(real: Segments, over: Index, parts: Split | None) -> tuple[Pieces,
     first = offsets(counts)
     m = int(first[-1])
     move = np.arange(n) if m == n else owners(counts)
-    fraction, end = np.ones(m), real.end if m == n else real.end[move]
+    fraction, end = np.ones(m), real.end if m == n else picked(real.end, move)
     if parts is not None:
         at = np.repeat(first[:-1][over], parts.counts) + places(parts.counts)
         fraction[at], end[at] = parts.fraction, parts.end

@@ -17,7 +17,7 @@ from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
 from ncfix.compensate.plain_text import PlainText
 from ncfix.compensate.ragged import owners, places
-from ncfix.compensate.rows import lengths
+from ncfix.compensate.rows import greatest, lengths
 from ncfix.compensate.sampling import features, passed
 from ncfix.compensate.verify import STRAIGHT, FigureTally, PathError, Samples, samples
 from ncfix.compensate.written import Written
@@ -85,7 +85,7 @@ def _to_be_followed(course: Course, end: Array) -> Mask:
     """(n,) motions along which the error may bend, or at the end of which it is not known."""
     moves, machine = course.part.moves, course.intent.machine
     found: Mask = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1) >= STRAIGHT
-    found |= np.abs(end - course.wanted)[:, machine.rotary].max(axis=1, initial=0.0) > TURNED
+    found |= greatest(np.abs(end - course.wanted)[:, machine.rotary]) > TURNED
     return found
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ncfix.compensate.arcs import across
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.rows import every, picked
 from ncfix.compensate.settle import Settled
 from ncfix.diagnostics import NcfixError
 from ncfix.program.emit import Reading
@@ -88,7 +89,7 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
         return None
-    differs: Mask = differ(again.end, emission.end[rows]) | _strayed(settled, again, rows)
+    differs: Mask = differ(again.end, picked(emission.end, rows)) | _strayed(settled, again, rows)
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
@@ -112,11 +113,15 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
     kept = pieces.kept[rows]
     if not kept.any():
         return kept
-    last = pieces.fraction == 1
-    shifts = np.abs(pieces.end[last] - ends[pieces.move[last]])
+    own = np.flatnonzero(kept)
+    off = np.abs(again.end[own] - ends[pieces.move[rows[own]]])
+    if not (off > STRAY).any():
+        return np.zeros_like(kept)
+    last = np.flatnonzero(pieces.fraction == 1)
+    shifts = np.abs(picked(pieces.end, last) - picked(ends, pieces.move[last]))
     most = max(STRAY, STRAYS * float(np.max(shifts[np.isfinite(shifts)], initial=0.0)))
-    strayed: Mask = (np.abs(again.end - ends[pieces.move[rows]]) > most).any(axis=1) & kept
-    return strayed
+    kept[own] = (off > most).any(axis=1)
+    return kept
 
 
 def differ(found: Array, meant: Array) -> Mask:
@@ -125,4 +130,4 @@ def differ(found: Array, meant: Array) -> Mask:
         same = np.asarray(np.abs(found - meant) <= SAME)
     if not same.all():
         same = same | (found == meant) | (np.isnan(found) & np.isnan(meant))
-    return np.asarray(~same.all(axis=1))
+    return ~every(same)

@@ -1,12 +1,14 @@
-"""Questions about the rows of narrow tables, column by column: numpy goes through short rows one at a time."""
+"""What concerns the rows of narrow tables, done in a way that does not take numpy a step for each short row."""
 
 from __future__ import annotations
 
 from functools import reduce
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.findings import Array, Index, Mask
 
 
 def every(mask: Mask) -> Mask:
@@ -26,6 +28,37 @@ def some(mask: Mask) -> Mask:
 def finite(values: Array) -> Mask:
     """Rows (n,) in which all numbers (n, k) are finite."""
     return every(np.isfinite(values))
+
+
+def picked(table: NDArray[Any], rows: Index) -> NDArray[Any]:
+    """Rows (k, m) of a table (n, m): as `table[rows]`, in a tenth of the time."""
+    return table.take(rows, axis=0)
+
+
+def spread(values: Array, width: int) -> Array:
+    """One value (n,) for all columns of each row, (n, width)."""
+    return np.repeat(values, width).reshape(-1, width)
+
+
+def chosen(table: NDArray[Any], mask: Mask) -> NDArray[Any]:
+    """The rows of a table that a mask (n,) names: as `table[mask]`."""
+    return table.compress(mask, axis=0)
+
+
+def put(table: NDArray[Any], rows: Index, values: NDArray[Any]) -> None:
+    """Put values (k, m) into rows (k,) of a table: as `table[rows] = values`."""
+    for column, new in zip(table.T, values.T, strict=True):
+        column[rows] = new
+
+
+def greatest(table: Array) -> Array:
+    """The largest number of each row, (n,); not below 0, NaN if one is NaN."""
+    return reduce(np.maximum, table.T, np.zeros(len(table)))
+
+
+def farthest(table: Array) -> Array:
+    """How far from 0 each column goes, (m,); NaN if that is not known."""
+    return np.array([np.abs(column).max() for column in table.T])
 
 
 def lengths(vectors: Array) -> Array:

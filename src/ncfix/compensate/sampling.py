@@ -7,6 +7,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
+from ncfix.compensate.rows import picked
 from ncfix.compensate.segments import Segments
 from ncfix.machine import Machine
 
@@ -31,7 +32,7 @@ def bends(intent: Intent, rows: Index) -> Array:
     of swinging the tip round: up to the distance of the tip from the rotary axes times the angle.
     """
     moves, machine = intent.moves, intent.machine
-    way = np.abs(moves.end[rows] - moves.start[rows])
+    way = np.abs(picked(moves.end, rows) - picked(moves.start, rows))
     swung = np.flatnonzero(moves.tcp[rows])
     if swung.size:
         angle = way[swung][:, machine.rotary].sum(axis=1)
@@ -39,7 +40,8 @@ def bends(intent: Intent, rows: Index) -> Array:
     arcs = np.flatnonzero(intent.segments.arc[rows])
     if arcs.size:
         way[arcs[:, None], intent.columns] += _arc_ways(intent, rows[arcs])
-    count: Array = (way / features(machine)).sum(axis=1)
+    way /= features(machine)
+    count: Array = way.sum(axis=1)
     count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
     return count
 

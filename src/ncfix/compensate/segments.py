@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.rows import picked, spread
 from ncfix.program.moves import Kind, Moves
 
 
@@ -51,17 +52,26 @@ class Segments:
 
         The end of a motion is known even if its start is not.
         """
-        command = self.end[rows]
         inside = np.flatnonzero(fraction != 1)
         if not inside.size:
-            return command
-        f, on = fraction[inside, None], rows[inside]
-        command[inside] = (1 - f) * self.start[on] + f * self.end[on]
+            return picked(self.end, rows)
+        if inside.size == len(rows):
+            command = self._on_line(rows, fraction)
+        else:
+            command = picked(self.end, rows)
+            command[inside] = self._on_line(rows[inside], fraction[inside])
         if self.arc.any():
-            on_arc = inside[self.arc[on]]
+            on_arc = inside[self.arc[rows[inside]]]
             if on_arc.size:
                 command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
         return command
+
+    def _on_line(self, rows: Index, fraction: Array) -> Array:
+        """The commands at fractions, each axis linear, (k, n_axes)."""
+        axes = self.end.shape[1]
+        result: Array = spread(1 - fraction, axes) * picked(self.start, rows)
+        result += spread(fraction, axes) * picked(self.end, rows)
+        return result
 
     def _on_arc(self, rows: Index, fraction: Array) -> Array:
         """X Y Z at fractions of arcs, (k, 3)."""

@@ -22,6 +22,7 @@ from ncfix.compensate.idle import without_idle
 from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
+from ncfix.compensate.rows import picked
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
 from ncfix.program.dialect import Dialect
@@ -81,7 +82,7 @@ class Settled:
     def shift(self) -> Array:
         """(n, n_axes) by how much the command at the end of each motion is changed, as written, mm and rad."""
         last = np.searchsorted(self.plan.pieces.move, np.arange(len(self.moves)), side="right") - 1
-        change: Array = self.emission.end[last] - self.moves.end
+        change: Array = picked(self.emission.end, last) - self.moves.end
         return change
 
 

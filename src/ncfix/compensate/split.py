@@ -21,7 +21,7 @@ import numpy as np
 from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import largest, offsets, owners, places
-from ncfix.compensate.rows import lengths
+from ncfix.compensate.rows import lengths, picked, spread
 
 
 class Cuttable(Protocol):
@@ -60,8 +60,9 @@ class Grid:
         node = first[piece] + 1 + places(inner)
         a, b = first[piece], last[piece]
         share = (self.fraction[node] - self.fraction[a]) / (self.fraction[b] - self.fraction[a])
-        command = self.command[a] + share[:, None] * (self.command[b] - self.command[a])
-        short, follow = command - self.command[node], self.follow[node]
+        before, axes = picked(self.command, a), self.command.shape[1]
+        command = before + spread(share, axes) * (picked(self.command, b) - before)
+        short, follow = command - picked(self.command, node), picked(self.follow, node)
         off = follow[:, :, 0] * short[:, None, 0]
         for j in range(1, short.shape[1]):
             off += follow[:, :, j] * short[:, None, j]

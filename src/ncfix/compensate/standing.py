@@ -13,6 +13,8 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
 from ncfix.compensate.kinematics import commands_from_joints, reached_joints
+from ncfix.compensate.ragged import distinct
+from ncfix.compensate.rows import every
 from ncfix.compensate.wordless import stays
 from ncfix.machine import Machine
 from ncfix.program.moves import Kind, Moves
@@ -41,12 +43,15 @@ def standing(
     before      (n_axes,) how far off the axes stand at the start of the first motion; not at all if not given
     approaches  (n, n_axes) where canned cycles feed from, and may return to; NaN, or not given: as programmed
     """
-    shift = np.where(kept[:, None], 0.0, _known(wanted - moves.end))
-    staying = stays(moves, kept, shift, before)
-    if not kept.any() and not staying.any() and _goes_on(moves):
+    shift = _known(wanted - moves.end)
+    shift[kept] = 0.0
+    decides = ~stays(moves, kept, shift, before)
+    if kept.any():
+        decides[kept] &= (moves.moved & ~moves.increments)[kept]
+    if _goes_on(moves):
         first = np.zeros((1, shift.shape[1])) if before is None else before[None]
-        return Standing(moves.start + np.concatenate([first, shift[:-1]]), moves.end + shift)
-    decides = ~staying & (~kept[:, None] | (moves.moved & ~moves.increments))
+        left = _carried(shift, decides, first)
+        return Standing(moves.start + left[:-1], moves.end + left[1:])
     back = _gone_back(moves)
     restarts = _restarts(moves, back)
     jumps, risen = _risen(moves, approaches)
@@ -67,6 +72,20 @@ def _goes_on(moves: Moves) -> bool:
     """Whether every motion begins where the one before ended, and commands mean the same all along."""
     joined = bool((moves.start[1:] == moves.end[:-1]).all()) and not (moves.kind == Kind.CYCLE).any()
     return joined and len(_runs(moves)) == 1
+
+
+def _carried(shift: Array, decides: Mask, first: Array) -> Array:
+    """Displacements before and behind motions that go on from each other, (n + 1, n_axes): `first`, then as decided.
+
+    Where a motion does not decide, it is that of the motion before.
+    """
+    found = np.concatenate([first, shift])
+    open_ = np.flatnonzero(~every(decides))
+    near = distinct(np.concatenate([open_, open_ + 1]))
+    decided = np.concatenate([np.ones_like(decides[:1]), decides])[near]
+    last = np.maximum.accumulate(np.where(decided, np.arange(len(near))[:, None], 0), axis=0)
+    found[near] = np.take_along_axis(found[near], last, axis=0)
+    return found
 
 
 def _filled(

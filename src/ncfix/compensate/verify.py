@@ -18,7 +18,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners
-from ncfix.compensate.rows import finite, lengths
+from ncfix.compensate.rows import finite, lengths, picked
 from ncfix.compensate.sampling import MOST, bends, even, merged, passed
 from ncfix.compensate.steer import rows_of
 from ncfix.compensate.wordless import correctable, lacking
@@ -158,8 +158,8 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
     kind = written.intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
     along &= written.intent.moving[move]
-    along &= finite(written.segments.start[which]) & finite(written.start[move])
-    along &= finite(written.intent.moves.start[move])
+    for begins, rows in ((written.segments.start, which), (written.start, move), (written.intent.moves.start, move)):
+        along &= finite(begins)[rows]
     counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
@@ -200,18 +200,18 @@ def _kinked(written: Written, which: Index, along: Mask) -> Mask:
 def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> Samples:
     intent = written.intent
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
-    lengths, states = intent.lengths(move), intent.states(move, at)
+    tools, states = intent.lengths(move), intent.states(move, at)
     commands = written.segments.at(piece, fraction)
     intended, done = intent.joints_at(move, at), intent.joints(move, commands)
-    tip = intent.machine.tip(intended, lengths)
+    tip = intent.machine.tip(intended, tools)
     before, after = (
-        np.linalg.norm(correctable(intent, move, commands, intent.machine.actual_tip(q, states) - tip), axis=1)
+        lengths(correctable(intent, move, commands, intent.machine.actual_tip(q, states) - tip))
         for q in (intended, done)
     )
     if not tilts:
         return Samples(move, at, before, after, _way(written, piece), 0.0, 0.0)
     ends = np.flatnonzero(fraction == 1.0)
-    meant = intent.machine.nominal(intended[ends], lengths if np.ndim(lengths) == 0 else lengths[ends])
+    meant = intent.machine.nominal(intended[ends], tools if np.ndim(tools) == 0 else tools[ends])
     found = [_tilt(intent.machine, q[ends], rows_of(states, ends), meant) for q in (intended, done)]
     return Samples(move, at, before, after, _way(written, piece), *found)
 
@@ -229,7 +229,7 @@ def _way(written: Written, piece: Index) -> Array:
     segments = written.segments
     first = np.flatnonzero(np.diff(piece, prepend=-1))
     counts = np.diff(first, append=len(piece))
-    chord = (segments.end - segments.start)[piece][:, ~written.intent.machine.rotary]
+    chord = picked(segments.end - segments.start, piece)[:, ~written.intent.machine.rotary]
     way = lengths(np.nan_to_num(chord))
     on_arc = np.flatnonzero(segments.arc[piece])
     if on_arc.size:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import finite
+from ncfix.compensate.rows import finite, picked, put
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.program.pieces import Pieces
 
@@ -51,8 +51,9 @@ class Written:
         pieces, moves = self.pieces, self.intent.moves
         start = np.empty_like(pieces.end)
         start[1:] = pieces.end[:-1]
-        start[self.opens] = self.start[pieces.move[self.opens]]
-        normal, sweep = moves.normal[pieces.move], moves.sweep[pieces.move] * self.span
+        opens = np.flatnonzero(self.opens)
+        put(start, opens, picked(self.start, pieces.move[opens]))
+        normal, sweep = picked(moves.normal, pieces.move), moves.sweep[pieces.move] * self.span
         arc = pieces.arc.copy()
         arc[arc] = finite(pieces.centre[arc])
         columns = self.intent.columns

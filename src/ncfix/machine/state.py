@@ -8,12 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ncfix import fast
 from ncfix.diagnostics import UsageError
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
 
 CHUNK = 4096
 """Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""
+LARGE = 1 << 15
+"""The same where compiled loops go through them, which take them by the handful."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +49,10 @@ class Poses:
     inputs: Mapping[str, Array]
 
     def chunks(self) -> Iterator[tuple[slice, Poses]]:
-        """The poses in runs of at most `CHUNK`."""
-        for start in range(0, self.positions.shape[1], CHUNK):
-            part = slice(start, start + CHUNK)
+        """The poses in runs."""
+        size = LARGE if fast.engaged() else CHUNK
+        for start in range(0, self.positions.shape[1], size):
+            part = slice(start, start + size)
             yield (
                 part,
                 Poses(

@@ -213,7 +213,7 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
     fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
     fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
     fit &= ~pieces.kept[first] & _writable_pieces(program, moves, pieces, first_piece, layouts)
-    fit &= np.isfinite(pieces.end[first]).all(axis=1) & _undisplaced(moves, pieces, first_piece)
+    fit &= pieces.known[first] & _undisplaced(moves, pieces, first_piece)
     fit &= layouts.known[program.template[moves.block]]
     rising = moves.block[1:] > moves.block[:-1]
     if not rising.all():
@@ -224,10 +224,11 @@ def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntA
 
 def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     """(n,) motions in which axes that must get no word stand where the program believes them to be."""
-    if moves.all_placed:
+    wordless = moves.wordless
+    if not wordless.any():
         return np.ones(len(moves), dtype=np.bool_)
     last = first_piece[1:] - 1
-    fine: Mask = ~(moves.wordless & (pieces.end[last] != moves.end)).any(axis=1)
+    fine: Mask = ~(wordless & (pieces.end.take(last, axis=0) != moves.end)).any(axis=1)
     return fine
 
 
@@ -238,7 +239,7 @@ def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece
     if len(several):
         straight = np.add.reduceat(pieces.arc, first_piece[:-1], dtype=np.int64)[several] == 0
         timed = (moves.feed_mode[several] == FeedMode.INVERSE_TIME) & (moves.modal[several] != 0)
-        finite = np.logical_and.reduceat(np.isfinite(pieces.end).all(axis=1), first_piece[:-1])[several]
+        finite = np.logical_and.reduceat(pieces.known, first_piece[:-1])[several]
         single[several] = straight & ~timed & finite & layouts.further[program.template[moves.block[several]]]
     return single
 

@@ -185,11 +185,6 @@ class Moves:
         return wordless if self.resting is None else wordless | self.resting
 
     @property
-    def all_placed(self) -> bool:
-        """Whether every axis may have a word wherever it needs one."""
-        return self.placed is None or (self.resting is None and bool(self.placed.all()))
-
-    @property
     def increments(self) -> NDArray[np.bool_]:
         """(n, n_axes) axes along which a motion makes the same way wherever it starts."""
         counted = self.incremental[:, None] if self.counted is None else self.counted
@@ -212,8 +207,9 @@ class Moves:
     @property
     def moved(self) -> NDArray[np.bool_]:
         """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
-        all_axes = (self.rule == Rule.PASS) & (self.kind != Kind.DWELL) & ~self.programmed.any(axis=1)
-        moved: NDArray[np.bool_] = self.programmed | (self.end != self.start) | all_axes[:, None]
+        moved: NDArray[np.bool_] = self.programmed | (self.end != self.start)
+        passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != Kind.DWELL))
+        moved[passed[~self.programmed[passed].any(axis=1)]] = True
         return moved
 
 

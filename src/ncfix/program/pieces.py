@@ -36,3 +36,9 @@ class Pieces:
 
     def __len__(self) -> int:
         return len(self.move)
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """(m,) the command at the end is known in all axes."""
+        finite = np.isfinite(self.end)
+        return np.ones(len(self), dtype=np.bool_) if finite.all() else np.asarray(finite.all(axis=1))

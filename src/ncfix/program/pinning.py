@@ -60,15 +60,17 @@ class _Walk:
         self.columns = [moves.axes.index(letter) if letter in moves.axes else -1 for letter in "XYZ"]
         self.passed = moves.rule == Rule.PASS
         self.said = moves.programmed & ~moves.increments
-        self.anchored = ((moves.kind == Kind.ARC) & ~self._floating() | bound) & ~self.passed
+        arcs = np.flatnonzero(moves.kind == Kind.ARC)
+        self.anchored = bound & ~self.passed
+        self.anchored[arcs] |= ~self._floating(arcs) & ~self.passed[arcs]
 
-    def _floating(self) -> Mask:
-        """Arcs of which both end and centre count from where they start, full circles among them."""
+    def _floating(self, arcs: NDArray[np.intp]) -> Mask:
+        """Which arcs (k,) have both end and centre that count from where they start, full circles among them."""
         moves = self.moves
-        named = [self.said[:, column] for column in self.columns if column >= 0]
-        in_plane = np.abs(moves.normal) < 1 - STILL
+        named = [self.said[arcs, column] for column in self.columns if column >= 0]
+        in_plane = np.abs(moves.normal[arcs]) < 1 - STILL
         own = np.stack(named, axis=1) & in_plane[:, [k for k, column in enumerate(self.columns) if column >= 0]]
-        return np.asarray(~moves.about_fixed_point & ~own.any(axis=1))
+        return np.asarray(~moves.about_fixed_point[arcs] & ~own.any(axis=1))
 
     def back_from(self, arc: int) -> None:
         """Keep the motions before an arc until every axis of its plane has been named by one.

@@ -12,13 +12,17 @@ from ncfix.program.writer import Edit
 #: How every stamp begins; what follows it is for people.
 SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
 
+MANY = 100
+"""Comments; to look for the name in the whole text takes less time than to look at so many."""
+
 
 def find(program: Program) -> int | None:
     """The block that carries a stamp, or None."""
     carriers = [any(isinstance(item, (Comment, Opaque)) for item in each.items) for each in program.templates]
-    if not any(carriers) or b"ncfix" not in program.source.lower():
+    blocks = np.flatnonzero(np.array(carriers)[program.template])
+    if len(blocks) > MANY and b"ncfix" not in program.source.lower():
         return None
-    for block in np.flatnonzero(np.array(carriers)[program.template]).tolist():
+    for block in blocks.tolist():
         for item in program.items_of(block):
             if isinstance(item, (Comment, Opaque)) and SIGN.search(program.slice(block, item.span)):
                 return int(block)

@@ -236,9 +236,9 @@ class Builder:
             np.concatenate([getattr(part, name).take(self.columns, axis=1) for part in parts])
             for name in ("start", "end")
         )
-        bits = np.array([1 << column for column in self.columns], dtype=np.int64)
+        named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles = self._style_columns(style)
-        programmed, counted = (mask[:, None] & bits) != 0, self._counted_column(styles["incremental"])
+        programmed, counted = named.take(mask, axis=0), self._counted_column(styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
@@ -256,7 +256,7 @@ class Builder:
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
-            placed=(adrift[:, None] & bits) == 0,
+            placed=(~named).take(adrift, axis=0),
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
             angles=angles,
