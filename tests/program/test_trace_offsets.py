@@ -107,7 +107,7 @@ def test_tool_length_is_that_of_the_spindle_without_an_offset() -> None:
 
 
 def test_after_an_offset_of_nothing_the_tool_is_as_long_as_without_one() -> None:
-    """G43 H0 with an empty spindle, and G43.1 Z0, are used to end an offset; the tool that comes next has its length."""
+    """G43 H0 with an empty spindle, and G43.1 Z0, are used to end an offset; the next tool has its length."""
     for none in ("G49", "G43 H0", "G43.1 Z0"):
         moves = follow(f"{none}\nT1 M6\nG0 X1 Y1 Z1\nT3 M6\nG0 X2 Y2 Z2", tools={0: Tool(0.0), **TOOLS}).moves
         assert np.array_equal(moves.tool_length, [100, np.nan], equal_nan=True)
