@@ -57,8 +57,8 @@ CODES = {
     ),
     "NCF659": Code(
         "repeats deny the noise that is stated",
-        "Values taken at one state one after another scatter by more than twice the noise in the header, or by less than "
-        "half of it. The repeats are believed where there are enough; the header is wrong, or a unit is.",
+        "Values taken at one state one after another scatter by more than twice the noise in the header, or by less "
+        "than half of it. The repeats are believed where there are enough; the header is wrong, or a unit is.",
         "Correct the line `# noise_um:`, or the unit of the values.",
     ),
 }
