@@ -5,25 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.sinumerik.destination import End, Words
+from ncfix.program.rs274.coordinates import INDEX, LETTERS
+from ncfix.program.sinumerik.destination import End, Words, destination
 from ncfix.program.sinumerik.plans import Letting
 from ncfix.program.sinumerik.state import Sinumerik
-from ncfix.program.sinumerik.vocabulary import ASYNCHRONOUS, OF_THE_CONTROL, PROBING, UNSEEN
+from ncfix.program.sinumerik.vocabulary import ASYNCHRONOUS, MOTIONS, OF_THE_CONTROL, PROBING, UNFOLLOWED_MOTIONS, UNSEEN
 
 if TYPE_CHECKING:
     from ncfix.program.sinumerik.statements import Turn
 
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
+POLYNOMIAL, POLYNOMIALS = "po", UNFOLLOWED_MOTIONS[MOTIONS["poly"]]
 GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
-BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE
-"""What with an axis as index lets it move on its own, `POS[X]=100`."""
+BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE | {POLYNOMIAL}
+"""What with an axis as index lets it move on its own, `POS[X]=100`, or says where it goes, `PO[X]=(10,2)`."""
 
 
 def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
     """POS[X]=.. and its like: an axis that moves by itself; where it arrives is not followed."""
     name = step.index[0](control) if step.index else None
     known = isinstance(name, str) and name in INDEX and INDEX[name] in control.machine
+    if step.name == POLYNOMIAL:
+        follow_polynomial(control, turn, step, str(name) if known else None)
+        return
     gone = (INDEX[str(name)],) if known else () if isinstance(name, str) else control.machine
     if not gone:
         return
@@ -34,6 +38,17 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
         control.go(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why)
     else:
         control.refusal = control.refusal or f"{why} is not followed"
+
+
+def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str | None) -> None:
+    """PO[X]=(end, a2, a3): the axis ends where the first number says; without one, or for an angle, nobody knows."""
+    first = next(iter(step.listed), step.value)
+    value = first(control) if first is not None and letter is not None else None
+    letters = LETTERS if letter is None else letter
+    axes = [each for each in letters if INDEX[each] in control.machine]
+    ends: dict[str, float | None] = dict.fromkeys(axes, None if isinstance(value, str) else value)
+    words = Words(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
+    control.go(Kind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
 
 
 def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:

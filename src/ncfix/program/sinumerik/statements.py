@@ -15,7 +15,7 @@ from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates
-from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
 from ncfix.program.sinumerik.unit import Unit
 from ncfix.program.sinumerik.values import Evaluate, number
@@ -279,6 +279,8 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         motion.moved(control, words, frozenset(turn.special))
         if control.modes.modal_cycle is not None:
             drill(control, control.modes.modal_cycle)
+    elif "soft" in turn.special:
+        control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
 
 
 def is_circle(control: Sinumerik, words: Words) -> bool:

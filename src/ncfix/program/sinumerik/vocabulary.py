@@ -50,12 +50,12 @@ UNFOLLOWED_MOTIONS = {
 _HARMLESS = """
     msg stopre waitp waits waitm waitmc waite setal clralm setm clearm getd get release write read delete isfile mmc
     fnorm flin fcub fpo ffwon ffwof brisk soft drive briska softa drivea jerka sblof sblon displof displon
-    contpron contdcon stopfifo startfifo fifoctrl setint enable disable clrint liftfast alf lfon lfof walimon walimof
+    stopfifo startfifo fifoctrl setint enable disable clrint liftfast alf lfon lfof walimon walimof
     walcs0 walcs1 walcs2 walcs3 setms spcon spcof cdon cdof cdof2 dynnorm dynpos dynrough dynsemifin dynfinish dynprec
     compof compcurv compcad compon compsurf upath spath stamac rmi rmb rme rmn cfc cftcp cfin fgroup fgref
     cut2d cut2df cut3dc cut3df cut3dff cut3dfs kontc kontt normal gwpson gwpsof tmon tmof fpr fpraon fpraof newconf
     cancel group_begin group_end group_addend punchacc spof son sof pon pons soff pdelayon pdelayof spif1 spif2
-    coupdef coupdel coupon coupof couponc coupofs waitc ctabdef ctabend ctabdel resetmon tang adisposa
+    coupdef coupdel coupon coupof couponc coupofs waitc ctabend ctabdel resetmon tang adisposa
     protd protz proa cutconon cutconof rtlion rtliof delt getselt settcor delobj
     oric orid orirota orirotr orirott orirotc orison orisof oriaxpos
     drfof delayfston delayfstof fendnorm icycof icycon eauto enat etan bauto bnat btan prepro
@@ -101,6 +101,9 @@ UNFOLLOWED = {
     "egon": "an electronic gear (EGON)",
     "egonsyn": "an electronic gear (EGONSYN)",
     "tangon": "tangential control (TANGON)",
+    "ctabdef": "a curve table, whose motions are not made (CTABDEF)",
+    "contpron": "a table of a contour, whose motions are not made (CONTPRON)",
+    "contdcon": "a table of a contour, whose motions are not made (CONTDCON)",
     "execstring": "text that is executed as a block (EXECSTRING)",
     "corrtc": "a corrected tool carrier (CORRTC)",
     "ptp": "motion from point to point (PTP)",
