@@ -51,7 +51,8 @@ def test_what_may_be_corrected_is_known(machine: Machine) -> None:
         try:
             program = read(text_of(seed).encode(), "part.mpf", "siemens")
             kinematics = kinematics_of(machine)
-            moves = trace(program, SETUP, machine.axis_names, frozenset("AC"), None, 3000, kinematics).moves
+            setup = replace(SETUP, most_blocks=3000)
+            moves = trace(program, setup, machine.axis_names, frozenset("AC"), None, kinematics).moves
         except NcfixError:
             continue
         followed += 1
