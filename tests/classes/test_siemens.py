@@ -37,7 +37,9 @@ WORDS = [
     case("rounding at the corner", "G1 X5 RND=2 F100\nY20", L3=R, L4=R),
     case("a contour by an angle", "G1 X5 ANG=45 F100", L3=N),
     case("a positioning axis", "POS[X]=5\nG0 X7", L3=N, L4=R),
-    case("a soft approach to where the next block says", "G147 DISR=5\nG1 X5 Y5 F100\nG0 X7 Y7 Z7\nX8", L4=N, L5=R, L6=R),
+    case(
+        "a soft approach to where the next block says", "G147 DISR=5\nG1 X5 Y5 F100\nG0 X7 Y7 Z7\nX8", L4=N, L5=R, L6=R
+    ),
     case("a curve table", "CTABDEF(Y,X,1,0)\nX5 Y5\nCTABEND\nG0 X7", L4=N, L6=N),
     case("where a polynomial ends", "POLY PO[X]=(35,1,0.5) PO[Y]=(9) F100\nG1 X5\nX6 Y5", L3=N, L4=R, L5=R),
     case("a polynomial to nobody knows where", "POLY PO[X]=($AA_IW[Y],1) F100\nG1 Y5\nX6 Y5", L3=N, L4=N, L5=N),

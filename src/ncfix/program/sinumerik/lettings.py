@@ -9,7 +9,14 @@ from ncfix.program.rs274.coordinates import INDEX, LETTERS
 from ncfix.program.sinumerik.destination import End, Words, destination
 from ncfix.program.sinumerik.plans import Letting
 from ncfix.program.sinumerik.state import Sinumerik
-from ncfix.program.sinumerik.vocabulary import ASYNCHRONOUS, MOTIONS, OF_THE_CONTROL, PROBING, UNFOLLOWED_MOTIONS, UNSEEN
+from ncfix.program.sinumerik.vocabulary import (
+    ASYNCHRONOUS,
+    MOTIONS,
+    OF_THE_CONTROL,
+    PROBING,
+    UNFOLLOWED_MOTIONS,
+    UNSEEN,
+)
 
 if TYPE_CHECKING:
     from ncfix.program.sinumerik.statements import Turn
