@@ -64,6 +64,7 @@ class Scale:
     weights: dict[frozenset[Member], float] = field(default_factory=dict)
     sketches: dict[frozenset[Member], float] = field(default_factory=dict)
     asked: dict[frozenset[Member], Heard] = field(default_factory=dict)
+    allowed: dict[frozenset[Member], Array | None] = field(default_factory=dict)
 
     def weight(self, members: Members) -> float:
         """Log likelihood of the data with these members, less their prices."""
@@ -118,6 +119,12 @@ class Scale:
 
     def allowance(self, members: Members) -> Array | None:
         """What the named members would show besides if their shapes differed a little, in the coordinates, (n, k)."""
+        key = frozenset(members.values())
+        if key not in self.allowed:
+            self.allowed[key] = self._allowance(members)
+        return self.allowed[key]
+
+    def _allowance(self, members: Members) -> Array | None:
         court = self.court
         named = [each for name, each in members.items() if name in court.names and not court.constant(name)]
         if not named:
