@@ -33,6 +33,7 @@ ODD = {
     "a long code": ("odd.nc", f"G21\nG{LONG} X1\nM30\n", "NCF115"),
     "a long M code": ("odd.nc", f"G21\nM{LONG}\nM30\n", "NCF115"),
     "a type that is not there": ("odd.mpf", "N0x1 DEF REAL SAFE_Z=60\nM30\n", "NCF110"),
+    "functions nested without end": ("odd.mpf", f"R1={'ABS(' * 3000}1{')' * 3000}\nM30\n", "NCF118"),
     "a degree beyond all bounds": ("machine.toml", f'{MACHINE}basis = "polynomial"\ndegree = [{LONG}]\n', "NCF316"),
     "a number of thousands of digits": ("machine.toml", f"{MACHINE}center = {ENDLESS}\n", "NCF301"),
     "keys nested without end": ("machine.toml", f"{'.'.join('a' * 3000)} = 1\n", "NCF3"),

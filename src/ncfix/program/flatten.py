@@ -19,6 +19,7 @@ from ncfix.program.moves import Kind, Kinematics, Moves, Rule
 from ncfix.program.reader import read
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
+from ncfix.program.writer import line_end
 
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup
@@ -93,7 +94,7 @@ def flatten(
         if error.messages[0].code in (RUNTIME, TOO_LONG):
             raise RefusedError.collected(error.messages) from None
         raise
-    end = line_end(program.source)
+    end = line_end(program.source).decode()
     text = "".join(line.text + end for line in found).encode("latin-1")
     flat = read(text, program.path, program.dialect)
     before = trace(program, setup, axes, rotary, resolve, kinematics=kinematics).moves
@@ -120,9 +121,3 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     stands_in = (before.kind == Kind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
     other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])
     return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be another" if other.any() else ""
-
-
-def line_end(source: bytes) -> str:
-    """The line end that a text uses first."""
-    at = source.find(b"\n")
-    return "\r\n" if at > 0 and source[at - 1 : at] == b"\r" else "\n"

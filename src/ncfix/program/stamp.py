@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ncfix.program.tree import Comment, Flow, Opaque, Program, Tape, Word
-from ncfix.program.writer import Edit
+from ncfix.program.writer import Edit, line_end
 
 #: How every stamp begins; what follows it is for people.
 SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
@@ -39,7 +39,7 @@ def insertion(program: Program, text: str) -> Edit:
             before = block + 1
         elif not _is_blank(program, block):
             break
-    eol = b"\r\n" if b"\r\n" in program.source else b"\n"
+    eol = line_end(program.source)
     line = comment.encode("latin-1", "replace")
     if before == 0:
         start = int(program.blocks[0, 0])

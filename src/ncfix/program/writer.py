@@ -37,8 +37,10 @@ def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
 
 
 def line_end(source: bytes) -> bytes:
-    """The line end that a text uses first."""
+    """The line end that a text uses first; a carriage return alone only where there is no line feed."""
     at = source.find(b"\n")
+    if at < 0 and b"\r" in source.rstrip(b"\r"):
+        return b"\r"
     return b"\r\n" if at > 0 and source[at - 1 : at] == b"\r" else b"\n"
 
 

@@ -41,6 +41,11 @@ def unread(source: Program) -> list[int]:
     ]
 
 
+def test_what_is_nested_too_deep_is_not_read() -> None:
+    deep = 3000
+    assert unread(one(f"Q1 = {'( ' * deep}1{' )' * deep}\nQ2 = {'SQRT ' * deep}1\nL X+1")) == [2, 3]
+
+
 def test_every_file_of_the_corpus_is_read(shared: Callable[[str], Path], figures: Callable[[str], None]) -> None:
     files, blocks, odd = 0, 0, 0
     for path in sorted((shared("corpus") / "heidenhain").iterdir()):

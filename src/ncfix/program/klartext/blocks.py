@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from lark import Token, UnexpectedInput
 
-from ncfix.program.build import Branch, Builder, Node, Parsed, edges, kind, tokens_of
+from ncfix.program.build import MAX_DEPTH, Branch, Builder, Node, Parsed, TooDeepError, edges, kind, tokens_of
 from ncfix.program.dialect import Dialect
 from ncfix.program.grammar import Squeezed, parse
 from ncfix.program.klartext.plans import MOVING, owners
@@ -54,16 +54,16 @@ VALUES = frozenset({"literal", "parameter", "unary"})
 
 
 def parse_block(dialect: Dialect, text: str) -> Parsed:
-    """One block, by the grammar; what is not Klartext is opaque."""
+    """One block, by the grammar; what is not Klartext, or nested too deep, is opaque."""
     remark = WHOLE.match(text)
     if remark is not None:
         return remark_block(text, remark)
     code = BLANKED.sub(lambda found: found[0] if found[0][0] == '"' else " " * len(found[0]), text)
     try:
         tree = parse(dialect, code)
-    except UnexpectedInput:
+        return built(tree, text)
+    except (UnexpectedInput, TooDeepError):
         return unread_block()
-    return built(tree, text)
 
 
 def complaint(dialect: Dialect, text: str) -> int:
@@ -245,23 +245,26 @@ class Maker:
 
     # -- expressions --------------------------------------------------------------------------------------------------
 
-    def expression(self, node: Node) -> Expression:
+    def expression(self, node: Node, depth: int = 0) -> Expression:
         """The expression that a tree, or the terminal of a number, stands for."""
+        if depth > MAX_DEPTH:
+            raise TooDeepError(0)
         if isinstance(node, Token):
             return Literal(self.builder.slots[edges(node)])
         parts = node.children
         match kind(node):
             case "literal":
-                return self.expression(parts[0])
+                return self.expression(parts[0], depth)
             case "bracket":
-                return Unary("+", self.expression(parts[0]))
+                return Unary("+", self.expression(parts[0], depth + 1))
             case "parameter":
                 return NamedParameter(str(parts[0]).upper())
             case "unary":
-                return Unary(str(parts[0]).lower(), self.expression(parts[1]))
+                return Unary(str(parts[0]).lower(), self.expression(parts[1], depth + 1))
             case "binary":
                 left, operator, right = parts
-                return Binary(str(operator).lower(), self.expression(left), self.expression(right))
+                operands = self.expression(left, depth + 1), self.expression(right, depth + 1)
+                return Binary(str(operator).lower(), *operands)
             case "pi":
                 return Call("pi", ())
         raise AssertionError(f"the grammar has an expression {node.data!r} that nobody builds")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from ncfix.program.klartext.plans import FUNCTIONS, OPENING, owners
+from ncfix.program.klartext.poles import in_lines
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.tree import (
     Anchor,
@@ -223,4 +224,4 @@ def tilts(source: bytes) -> bool:
 @lru_cache(maxsize=4)
 def poles_move(source: bytes) -> bool:
     """Whether some pole counts from where the tool stands, and so moves with its correction."""
-    return RELATIVE_POLE.search(b"\n" + source) is not None
+    return RELATIVE_POLE.search(b"\n" + in_lines(source)) is not None

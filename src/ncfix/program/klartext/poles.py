@@ -33,6 +33,11 @@ LOOK = 80
 """Bytes of a line that tell what it is."""
 
 
+def in_lines(source: bytes) -> bytes:
+    """A text with a line feed for every carriage return, which may stand alone: every byte is where it was."""
+    return source.replace(b"\r", b"\n")
+
+
 def is_relied_on(source: bytes, after: int) -> bool:
     """Whether what follows a byte of the program may rely on the pole that is in force there."""
     places, relying = _events(source)
@@ -50,7 +55,7 @@ def relies_at_once(source: bytes) -> bool:
 def _events(source: bytes) -> tuple[list[int], list[bool]]:
     """Where a pole is set or something may rely on one, and which of the two it is."""
     places, relying = [], []
-    text = b"\n" + source
+    text = b"\n" + in_lines(source)
     for found in EVENT.finditer(text):
         line = text[found.start("what") : found.start("what") + LOOK]
         if CALCULATION.match(line) is None:
@@ -68,5 +73,5 @@ def pole_in_force(source: bytes, at: int) -> str | None:
 
 @lru_cache(maxsize=4)
 def _poles(source: bytes) -> tuple[list[int], list[str | None]]:
-    found = [(match.start(), match["words"]) for match in LINE.finditer(source)]
+    found = [(match.start(), match["words"]) for match in LINE.finditer(in_lines(source))]
     return [place for place, _ in found], [None if words is None else words.decode("latin-1") for _, words in found]

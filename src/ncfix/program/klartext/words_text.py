@@ -15,6 +15,7 @@ from ncfix.program.klartext.turns import UNCORRECTED, on_its_side
 from ncfix.program.number_text import ROUNDED
 from ncfix.program.target import Target
 from ncfix.program.tree import Literal, Program, Span, Word
+from ncfix.program.writer import line_end
 
 FloatArray = NDArray[np.float64]
 
@@ -187,7 +188,7 @@ class WordWriter(BlockWriter[Layout]):
         self.out.lines.append(self._prefix() + self.layout.blank.join(words))
 
     def _line_end(self) -> str:
-        return "\r\n" if b"\r\n" in self.program.source else "\n"
+        return line_end(self.program.source).decode()
 
     def _prefix(self) -> str:
         """What stands before the function: the block number, which inserted blocks repeat, and its blanks."""

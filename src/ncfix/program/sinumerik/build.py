@@ -122,9 +122,9 @@ class SinumerikBuilder(Builder):
             return Parameter(Constant(float(name[1:])))
         return NamedParameter(name.lower())
 
-    def array_element(self, name: str, index: Node) -> Parameter | Call:
+    def array_element(self, name: str, index: Node, depth: int = 0) -> Parameter | Call:
         """`R[..]`, or an element of another array."""
-        places = self.arguments(index)
+        places = self.arguments(index, depth)
         if name.upper() == "R" and len(places) == 1 and places[0] is not None:
             return Parameter(places[0])
         return Call(name.lower(), places, indexed=True)
@@ -204,10 +204,10 @@ class SinumerikBuilder(Builder):
 
     # -- expressions --------------------------------------------------------------------------------------------------
 
-    def arguments(self, node: Node) -> tuple[Expression | None, ...]:
+    def arguments(self, node: Node, depth: int = 0) -> tuple[Expression | None, ...]:
         """What stands between brackets; None where an argument is left out."""
         assert not isinstance(node, Token)
-        values = tuple(None if kind(part) == "omitted" else self.expression(part) for part in node.children)
+        values = tuple(None if kind(part) == "omitted" else self.expression(part, depth) for part in node.children)
         return () if values == (None,) else values
 
     def compound(self, tree: Branch, depth: int) -> Expression:
@@ -232,11 +232,11 @@ class SinumerikBuilder(Builder):
             case "name":
                 return NamedParameter(str(first).lower())
             case "element":
-                return self.array_element(str(first), parts[1])
+                return self.array_element(str(first), parts[1], depth)
             case "call":
-                return Call(str(first).lower(), self.arguments(parts[1]))
+                return Call(str(first).lower(), self.arguments(parts[1], depth))
             case "list":
-                return Call(BRACKET, self.arguments(tree))
+                return Call(BRACKET, self.arguments(tree, depth))
             case "unary":
                 return Unary(str(first).lower(), self.expression(parts[1], depth))
             case "binary":
