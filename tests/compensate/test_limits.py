@@ -128,6 +128,15 @@ def test_outside_the_calibrated_range_is_told_once_and_not_as_over_travel() -> N
     assert found(machine, moves, corrected(machine, moves)) == {"NCF405": [0]}
 
 
+def test_what_comes_back_in_several_blocks_is_not_put_down_to_the_correction() -> None:
+    """The bent guideway of Y splits the way back; its first blocks end where X is beyond the travel as programmed."""
+    machine = perfect("w F X Y Z t").replace(effects=(Effect("EZY", (0.05 / STROKE**2,), Polynomial((2,))),))
+    moves = motions(machine, (0, -STROKE, 0), [(1.5 * STROKE, -STROKE, 0), (-STROKE, STROKE, 0)])
+    result = corrected(machine, moves)
+    assert (result.pieces.end[result.pieces.move == 1][:-1, 0] > STROKE).any()
+    assert found(machine, moves, result) == {"NCF405": [0, 1]}
+
+
 @pytest.mark.parametrize(("size", "refused"), [(0.499, False), (0.5, False), (0.501, True), (5.0, True)])
 def test_a_correction_above_the_machines_limit_is_refused_never_cut_short(size: float, refused: bool) -> None:
     machine = shifted(size)

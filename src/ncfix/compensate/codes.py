@@ -32,7 +32,7 @@ CODES = {
     "NCF405": Code(
         "the pose is outside the calibrated range",
         "The errors are known within the `range` of each axis; beyond it the last value would be held, which is a "
-        "guess.",
+        "guess. The program itself goes there, or comes back from there in blocks of which one ends there.",
         "Calibrate the machine over the range that is used, or correct the `range` in the machine file.",
     ),
     "NCF406": Code(

@@ -44,8 +44,7 @@ def findings(
     written = Written(Intent(machine, moves, state or State()), pieces, moves.start if start is None else start)
     found = [
         not_a_number(written),
-        outside_calibrated(written),
-        over_travel(written),
+        *beyond_ranges(written),
         too_large(written),
         too_fast(written),
     ]
@@ -61,19 +60,19 @@ def not_a_number(written: Written) -> Finding:
     return Finding("NCF408", rows, np.zeros(len(rows)), "the corrected position is not a finite number")
 
 
-def outside_calibrated(written: Written) -> Finding:
-    """NCF405: motions that leave the range of an axis as they are programmed."""
-    text = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
-    return _of_axes(written, "NCF405", text, programmed_excess(written))
+def beyond_ranges(written: Written) -> tuple[Finding, Finding]:
+    """NCF405: motions that leave the range of an axis as programmed, or come back from beyond it in several blocks.
 
-
-def over_travel(written: Written) -> Finding:
-    """NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected.
-
-    On the limit is within.
+    NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected. On the limit
+    is within.
     """
-    text = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
-    return _of_axes(written, "NCF404", text, _correction_excess(written))
+    programmed, corrected = programmed_excess(written), _corrected_excess(written)
+    if (corrected > FUZZ).any():
+        programmed = np.maximum(programmed, _begun_beyond(written, corrected))
+        corrected[programmed > FUZZ] = -np.inf
+    outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
+    over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
+    return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)
 
 
 def led_astray(machine: Machine, moves: Moves, pieces: Pieces, start: Array, state: State) -> Index:
@@ -83,12 +82,23 @@ def led_astray(machine: Machine, moves: Moves, pieces: Pieces, start: Array, sta
         return rows[:0]
     kept = np.zeros(len(moves), dtype=bool)
     kept[pieces.move] = pieces.kept
-    beyond = _correction_excess(Written(Intent(machine, moves, state), pieces, start))
+    written = Written(Intent(machine, moves, state), pieces, start)
+    beyond = _corrected_excess(written)
+    if (beyond > FUZZ).any():
+        beyond[programmed_excess(written) > FUZZ] = -np.inf
     return rows[kept[rows] & (beyond[rows] > FUZZ).any(axis=1)]
 
 
-def _correction_excess(written: Written) -> Array:
-    """As `excess`, of the corrected program, (n, n_axes); negative, too, where the program itself goes beyond."""
+def _begun_beyond(written: Written, corrected: Array) -> Array:
+    """(n, n_axes) how far motions begin beyond ranges, where a block of theirs ends there; -inf elsewhere."""
+    each = np.flatnonzero((corrected > FUZZ).any(axis=1))
+    begun = np.full(corrected.shape, -np.inf)
+    begun[each] = _beyond(written.intent.machine, written.intent.joints_at(each, np.zeros(len(each))))
+    return np.where(corrected > FUZZ, begun, -np.inf)
+
+
+def _corrected_excess(written: Written) -> Array:
+    """As `excess`, of the corrected program, (n, n_axes)."""
     pieces = written.pieces
     each = np.arange(len(pieces))
     curved = written.intent.moves.tcp[pieces.move]
@@ -100,7 +110,6 @@ def _correction_excess(written: Written) -> Array:
     beyond = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
     if (found > FUZZ).any():
         np.maximum.at(beyond, pieces.move, found)
-        beyond[programmed_excess(written) > FUZZ] = -np.inf
     return beyond
 
 
