@@ -11,7 +11,7 @@ from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import offsets, owners, places, sums
-from ncfix.compensate.rows import picked
+from ncfix.compensate.rows import lengths, picked
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
 
@@ -96,7 +96,7 @@ def _shares(pieces: Pieces, real: Segments, counts: Index) -> Array:
     start = np.empty_like(pieces.end)
     start[1:] = pieces.end[:-1]
     start[first] = real.start
-    way = np.linalg.norm(pieces.end - start, axis=1)
+    way = lengths(pieces.end - start)
     whole = np.repeat(sums(way, counts), counts)
     share = np.where(jumps, np.maximum(way / np.maximum(whole, 1e-300), LEAST_SHARE), span)
     result: Array = share / np.repeat(sums(share, counts), counts)

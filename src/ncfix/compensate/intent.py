@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ncfix.compensate.direction import Signs, carried, matters, signs
+from ncfix.compensate.direction import REST, Signs, carried, matters, signs
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import (
     commands_from_joints,
@@ -76,8 +76,9 @@ class Intent:
     @cached_property
     def moving(self) -> Mask:
         """Motions that are to move anything, (n,); others only take up what the machine is off where they begin."""
-        way = some(signs(self.moves.end - self.moves.start) != 0)
-        return np.asarray(way | (self.moves.kind == Kind.ARC), dtype=bool)
+        way = np.abs(self.moves.end - self.moves.start)
+        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind == Kind.ARC)
+        return moving
 
     @cached_property
     def wordless(self) -> Mask | None:

@@ -178,8 +178,9 @@ def _highest(function: Callable[[Array], Array], low: Array, high: Array) -> Arr
 
 def _beyond(machine: Machine, q: Array) -> Array:
     """How far beyond the nearer end of its range each axis is, negative if within; -inf where there is no range."""
-    low, high = machine.ranges.T
-    result: Array = np.maximum(low - q, q - high)
+    result = np.empty_like(q)
+    for axis, (low, high) in enumerate(machine.ranges.tolist()):
+        np.maximum(low - q[:, axis], q[:, axis] - high, out=result[:, axis])
     return result
 
 

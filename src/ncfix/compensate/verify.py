@@ -17,9 +17,9 @@ from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
-from ncfix.compensate.ragged import batches, owners
+from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked
-from ncfix.compensate.sampling import MOST, bends, even, merged, passed
+from ncfix.compensate.sampling import MOST, bends, merged, passed
 from ncfix.compensate.steer import rows_of
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.compensate.written import Written
@@ -166,13 +166,14 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
 
 def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: Mask) -> tuple[Index, Array]:
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
-    each, inner = np.arange(len(which)), even(counts)
-    lists = [(owners(counts), inner), (each, np.ones(len(which)))]
+    many = counts + 1
+    fraction = (places(many) + 1) / np.repeat(many, many)
     begun = np.flatnonzero(_begins_uneasily(written, which, uneasy) & along)
-    lists.append((begun, np.full(len(begun), START)))
+    extra = [(begun, np.full(len(begun), START))]
     if written.intent.kinks:
-        lists.append(_passed(written, which, along))
-    many, fraction = merged(len(which), *lists)
+        extra.append(_passed(written, which, along))
+    if any(len(each) for each, _ in extra):
+        many, fraction = merged(len(which), (owners(many), fraction), *extra)
     return which[owners(many)], fraction
 
 
