@@ -24,8 +24,8 @@ STRAY = 1.0
 STRAYS = 10.0
 TURN = 1.0
 """rad; a corrected arc turns by what it did but for little, or else by a full turn more or less."""
-ATTEMPTS = 4
-"""A second attempt knows the frames that moved with the first; the others are for frames that depend on frames."""
+ATTEMPTS = 16
+"""The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
 
 Follow = Callable[[Program], Trace]
 
