@@ -144,6 +144,7 @@ FLOW = [
     case("a subprogram that only the control knows", "L=R5\nG0 X1 Y1 Z1", L4=N),
     case("a modal pocket", "MCALL POCKET3(50,0,2,-20)\nX5 Y5\nMCALL\nG1 X7 F100\nG0 X1 Y1 Z1", L4=N, L6=N, L7=R),
     case("a row of holes", "HOLES1(0,0,0,10,10,5)\nG0 X5 Y5 Z5", L3=N, L4=R),
+    case("holes on a circle", "MCALL CYCLE81(50,0,2,-5)\nHOLES2(0,0,9,0,0,5)\nMCALL\nG0 X5 Y5 Z5", L3=P, L4=N, L6=R),
     case("a synchronized action", "WHEN TRUE DO $A_OUT[1]=1\nG1 X5 F100\nID=1 DO POS[X]=5\nX7", L4=R, L6=N),
 ]
 

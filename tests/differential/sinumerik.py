@@ -60,7 +60,7 @@ class Control(Standing):
 
     def block(self, body: str) -> None:
         """One block."""
-        if found := re.fullmatch(r"(MCALL\s*)?(CYCLE\d+)?\s*(\(.*\))?", body):
+        if found := re.fullmatch(r"(MCALL\s*)?((?:CYCLE|HOLES)\d+)?\s*(\(.*\))?", body):
             self.cycle(found[1], found[2], found[3])
             return
         codes, words, names = [], {}, []
@@ -157,8 +157,31 @@ class Control(Standing):
             self.modes["drill"] = values[0], values[3]
         elif name == "CYCLE81":
             self.drill(values[0], values[3])
+        elif name in ("HOLES1", "HOLES2"):
+            self.holes(name, values)
         else:
             raise NotImplementedError(name)
+
+    def holes(self, name: str, values: list[float]) -> None:
+        """A row, from its nearer end, or a circle, whose holes are turned about its centre one after the other."""
+        one, two, angle, *rest = (np.array(value) for value in values)
+        first, second, _ = PLANES[self.modes["plane"]]
+        if name == "HOLES1":
+            (off, step, count), along = rest, about(2, angle)[:2, 0]
+            places = [np.array([one, two]) + along * (off + n * step) for n in range(int(count))]
+            here = self.frame.back(self.base)[[first, second]] / self.modes["unit"]
+            nearer = np.linalg.norm(here - places[-1]) < np.linalg.norm(here - places[0])
+            places = places[::-1] if nearer else places
+        else:
+            radius, (start, step, count) = angle, rest
+            turn = about(2, step if step else 360.0 / count)[:2, :2]
+            arm, places = radius * about(2, start)[:2, 0], []
+            for _ in range(int(count)):
+                places.append(np.array([one, two]) + arm)
+                arm = turn @ arm
+        for place in places:
+            self.move({"XYZ"[index]: value for index, value in zip((first, second), place, strict=True)}, False)
+            self.drill(*self.modes["drill"])
 
     def drill(self, clear: float, depth: float) -> None:
         """Down and up."""

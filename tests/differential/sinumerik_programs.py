@@ -258,6 +258,27 @@ class Author:
         self.lines.append("G91" if self.incremental else "G90")
 
 
+def patterned(seed: int) -> str:
+    """A program with rows and circles of holes, in frames and planes of all kinds."""
+    author = Author(seed)
+    number, chance = author.number, author.chance
+    for _ in range(4):
+        author.incremental = False
+        author.lines += [
+            "G90",
+            chance.choice(("TRANS", f"ROT RPL={number(-60, 60)}", "MIRROR X0", "SCALE X0.8 Y0.8 Z0.8")),
+        ]
+        author.lines += ["G0 X=AC(3) Y=AC(-4) Z=AC(40)", "MCALL CYCLE81(35,5,2,-4)"]
+        for _ in range(chance.randint(1, 3)):
+            count = chance.randint(1, 5)
+            row = f"HOLES1({number(-9, 9)},{number(-9, 9)},{number(-180, 180)},{number(0, 5)},{number(2, 6)},{count})"
+            step = chance.choice(("0", number(10, 60), number(-60, -10)))
+            circle = f"HOLES2({number(-9, 9)},{number(-9, 9)},{number(4, 20)},{number(-180, 180)},{step},{count})"
+            author.lines.append(chance.choice((row, circle)))
+        author.lines += ["X=AC(5) Y=AC(6)", "MCALL", "G1 X=AC(8) Y=AC(-2)"]
+    return "\n".join([*author.lines, "G0 Z60", "M30"]) + "\n"
+
+
 def looped(seed: int) -> str:
     """A program with two loops, in which frames, ends and values change from turn to turn."""
     author = Author(seed)

@@ -16,7 +16,7 @@ import pytest
 from differential import errors, sinumerik
 from differential.sinumerik_frames import Floats
 from differential.sinumerik_motions import Path as Way
-from differential.sinumerik_programs import Author, looped
+from differential.sinumerik_programs import Author, looped, patterned
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.machine import load
@@ -115,6 +115,25 @@ def test_flat_programs_do_what_was_meant(root: Path, figures: Callable[[str], No
     figures(
         f"siemens judged, --flatten: {lines} motions, worst end {ends * 1e3:.3f} um, on the way {ways * 1e3:.3f} um"
     )
+
+
+def test_patterns_of_holes_are_written_out(root: Path, figures: Callable[[str], None]) -> None:
+    """Every place of every pattern, in its order; one block leads to all places of its pattern."""
+    model, worst, places = errors.load(root / MACHINE), 0.0, 0
+    for seed in range(PROGRAMS // 2):
+        text = sinumerik.marked(patterned(seed))
+        program = read(text.encode(), "part.mpf", "siemens")
+        fixed = fix_flat(program, load(str(root / MACHINE)), SETUP, FixOptions(verify=False, flatten=True))
+        assert not fixed.report.refused
+        meant, done = (by_mark(model, each, actual=n == 1) for n, each in enumerate((text, fixed.text.decode())))
+        for mark, (ways, tips) in meant.items():
+            if "HOLES" not in text.splitlines()[ways[0].line - 1]:
+                continue
+            last = np.cumsum([len(way.q) for way in ways]) - 1
+            off = np.linalg.norm(tips[last] - done[mark][1][last], axis=1)
+            worst, places = max(worst, float(off.max())), places + len(off)
+    assert worst < AT_ENDS
+    figures(f"siemens judged, patterns, --flatten: {places} places of holes, worst {worst * 1e3:.3f} um")
 
 
 def test_the_judge_tells_what_is_wrong(root: Path) -> None:

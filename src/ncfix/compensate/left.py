@@ -63,7 +63,7 @@ class Left:
         far = f"{np.degrees(self.most):.4g} degrees" if self.rotary else f"{self.most * 1e3:.2f} um"
         text = (
             f"{self.axis} is left where it stands in {many}, up to {far} beside where it should be: "
-            "the program has not said where it is, or the control offsets the contour there"
+            "the program has not said where it is, or the control offsets or rounds the contour there"
         )
         return Message("NCF439", text, Place(path, self.first), HINT if self.cuts else "")
 

@@ -1,8 +1,14 @@
-"""Motions that make no way in the plane while the control offsets the contour (cutter radius compensation).
+"""What may not move beside a contour that the control changes by itself.
+
+Motions that make no way in the plane while the control offsets the contour (cutter radius compensation).
 
 The least way in the plane would be offset by the radius, in whatever direction it leads. So a motion that makes none
 must make none when it is corrected: axes of the plane that it does not name get no word, and those that it names, as
 `X40` where X stands at 40, stay where they stand.
+
+Motions that meet at a corner which the control rounds or breaks: it puts in nothing where a motion leaves the plane, so
+that one which does not must not when it is corrected.
+Source: Siemens, "SINUMERIK 840D sl, NC programming, fundamentals": chamfer, rounding (CHF, CHR, RND, RNDM).
 """
 
 from __future__ import annotations
@@ -29,15 +35,21 @@ def plane_of(control: Control) -> int:
     return mask_of((control.modal.plane.first, control.modal.plane.second)) & mask_of(control.machine)
 
 
-def resting(control: Control, axes: int, target: Vector, unknown: Unknown) -> int:
-    """The axes of the plane if a straight motion to a command names some of them (`axes`) without any way in it."""
-    plane = plane_of(control) if control.modal.compensated else 0
-    if not axes & plane or any((plane >> index) & 1 for index in (*unknown, *control.unknown)):
+def resting(control: Control, axes: int, target: Vector, unknown: Unknown, *, straight: bool) -> int:
+    """Axes that must stay where they stand in a motion to a command with words for `axes`.
+
+    Those of the plane, if it names some of them without any way in it; at a corner all others that make no way.
+    """
+    plane = plane_of(control)
+    beside = straight and bool(control.modal.compensated and axes & plane)
+    if not (beside or control.at_corner):
         return 0
     way = [there - here for there, here in zip(target, control.position, strict=True)]
     way = rotated(control.inverse, way) if control.is_rotated else way
-    moved = any(abs(way[index]) > NO_WAY for index in (control.modal.plane.first, control.modal.plane.second))
-    return 0 if moved else plane
+    lacking = {*unknown, *control.unknown}
+    still = mask_of(index for index in control.machine if abs(way[index]) <= NO_WAY and index not in lacking)
+    across = still & ~plane if control.at_corner else 0
+    return across | (plane if beside and plane & ~still == 0 else 0)
 
 
 def resting_of_many(control: Control, mask: IntArray, starts: FloatArray, ends: FloatArray) -> IntArray:

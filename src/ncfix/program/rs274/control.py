@@ -86,6 +86,7 @@ class Control:
     left_out   the block just followed has no place in a flat program
     unwritten  why a flat program cannot say what the program means; empty if it can
     whole      the motions of the block must not be split, as under cutter compensation
+    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     saved      the modal states that M70 saved, one place for each call level
     places     which axes the program itself has brought to where they stand
@@ -123,7 +124,7 @@ class Control:
         self.tilted = False
         self.tip_control = False
         self.unnamed: frozenset[int] = frozenset()
-        self.whole = False
+        self.whole = self.at_corner = False
         self.beside = 0
         self.left_out = False
         self.unwritten = ""
@@ -287,8 +288,8 @@ class Control:
         self.whole, self.beside = whole, self.beside & ~axes
         if arc is not None:
             self.builder.arc(arc)
-        elif not passing and kind != Kind.DWELL:
-            self.builder.rests(contour.resting(self, axes, target, unknown))
+        if not passing and kind != Kind.DWELL:
+            self.builder.rests(contour.resting(self, axes, target, unknown, straight=arc is None))
         start, end = self.position, target
         if self.unknown:
             start = blanked(start, self.unknown)

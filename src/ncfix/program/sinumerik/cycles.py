@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.destination import End, Words, command
+from ncfix.program.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
 from ncfix.program.sinumerik.plans import Calling
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.values import number
@@ -59,6 +60,9 @@ def cycle(control: Sinumerik, block: int, step: Calling, *, modal: bool) -> None
         if modal:
             control.suspended["cycle"] = f"the modal cycle {name} is in force, which ncfix does not follow"
             return
+        if points := points_of(control, step):
+            pattern(control, block, name, points)
+            return
         holes = step.name.startswith(("holes", "cycle80"))
         refuse(control, block, (MADE_HOLES if holes else MADE).format(name))
         if MEASURING.fullmatch(step.name):
@@ -69,6 +73,18 @@ def cycle(control: Sinumerik, block: int, step: Calling, *, modal: bool) -> None
         control.modes.modal_cycle = drilling
     else:
         drill(control, drilling)
+
+
+def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
+    """The modal cycle at each place of a pattern; behind it nobody knows for certain at which the axes stand."""
+    drilling, plane = control.modes.modal_cycle, control.modal.plane
+    assert drilling is not None
+    control.pattern = points
+    for point in points:
+        lead_to(control, block, point, name)
+        drill(control, drilling)
+    control.lost = dict(control.lost) | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
+    control.unknown = control.unknown_for(control.lost)
 
 
 def drill(control: Sinumerik, drilling: Drilling) -> None:

@@ -158,6 +158,8 @@ class Interpreter:
         control = self.control
         if self.recorder is not None or (control.modal.incremental and control.counted != control.footing):
             return False
+        if control.cornered or control.modes.rounds:
+            return False
         busy = control.at_start or control.modes.carried or control.modes.modal_cycle or self.course.sections
         return not (busy or control.lost or control.over or control.modes.diameter == "DIAM90" or leads_along(control))
 

@@ -21,9 +21,6 @@ from ncfix.program.sinumerik.poles import has_partial
 from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS, POLAR
 from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Skip, Tape, Word
 
-AFTER_MOTION = frozenset({"RND", "CHF", "CHR"})
-"""Words that belong to the corner at the end of the block."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SinumerikLayout(Layout):
@@ -109,4 +106,4 @@ def named_motion(program: Program, block: int) -> Word | None:
 
 def acts_later(program: Program, block: int, word: Word) -> bool:
     """Whether a word acts at the end of the motion."""
-    return word.address in AFTER_MOTION or _code(program, block, word, "M") in CODES_AFTER_MOTION | {17.0}
+    return _code(program, block, word, "M") in CODES_AFTER_MOTION | {17.0}

@@ -53,6 +53,7 @@ class Modes:
     modal_cycle  what MCALL calls after each block with a motion
     orientation  ORIAXES, ORIVECT or another way in which the tool turns, lower case
     orientation_in_machine  ORIMKS
+    rounds       RNDM rounds all corners
     angles       ORIEULER, ORIRPY or ORIRPY2, lower case: what A2 B2 C2 are
     """
 
@@ -66,6 +67,7 @@ class Modes:
     modal_cycle: Drilling | None = None
     orientation: str = ""
     orientation_in_machine: bool = False
+    rounds: bool = False
     angles: str = ""
 
 

@@ -20,7 +20,8 @@ AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is 
 APPROACH = frozenset({1400, 1410, 1420, 1430, 1470, 1480, 2470, 2480, 3400, 3410, 3470, 3480})
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
 AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
-NO_MOTION = -1
+CORNERS = frozenset({"RND", "CHF", "CHR"})
+"""Words with which the control rounds or breaks the corner at the end of the block."""
 
 CIP, CT, POLY = MOTIONS["cip"], MOTIONS["ct"], MOTIONS["poly"]
 
@@ -36,6 +37,9 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
         mind_carried(control)
     timed = control.modal.feed_mode == 93 and "F" not in words.values
     words.whole = timed or words.block in control.solitary or control.modes.modal_cycle is not None
+    corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
+    control.at_corner = not machine and (corner or control.cornered)
+    words.whole |= control.at_corner
     oriented(control, words)
     if machine:
         to_machine_position(control, words, machine.upper())
@@ -54,6 +58,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     else:
         straight(control, words, 10 if code not in (0, 10) else code)
     control.wrap()
+    control.cornered, control.at_corner = corner, False
 
 
 def straight(control: Sinumerik, words: Words, code: int) -> None:

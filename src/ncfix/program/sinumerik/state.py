@@ -59,6 +59,8 @@ class Sinumerik(Control):
     edge  cutting edge in force (D), 0 for none
     at_start  the tool is still that with which the program began, with its edge D1
     whole  the motion must not be split
+    cornered  the last motion ended at a corner that the control rounds or breaks
+    pattern  the places to which the last pattern of holes has led
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     points  a block gave the direction of the tool as a vector
     fresh_tool  a tool has been called since the last motion
@@ -83,8 +85,9 @@ class Sinumerik(Control):
         self.at_start = True
         self.fresh_tool = self.changed_by_cycle = False
         self.points = False
+        self.pattern: tuple[tuple[float, float], ...] = ()
         self.heading: Sequence[float] | None = None
-        self.whole = False
+        self.whole = self.cornered = False
         self.solitary: frozenset[int] = frozenset()
         self.variables = Variables.given(setup.variables)
         self.named = Named()

@@ -269,6 +269,8 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         return
     framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
     feed(control, turn)
+    if "RNDM" in words.values:
+        control.modes.rounds = words.values["RNDM"] != 0.0
     if motion.REFERENCE.keys().isdisjoint(plan.g):
         strangers(control, words)
     if "MEAS" in words.values or "MEAW" in words.values:

@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
 from ncfix.program.number_style import decimals_for
+from ncfix.program.rs274.coordinates import LETTERS
 from ncfix.program.rs274.faults import Fault
+from ncfix.program.sinumerik.patterns import PATTERNS
 from ncfix.program.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
 from ncfix.program.sinumerik.render import FORM
 from ncfix.program.sinumerik.state import Sinumerik
@@ -81,6 +83,8 @@ class Recorder:
         text = text.strip()
         if text.split(";")[0].strip() or (main and text):
             self.lines.append(FlatLine(text, line))
+        self.lines += [FlatLine(self.place(scope, point), line) for point in scope.pattern[1:]]
+        scope.pattern = ()
 
     def rewritten(self, scope: Sinumerik, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
         """The stretch of an item that changes and what it becomes (None: a number); None where the item stays."""
@@ -145,10 +149,19 @@ class Recorder:
         found = FORM.match(text) if isinstance(item.value, Call) and item.value.name in FORMS else None
         return shown if found is None else text[: found.start("value")] + shown + text[found.end("value") :]
 
+    def place(self, scope: Sinumerik, point: tuple[float, float]) -> str:
+        """The rapid to a place of a pattern of holes."""
+        letters = [LETTERS[index] for index in (scope.modal.plane.first, scope.modal.plane.second)]
+        digits = [decimals_for(self.steps[letter]) + MORE_DECIMALS for letter in letters]
+        words = zip(letters, point, digits, strict=True)
+        return " ".join(["G0", *(f"{letter}{written(value, places)}" for letter, value, places in words)])
+
     def command(self, scope: Sinumerik, command: Command, turn: Turn) -> tuple[Span, str | None] | None:
         """What becomes of a name."""
         if command.name in ("def", "ret") or (turn.called is not None and turn.called.span == command.span):
             return command.span, ""
+        if command.name in PATTERNS and scope.pattern:
+            return command.span, self.place(scope, scope.pattern[0])
         if all(part is None or is_plain(part) for part in command.arguments):
             return None
         step = next(step for step in turn.plan.steps if isinstance(step, Calling) and step.span == command.span)
