@@ -242,6 +242,7 @@ def test_the_point_of_each_word_is_kept(text: str, no_point: str, expected: str)
         ("G0G18G16Z10.X90.\nG15X1.", [[10, 0, 0], [1, 0, 0]]),
         ("G40.1G50.2\nG5.4Q1\nG54.4P0\nG54.2P0\nG0X1.", [[1, 0, 0]]),
         ("G5.1Q1\nG8P1\nG0X1.\nG5.1Q0", [[1, 0, 0]]),
+        ("G0X1.Y2.Z3.\nG5.1Q2X0Y0Z0\nX4.\nG5.1Q0", [[1, 2, 3], [4, 2, 3]]),
     ],
 )
 def test_codes(text: str, expected: list[list[float]]) -> None:

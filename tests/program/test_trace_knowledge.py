@@ -207,6 +207,23 @@ def test_coordinates_that_are_not_followed_are_refused_until_they_end(on: str, o
     assert np.isnan(followed.moves.start[2]).all()
 
 
+@pytest.mark.parametrize("word", ["G10 L2 P0 X5", "G10 L2 X5", "G91 G10 L2 P1 X5"])
+def test_offsets_that_controls_set_in_different_ways_are_refused(word: str) -> None:
+    assert "G10 L2 sets differs from control to control" in reasons(follow(f"{word}\nG90 G0 X1", dialect="iso"))[-1]
+
+
+@pytest.mark.parametrize("word", ["G5 X5 Y5 I1 J1 P1 Q1", "G5.1 X5 Y5 I1 J1"])
+def test_splines_are_no_smoothing(word: str) -> None:
+    followed = follow(f"G1 X1 F1\n{word}\nG0 X3 Y3 Z3", dialect="iso")
+    assert rules(followed) == [Rule.CORRECT, Rule.REFUSE, Rule.REFUSE]
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas", "mitsubishi"])
+def test_smoothing_names_axes_and_moves_none(dialect: str) -> None:
+    followed = follow("G0 X1. Y2. Z3.\nG05.1 Q3 X0 Y0 Z0\nG0 X4.\nG5.1 Q0", dialect=dialect)
+    assert ends(followed) == [[1, 2, 3], [4, 2, 3]]
+
+
 def test_skip_signals_are_probing() -> None:
     assert reasons(follow("G31 Z-5 F1\nG0 Z1", dialect="iso")) == ["probing", ""]
 

@@ -141,6 +141,13 @@ def test_frames(body: str, end: list[float]) -> None:
     assert ends(body) == [end]
 
 
+@pytest.mark.parametrize(
+    "words", ["DWELL TIME10", "DWELL REV5.8", "AFC CTRL", "AFC CUT BEGIN TIME3 LOAD80", "AFC CUT END"]
+)
+def test_functions_that_only_wait_or_mind_the_feed_are_passed_over(words: str) -> None:
+    assert reasons(f"FUNCTION {words}\nL X+1 Y+1 Z+1") == []
+
+
 def test_a_tool_that_is_called_by_name_is_asked_for_as_one_by_number_is() -> None:
     called = 'TOOL CALL "Drill" Z\nL X+1'
     with pytest.raises(UsageError) as caught:
@@ -184,6 +191,8 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("CC X+0 Y+0\nL X+10 Y+0 F1\nC X+0 Y+10.1 DR+", "does not close"),
         ("FUNCTION TCPM F TCP AXIS SPAT PATHCTRL AXIS\nL X+1", "spatial angles"),
         ("M114\nL X+1", "M114"),
+        ("M104\nL X+1", "the datum that was set last"),
+        ("CYCL DEF 291 COUPLG.TURNG.INTERP. Q560=1\nL X+1", "cycle 291 may change coordinates"),
         ("TRANS ROTATION ABOUT+5\nL X+1", "TRANS ROTATION"),
     ],
 )

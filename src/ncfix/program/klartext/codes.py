@@ -13,6 +13,7 @@ from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words
 
 SUSPENDING = {
+    104: "M104: the datum that was set last comes back into force",
     114: "M114: the control works the geometry of the machine into positions",
     144: "M144: the control works the geometry of the machine into positions",
 }

@@ -105,9 +105,13 @@ def length_of(control: Control, number: int) -> float:
 
 
 def set_data(control: Control, block: Block, code: int) -> None:
-    """G10: L2 and L20 set a coordinate system, L1, L10 and L11 a tool."""
+    """G10: L2 and L20 set a coordinate system, L1, L10 and L11 a tool.
+
+    Where controls differ: P0 is the system in force or the external one, and in G91 words are set or added.
+    """
     kind = whole(block.get("L", -1.0), "L of G10")
-    if not control.rules.strict and (kind != 2 or "R" in block.values):
+    alike = kind == 2 and "R" not in block.values and block.get("P") != 0.0 and not control.modal.incremental
+    if not control.rules.strict and not alike:
         control.refusal = control.refusal or DIFFERS.format(kind)
     elif kind in (2, 20):
         set_system(control, block, at_position=kind == 20)

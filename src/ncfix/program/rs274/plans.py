@@ -35,6 +35,8 @@ NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
 POLAR = frozenset("@^")
+SMOOTHING = 51
+"""G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
 """Addresses that together stand for X and Y."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
@@ -196,10 +198,11 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
     """The codes of a block by group; raises `Fault` where two exclude one another or one is not known."""
     g: dict[str, int] = {}
     m: dict[str, int] = {}
-    unknown = []
+    unknown, named = [], False
     for word, code in pairs:
         if word.address == "G":
-            if code in rules.harmless_g:
+            named |= code == SMOOTHING and "Q" in letters
+            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):
                 continue
             if code not in rules.g_groups:
                 unknown.append(code)
@@ -219,9 +222,14 @@ def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], ru
         g.get(groups.MOTION),
         m.get(groups.STOP),
         m.get(groups.CALL),
-        bool((AXES_TAKEN | rules.takes) & set(g.values())),
+        named or bool((AXES_TAKEN | rules.takes) & set(g.values())),
         tuple(unknown),
     )
+
+
+def is_spline(letters: frozenset[str]) -> bool:
+    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end."""
+    return not letters.isdisjoint("IJ") and not letters.isdisjoint(INDEX)
 
 
 def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:
