@@ -17,7 +17,7 @@ from ncfix.program import dialects
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
-from ncfix.program.tree import Opaque
+from ncfix.program.tree import Opaque, Word
 from program.lanes import assert_read_right
 from program.tracing import KNOWN, ends, follow, last, reasons
 
@@ -106,6 +106,20 @@ def test_numbers_with_and_without_a_point_have_templates_of_their_own() -> None:
 )
 def test_detection(source: bytes, expected: str) -> None:
     assert dialects.detect(source, "part.nc").name == expected
+
+
+def test_a_word_e_may_stand_close_to_the_one_before() -> None:
+    words = read(b"G187P3E.01\n", dialect="haas").items_of(0)
+    assert [word.address for word in words if isinstance(word, Word)] == ["G", "P", "E"]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "reason"), [("fanuc", "names no axis"), ("mitsubishi", "names no axis"), ("haas", "")]
+)
+def test_a_reference_point_for_no_axis_or_for_all(dialect: str, reason: str) -> None:
+    found = reasons(follow("G0X1.Y1.Z1.\nG28\nG1X2.F100.\nG0X3.Y3.Z3.\nX4.", dialect=dialect))
+    assert reason in found[2]
+    assert found[-1] == ""
 
 
 def test_a_command_that_is_not_known_is_kept_and_refuses_what_follows() -> None:

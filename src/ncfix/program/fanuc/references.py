@@ -1,4 +1,4 @@
-"""Reference points of these controls: G27 checks one, G30 Pn goes to the second, third or fourth.
+"""Reference points of these controls: G28 goes to the first, G27 checks one, G30 Pn goes to a further one.
 
 Sources: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words; Haas mill
 operator's manual, G28, G49.
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
 
 CHECKED = "reference point check (G27)"
+AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
 SECOND = 2
 NO_LENGTH = 490
 
@@ -28,6 +29,16 @@ def check(control: Control, block: Block, code: int) -> None:
     if block.axes:
         target, unknown = destination(control, block)
         control.move(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED)
+
+
+def named(control: Control, block: Block, code: int) -> None:
+    """G28: the axes that are named go; whether all go where none is named, differs."""
+    if block.axes:
+        go_to_reference(control, block, code)
+        return
+    unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
+    passing = REFERENCE_POINT.format("G28")
+    control.move(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing)
 
 
 def cancelling(control: MacroControl, block: Block, code: int) -> None:

@@ -71,6 +71,7 @@ FANUC = Rules(
         150: polar.switch,
         160: polar.switch,
         270: references.check,
+        280: references.named,
         290: data.made,
         300: references.further,
         **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),

@@ -17,9 +17,10 @@ from ncfix.program.tree import Constant, Word
 MAY_REPEAT = frozenset("GM")
 """The addresses that may stand several times in a block."""
 
-G_WITH_E = frozenset({700, 760})
+G_WITH_E = frozenset({470, 700, 760, 1870})
 M_WITH_E = frozenset({660, 670, 680})
-"""G70, G76, M66, M67, M68 take an E word, so that `H2E1` is two words there (LinuxCNC, "G codes" and "M codes")."""
+"""They take an E word, so that `H2E1` is two words there: G70, G76, M66, M67, M68 of LinuxCNC ("G codes", "M codes"),
+G47 and G187 of Haas."""
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
 """A parameter, and behind it outside brackets what a check number looks like."""
