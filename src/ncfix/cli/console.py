@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import replace
 from threading import Timer
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -169,5 +169,19 @@ def colour() -> bool | None:
 
 def abandon_stdout() -> None:
     """Point standard output at nothing, so that Python's exit does not fail on what could not be written."""
+    _abandon(sys.stdout)
+
+
+def settle() -> None:
+    """Point streams at nothing that still hold what could not be written: Python's exit would fail on that (120)."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except (OSError, ValueError):
+            _abandon(stream)
+
+
+def _abandon(stream: TextIO) -> None:
     with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

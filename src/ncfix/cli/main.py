@@ -98,7 +98,9 @@ def main() -> None:
     sys.set_int_max_str_digits(MOST_DIGITS)
     if not sys.warnoptions and "--debug" not in sys.argv:
         warnings.simplefilter("ignore", RuntimeWarning)
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    console.settle()
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:
