@@ -7,9 +7,22 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnose.contest import COUNT, Contest, climbed, exchanged
-from ncfix.diagnose.next_poses import SURELY, TOLD, Proposal, _beyond, _marked, _new_tools, _one_more, _travels
+from ncfix.diagnose.next_poses import (
+    SURELY,
+    TOLD,
+    Proposal,
+    _beyond,
+    _marked,
+    _new_tools,
+    _offered,
+    _one_more,
+    _travels,
+    _where_it_was,
+)
+from ncfix.diagnose.view import view
 from ncfix.measure.program import skeleton
 from ncfix.measure.reader import reads
+from ncfix.measure.synthetic import Faults, simulate
 from ncfix.measure.writer import dumps
 
 OFFERED, HEIGHT, WIDTH = 60, 3, 9
@@ -98,3 +111,18 @@ def test_the_chance_of_one_name_is_that_of_odds_that_scatter() -> None:
     assert Proposal("EYZ", None, 0.0, SURELY, "", ()).chance == pytest.approx(0.95, abs=0.005)
     assert Proposal("EYZ", None, 1.0, 11.0, "", ()).times == 2
     assert Proposal("EYZ", None, 1.0, 25.0, "", ()).times == 1
+
+
+def test_the_tip_stays_where_it_was_whatever_the_tool() -> None:
+    """With a tool so much longer the same axis positions would lead into the table."""
+    known = machine("wCBXFZYSt")
+    short = plan(known, "tcp", 60)
+    short = short.with_columns({"tool_length": np.full(60, 100.0)})
+    seen = view([simulate(short, known, Faults(1.0), 1)], known)
+    offered = _offered(seen, seen.reach.spans, (100.0, 300.0))
+    assert set(offered.column("tool_length")) == {100.0, 300.0}
+    assert _where_it_was(seen, offered).all()
+    tips = known.tip(offered.positions(known), offered.column("tool_length"))
+    been = known.tip(short.positions(known), short.column("tool_length"))
+    assert (tips.min(axis=0) >= been.min(axis=0) - 0.05).all()  # what the file's errors make of a pose, and more
+    assert "the tool tip beyond the travels" in dumps(_marked(short, (), (), True), ("dx",))

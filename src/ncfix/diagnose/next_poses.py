@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
+from ncfix.diagnose.addition import Mask
 from ncfix.diagnose.contest import Contest, exchanged
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
 from ncfix.diagnose.selection import ALIKE, Selected, aliases
+from ncfix.diagnose.view import View
 from ncfix.diagnose.weighing import Members, Scale
 from ncfix.machine import Machine
 from ncfix.measure.candidates import Room, candidates
@@ -26,6 +28,8 @@ from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 
 OFFERED = 320
+DRAWN, FEW = 10, 60
+"""Times as many are drawn to find those whose tip stays where it was; if these are fewer than so many, others, too."""
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""
 RIVALS_MOST = 3
@@ -68,6 +72,7 @@ class Proposal:
     alike    names that cannot be told from it by any of the poses, besides
     beyond   axes that have to go beyond the travels measured so far
     tools    mm: lengths of tools that were not used so far
+    strays   whether the tool tip goes where it has not been so far, seen from the workpiece
     """
 
     name: str
@@ -79,6 +84,7 @@ class Proposal:
     alike: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
     tools: tuple[float, ...] = ()
+    strays: bool = False
 
     @property
     def chance(self) -> float:
@@ -160,7 +166,7 @@ def _within(
     lengths: Sequence[float],
 ) -> Proposal:
     """The best poses of those that lie within these ranges, with tools of these lengths."""
-    offered = _offered(court, ranges, lengths)
+    offered = _offered(court.background.view, ranges, lengths)
     new = observe(offered, court.background.view.machine)
     rounds = [
         (rival.group.owner.name, _contest(court, new, true, other, sigma))
@@ -179,7 +185,9 @@ def _within(
     told = tuple(dict.fromkeys(name for name, _ in able))
     alike = tuple(each for each in names if each not in told)
     beyond, tools = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
-    return Proposal(name, _marked(plan, beyond, tools), before, after, reason, told, alike, beyond, tools)
+    strays = not _where_it_was(view, plan).all()
+    marked = _marked(plan, beyond, tools, strays)
+    return Proposal(name, marked, before, after, reason, told, alike, beyond, tools, strays)
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:
@@ -214,21 +222,32 @@ def _new_tools(plan: Measurement, used: Array) -> tuple[float, ...]:
     return tuple(sorted(each for each in lengths if np.abs(used - each).min() > ROUNDED))
 
 
-def _marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = ()) -> Measurement:
-    """With lines that say which axes go further than before, and which tools are new."""
-    said = [f"{', '.join(beyond)} beyond the travels measured so far, mind the clearance"] if beyond else []
+def _where_it_was(view: View, plan: Measurement) -> Mask:
+    """The rows whose tool tip is within the block that it has been in so far, seen from the workpiece."""
+    been = view.machine.tip(view.q, view.column("tool_length"))
+    tip = view.machine.tip(plan.positions(view.machine), plan.column("tool_length"))
+    inside: Mask = ((tip >= been.min(axis=0) - ROUNDED) & (tip <= been.max(axis=0) + ROUNDED)).all(axis=1)
+    return inside
+
+
+def _marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = (), strays: bool = False) -> Measurement:
+    """With lines that say what goes further than before, and which tools are new."""
+    far = [*beyond, *(["the tool tip"] if strays else [])]
+    said = [f"{', '.join(far)} beyond the travels measured so far, mind the clearance"] if far else []
     lengths = " and ".join(f"{each:g} mm" for each in tools)
     said += [f"tool of {lengths}: or one that differs as much, with its own length in the file"] if tools else []
     return plan.with_header("note", "; ".join(said)) if said else plan
 
 
-def _offered(court: Court, ranges: Mapping[str, Span], lengths: Sequence[float]) -> Measurement:
-    """Poses within these ranges, with these tools."""
-    view = court.background.view
+def _offered(view: View, ranges: Mapping[str, Span], lengths: Sequence[float]) -> Measurement:
+    """Poses within these ranges, with these tools, whose tip stays where it has been if there are such."""
     loads = view.column("load_kg")
     inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
     room = Room(ranges=ranges, tool_lengths=lengths, inputs=inputs)
-    plan = candidates(view.machine, "tcp", OFFERED, room)
+    drawn = candidates(view.machine, "tcp", DRAWN * OFFERED, room)
+    inside = _where_it_was(view, drawn)
+    kept = drawn.rows(inside) if inside.sum() >= FEW else drawn
+    plan = kept.rows(range(min(OFFERED, len(kept))))
     known = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}
     held = {name: np.full(len(plan), view.column(name)[-1]) for name in known if name not in plan.columns}
     sets = tuple(f"tool {length:g}" for length in plan.column("tool_length"))

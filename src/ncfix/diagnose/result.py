@@ -84,6 +84,7 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
         "alike": p.alike,
         "told_apart": {"now": p.before, "after": p.after, "chance": p.chance, "times_each": p.times},
         "beyond_travels_measured": list(p.beyond),
+        "tip_beyond": p.strays,
         "new_tool_lengths": list(p.tools),
     }
 

@@ -11,6 +11,8 @@ from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
 
 SHOWN = 0.05
 """um and urad: what is smaller is not there."""
+NEARLY = 0.925
+"""Chances above this are said to be nearly sure, in steps of five of a hundred."""
 SAID = {
     NOTHING: "nothing is missing that stands out of the noise",
     FOUND: "the model lacks something that has a name",
@@ -127,18 +129,19 @@ def hope(proposal: Proposal) -> str:
     """How far the poses would lead."""
     assert proposal.plan is not None
     said = f"{len(proposal.plan)} more poses leave one name in {_of_hundred(proposal.chance)}"
-    if proposal.times == 1:
+    if proposal.times == 1 or proposal.chance >= NEARLY:
         return said
     return f"{said}, and in nearly all if each is measured {proposal.times} times"
 
 
 def _of_hundred(chance: float) -> str:
-    return "nearly all cases" if chance > 0.95 else f"{max(round(20 * chance) * 5, 5)} of 100 cases"
+    return "nearly all cases" if chance >= NEARLY else f"{max(round(20 * chance) * 5, 5)} of 100 cases"
 
 
 def unusual(proposal: Proposal) -> str:
     """What has to be done that was not done so far."""
-    said = [f"{', '.join(proposal.beyond)} beyond the travels measured so far"] if proposal.beyond else []
+    far = [*proposal.beyond, *(["the tool tip"] if proposal.strays else [])]
+    said = [f"{', '.join(far)} beyond the travels measured so far"] if far else []
     if proposal.tools:
         lengths = " and ".join(f"{each:g} mm" for each in proposal.tools)
         said.append(f"a tool of {lengths}, or one that differs as much from those that were used")
