@@ -57,7 +57,7 @@ def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[di
     left = {refusal.line for refusal in fixed.report.refused}
     left |= {note.place.line for note in fixed.report.warnings if note.place and "must not be split" in note.text}
     for each in fixed.report.left:
-        left |= {line for first, last in each.lines for line in range(first, last + 1)}
+        left |= {line for first, last in each.stretches for line in range(first, last + 1)}
     model = errors.load(root / MACHINE)
     meant, done = (by_mark(model, each, actual=n == 1) for n, each in enumerate((text, fixed.text.decode())))
     assert list(meant) == list(done)

@@ -43,13 +43,20 @@ TURNED = 0.2
 
 
 def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[float, float, int]:
-    """The worst distance of ends and of ways from where they should be, mm, and how many lines were judged."""
+    """The worst distance of ends and of ways from where they should be, mm, and how many lines were judged.
+
+    Where an axis had to be left, as across the plane at a rounded corner, it may be off by as much as was said.
+    """
     text = sinumerik.marked(text)
     program = read(text.encode(), "part.mpf", "siemens")
     options = FixOptions(strategy=strategy, verify=False, flatten=flat)
     fixed = (fix_flat if flat else fix_program)(program, load(str(root / MACHINE)), SETUP, options)
     left = {refusal.line for refusal in fixed.report.refused}
     left |= {note.place.line for note in fixed.report.warnings if note.place and "must not be split" in note.text}
+    said: dict[int, float] = {}
+    for axis in fixed.report.left:
+        for first, last in axis.stretches:
+            said |= {line: said.get(line, 0.0) + axis.most for line in range(first, last + 1) if not axis.rotary}
     model = errors.load(root / MACHINE)
     meant, done = (by_mark(model, each, actual=n == 1) for n, each in enumerate((text, fixed.text.decode())))
     assert list(meant) == list(done)
@@ -62,9 +69,10 @@ def judged(text: str, root: Path, strategy: str, flat: bool = False) -> tuple[fl
             continue
         turned = (ways[-1].q[-1] - done[mark][0][-1].q[-1])[3:]
         assert np.abs((turned + 180.0) % 360.0 - 180.0).max() < TURNED, f"line {line}"
-        worst[0] = max(worst[0], float(np.linalg.norm(tips[-1] - done[mark][1][-1])))
+        off = said.get(line, 0.0)
+        worst[0] = max(worst[0], float(np.linalg.norm(tips[-1] - done[mark][1][-1])) - off)
         if kind == "cut" and not fresh:
-            worst[1] = max(worst[1], apart(tips, done[mark][1][1:]), apart(done[mark][1], tips[1:]))
+            worst[1] = max(worst[1], apart(tips, done[mark][1][1:]) - off, apart(done[mark][1], tips[1:]) - off)
         fresh, judged_lines = False, judged_lines + 1
     return worst[0], worst[1], judged_lines
 
