@@ -34,6 +34,7 @@ FAMILIES = {
 
 RELATIVES = {"fanuc": ("haas",)}
 FOREIGN = frozenset({"NCF101", "NCF102", "NCF103"})
+BEYOND = "beyond the range over which its errors are known"
 SETUP = Setup(assume_zero=True, no_point="calculator")
 
 
@@ -53,16 +54,23 @@ class Account:
     stopped: Counter[str] = field(default_factory=Counter)
 
     @property
+    def beyond(self) -> int:
+        """Motion blocks that leave the travel of the machine: that is no machine for their programs."""
+        return sum(count for reason, count in self.reasons.items() if BEYOND in reason)
+
+    @property
     def refused(self) -> float:
-        """The share of motion blocks that are refused."""
-        return self.blocks["refused"] / max(1, sum(self.blocks.values()))
+        """The share of the motion blocks within the travel that are refused."""
+        return (self.blocks["refused"] - self.beyond) / max(1, sum(self.blocks.values()) - self.beyond)
 
     def lines(self, name: str) -> list[str]:
         """The account in words."""
         files = ", ".join(f"{count} {what}" for what, count in sorted(self.files.items()))
         blocks = ", ".join(f"{self.blocks[what]} {what}" for what in ("corrected", "passed", "refused"))
-        reasons = [f"    {count} {reason}" for reason, count in self.reasons.most_common(10)]
-        return [f"{name}: files: {files}; motion blocks: {blocks} ({100 * self.refused:.2f} %)", *reasons]
+        kept = [each for each in self.reasons.most_common() if BEYOND not in each[0]]
+        reasons = [f"    {count} {reason}" for reason, count in kept[:10]]
+        far = f"{self.beyond} of them beyond the travel, {100 * self.refused:.2f} % of the others"
+        return [f"{name}: files: {files}; motion blocks: {blocks} ({far})", *reasons]
 
 
 def dialect_of(source: bytes, name: str, dialect: str) -> str:

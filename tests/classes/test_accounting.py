@@ -14,7 +14,7 @@ from ncfix.machine import load
 from ncfix.program.reader import read
 
 MOST, MOST_FLAT = 0.05, 0.01
-"""The share of motion blocks that may be refused, without and with --flatten."""
+"""The share of the motion blocks within the travel that may be refused, without and with --flatten."""
 
 STUDIED = ("fanuc",) if not os.environ.get("NCFIX_CORPUS") else tuple(FAMILIES)
 """`NCFIX_CORPUS=1` takes all folders; the large ones take minutes."""
