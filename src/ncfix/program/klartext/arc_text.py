@@ -169,15 +169,15 @@ def swung(begin: FloatArray, pole: FloatArray, angle: float) -> FloatArray:
 
 
 def between(begin: FloatArray, end: FloatArray, middle: FloatArray, angle: float) -> FloatArray:
-    """A centre moved towards where it is equally far from both ends, as far as the rest of the arc suffers no more
-    than its end gains: of nearly full circles, rounded ends are equally far only from a place far aside.
+    """The centre that is equally far from both ends; of nearly full circles, where rounded ends are equally far only
+    from a place far aside, a centre on the way there, so that the rest of the arc suffers no more than its end.
     """
     goal = equally_far(begin, end, middle)
     aside = float(np.hypot(*(goal - middle)))
     uneven = abs(float(np.hypot(*(begin - middle))) - float(np.hypot(*(end - middle))))
-    if aside == 0:
-        return middle
     bulge = 2.0 if abs(angle) > math.pi else 1 - math.cos(angle)
+    if bulge * aside <= 2 * uneven:
+        return goal
     result: FloatArray = middle + uneven / (uneven + bulge * aside) * (goal - middle)
     return result
 
