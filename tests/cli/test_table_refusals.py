@@ -141,6 +141,7 @@ def test_a_hand_edited_file_with_a_wrong_count(shop: Any, ncfix: Any, control: s
     result = ncfix("emulate", control, folder, "-m", shop.machine)
     assert (result.code, "NCF491" in result.err) == (ExitCode.UNREADABLE, True), result.err
     assert said in result.err
+    assert result.err.startswith(f"{folder}/")
     assert "Traceback" not in result.err
 
 

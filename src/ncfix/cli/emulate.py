@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Container, Iterable
+from dataclasses import replace
 from typing import Any
 
 import click
@@ -13,7 +15,7 @@ from ncfix.cli.export import tell
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.diagnostics import ExitCode
+from ncfix.diagnostics import ConfigError, ExitCode, Message
 
 
 @click.command()
@@ -50,13 +52,27 @@ def emulate(
     content = read_folder(folder)
     more: dict[str, Any] = {}
     with console.busy("running the tables"):
-        found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
+        try:
+            found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
+        except ConfigError as error:
+            raise ConfigError.collected(_below(folder, error.messages, content)) from error
         if program is not None:
             made = loads(content[NAME], NAME)
             more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
+    found = replace(found, messages=_below(folder, found.messages, content))
     console.tell_some(found.messages)
     tell(found, as_json, control=chosen.name, reaches=chosen.reaches, **more)
     return ExitCode.FINDINGS if found.messages else ExitCode.DONE
+
+
+def _below(folder: str, messages: Iterable[Message], names: Container[str]) -> tuple[Message, ...]:
+    """The messages with the folder before the names of its files."""
+    return tuple(
+        replace(message, place=replace(message.place, path=os.path.join(folder, message.place.path)))
+        if message.place is not None and message.place.path in names
+        else message
+        for message in messages
+    )
 
 
 def read_folder(folder: str) -> dict[str, bytes]:
