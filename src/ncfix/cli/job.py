@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from ncfix import __version__, fast
@@ -112,6 +114,7 @@ class Job:
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:
         from ncfix.program.parts import NotInPartsError
 
+        _let_stay()
         try:
             done = stream.run()
         except NotInPartsError:
@@ -119,6 +122,12 @@ class Job:
             assert isinstance(fixed.text, bytes)
             return Fixed(outlet.after(fixed.text, source.path), fixed.changed, fixed.report)
         return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
+
+
+@cache
+def _let_stay() -> None:
+    """Spare the garbage collector what is loaded by now, once in a process: it stays, and is much to go through."""
+    gc.freeze()
 
 
 def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:
