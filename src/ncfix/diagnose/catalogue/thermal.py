@@ -3,7 +3,8 @@
 A name says where an effect acts: along the tool, on an axis line, in proportion to a position. Its course in time is no
 part of the name: what drives it is rarely what is measured, for a sensor may be late or sit on another body. So each
 effect may follow any logged temperature, at once or with a lag, and has a course of its own besides, or nothing but
-that; the bodies differ only in which sensors are likely theirs, and in how slow they are.
+that, or it closely follows the sensors that are called like its body; the bodies differ only in which sensors are
+likely theirs, and in how slow they are.
 """
 
 from __future__ import annotations
@@ -33,10 +34,15 @@ BADLY = 0.25
 """Variance of the temperatures beside that of the course of time, where they say little."""
 FOREIGN = 0.3
 """Variance of a sensor that is likely of another body."""
+CLOSELY = 0.05
+"""Variance of the course of time beside that of a body's own sensors."""
 AIR = ("ambient", "air", "hall", "room")
 HOT = ("spindle", "head", "motor", "bearing")
-HOLDS = 5
-"""Places along its travel at which a scale may be held; the true one is between two of them."""
+STAND = ("column", "bed", "frame", "base", "stand")
+HOLDS = 4
+"""Places along its travel at which a scale may be held."""
+BETWEEN = 1 / (HOLDS - 1) / np.sqrt(3)
+"""The true one is between two of them: how far from the nearer one, of half the travel, rms."""
 SLIPS = 40
 DEGREE = Polynomial(degree=(1,))
 WARMER = 5.0
@@ -52,13 +58,16 @@ class Body:
     """What becomes warm.
 
     slow, quick  s: over which times its course bends where it follows its sensors, and where it does not
+    words        what its own sensors are called
     """
 
     slow: float
     quick: float
+    words: tuple[str, ...] = ()
 
 
-SPINDLES, FRAMES, OUTSIDE = Body(3600.0, 1200.0), Body(7200.0, 2400.0), Body(14400.0, 7200.0)
+SPINDLES, FRAMES = Body(3600.0, 1200.0, HOT), Body(7200.0, 2400.0, STAND)
+OUTSIDE = Body(14400.0, 7200.0, AIR)
 PLATE = Body(28800.0, 28800.0)
 """One that is held at a point nobody knows: all ways at once with courses of their own would be anything."""
 
@@ -87,15 +96,15 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
             title = f"thermal scale of {axis.name}: positions stretch with temperature"
             name = f"E{LETTERS[own]}{axis.name}"
             places = np.linspace(*reach.spans[axis.name], HOLDS).tolist()
-            fixed = [[(name, linear | {"times_center": place})] for place in places]
-            yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven)
+            fixed = [[(name, linear | {"times_center": place}), (name, {})] for place in places]
+            yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven, among=[(1.0, BETWEEN)])
         for turn in TURNS:
             title = f"thermal bend: {axis.name} tilts about {LETTERS[TURNS.index(turn)]} with temperature"
             name = f"E{turn}{axis.name}"
             yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
     for axis in reach.rotary:
         lines = [f"E{LETTERS[k]}0{axis.name}" for k in across(axis)]
-        ways: list[Parts] = [[(line, {"carried": True}) for line in lines], [(line, {}) for line in lines]]
+        ways: list[Parts] = [[(line, how) for line in lines] for how in ({"carried": True}, {})]
         title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
         yield _driven(f"rotary centre drift {axis.name}", title, axis.name, ways, driven)
     yield _artefact(reach, clocked)
@@ -131,11 +140,19 @@ def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
             yield _driven(f"ambient swing {letter}", title, letter, parts, outside)
 
 
-def _driven(name: str, title: str, axis: str, places: Sequence[Parts], drive: Drive, family: str = "heat") -> Candidate:
+def _driven(
+    name: str,
+    title: str,
+    axis: str,
+    places: Sequence[Parts],
+    drive: Drive,
+    family: str = "heat",
+    among: Sequence[Sequence[float]] = (),
+) -> Candidate:
     """Components that follow temperatures, lagged and not, and a course of time; at one of several places.
 
     Of several components at a place one leads, whichever: one heat moves a body one way, and hardly any other way with
-    a course of its own. What walks all ways at once is no body that warms.
+    a course of its own. What walks all ways at once is no body that warms. `among` has other sizes.
     """
     effects = zero(
         [Effect(part, (), **each, **options) for place in places for part, options in place for each in drive.options]
@@ -144,14 +161,19 @@ def _driven(name: str, title: str, axis: str, places: Sequence[Parts], drive: Dr
     for form in drive.forms:
         rows = 0
         for place in places:
-            for leads in range(len(place)):
-                block = stacked(*(form if part == leads else BESIDE * form for part in range(len(place))))
+            for sizes in among or _leading(len(place)):
+                block = stacked(*(size * form for size in sizes))
                 whole = np.zeros((count, block.shape[1]))
                 whole[rows : rows + len(block)] = block
                 loadings.append(whole)
             rows += len(block)
     needs = tuple(dict.fromkeys(each["input"] for each in drive.options))
     return Candidate(name, title, axis, family, effects, tuple(loadings), needs, WARM_UP)
+
+
+def _leading(count: int) -> list[list[float]]:
+    """The sizes of so many components of which one leads, for each of them."""
+    return [[1.0 if part == leads else BESIDE for part in range(count)] for leads in range(count)]
 
 
 def _swing(reach: Reach, air: Sequence[str]) -> float:
@@ -175,8 +197,11 @@ def _drive(reach: Reach, sensors: Mapping[str, float], body: Body, clocked: bool
         {"basis": shapes.spline(pieces=PIECES), "input": "time_s", "center": (first + last) / 2, "scale": half}
     )
     slow, quick = (course * shapes.wandering(length / half, PIECES) for length in (body.slow, body.quick))
-    late = stacked(warm, np.sqrt(FREE) * slow)
-    return Drive(tuple(options), (late, stacked(np.sqrt(BADLY) * warm, quick)))
+    forms = [stacked(warm, np.sqrt(FREE) * slow), stacked(np.sqrt(BADLY) * warm, quick)]
+    own = [float(_of(sensor, body.words)) for sensor in sensors for _ in lags]
+    if any(own):
+        forms.append(stacked(weighed(own), np.sqrt(CLOSELY) * slow))
+    return Drive(tuple(options), tuple(forms))
 
 
 def _slip(reach: Reach) -> Iterator[Candidate]:
