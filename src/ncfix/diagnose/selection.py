@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.twins import acts_alike
 from ncfix.diagnose.weighing import Members, Scale, margin
 
 MOST = 5
@@ -18,6 +19,8 @@ FORMS = 2
 """Forms of another name that are weighed in a member's place."""
 ALIKE = 3.0
 """Log odds (20 to 1) within which another name explains a member's part as well."""
+ASSUMED = 3.0
+"""So much less count odds between names that act in the same way: they rest on courses and shapes that are assumed."""
 TOGETHER = 3
 """Names that are tried as a whole where none helps by itself."""
 NEARLY = 20.0
@@ -36,12 +39,14 @@ class Selected:
     odds      name -> log odds that it is there, the others given; what it was chosen from is counted
     runners   name -> {other name: log odds of that one in its place}
     rivals    the names of what has none
+    twins     name -> those of its runners that act in the same way in these data
     """
 
     members: dict[str, Member]
     odds: dict[str, float]
     runners: dict[str, dict[str, float]]
     rivals: frozenset[str] = frozenset()
+    twins: dict[str, frozenset[str]] = field(default_factory=dict)
 
     @property
     def named(self) -> list[str]:
@@ -139,6 +144,7 @@ def judged(scale: Scale, members: Members) -> Selected:
     court = scale.court
     odds: dict[str, float] = {}
     runners: dict[str, dict[str, float]] = {}
+    twins: dict[str, frozenset[str]] = {}
     for name in members:
         others = _less(members, name)
         sort = [each for each in _sort(court, name) if each not in others]
@@ -151,8 +157,10 @@ def judged(scale: Scale, members: Members) -> Selected:
         paid = margin(len(members)) - margin(len(others))
         odds[name] = gained.pop(name) + paid
         runners[name] = {each: value + paid for each, value in gained.items()}
+        near = [each for each, value in runners[name].items() if value > odds[name] - ASSUMED * ALIKE]
+        twins[name] = frozenset(each for each in near if acts_alike(court, scale.all(members), members[name], each))
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
-    return Selected(ranked, odds, runners, frozenset(court.rivals))
+    return Selected(ranked, odds, runners, frozenset(court.rivals), twins)
 
 
 def _sort(court: Court, name: str) -> Sequence[str]:
@@ -167,7 +175,7 @@ def _less(members: Members, out: str) -> dict[str, Member]:
 
 
 def aliases(selected: Selected, name: str) -> list[str]:
-    """Names that explain a member's part nearly as well."""
-    rest = selected.runners[name]
-    found = [key for key, value in rest.items() if value > selected.odds[name] - ALIKE]
+    """Names that explain a member's part nearly as well, or act in the same way."""
+    rest, twins = selected.runners[name], selected.twins.get(name, frozenset())
+    found = [key for key in rest if rest[key] > selected.odds[name] - ALIKE * (ASSUMED if key in twins else 1.0)]
     return sorted(found, key=lambda key: -rest[key])

@@ -13,7 +13,7 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.smooth import Backlash, Fourier
 from ncfix.measure.measurement import Array
 
-ORDERS = (1, 2, 3, 4)
+ORDERS = (1, 2, 3, 4, 5, 6, 7, 8)
 TEETH = tuple(range(5, 181))
 """Errors per turn that a worm, gear or encoder may have."""
 
@@ -48,7 +48,7 @@ def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
     )
     for name, title, letters, remedy in sorts:
         effects = zero([Effect(f"E{letter}{q}", (), Fourier(order=ORDERS)) for letter in letters])
-        loading = stacked(*[weighed(shapes.harmonics())] * len(letters))
+        loading = stacked(*[weighed(shapes.harmonics(len(ORDERS)))] * len(letters))
         yield Candidate(name, title, q, f"{q} turning", effects, (loading,), (), remedy)
 
 

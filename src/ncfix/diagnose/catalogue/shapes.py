@@ -13,7 +13,7 @@ PIECES = 14
 """Pieces of a spline over what was measured: bends down to a seventh of the travel."""
 SMOOTH = (0.18, 0.4, 0.9)
 """Distances, of half the travel, over which a curve bends: wear, a scale's or guide's own shape, a bow."""
-HARMONICS = (1.0, 0.5, 0.2, 0.1)
+HARMONICS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.03, 0.02, 0.01)
 """Variance of the orders of an error that repeats with a turn."""
 LOST = (1.0, 0.15, 0.1)
 """Variance of play: constant, growing, bowed along the travel."""
@@ -76,6 +76,6 @@ def _straight(length: float, powers: int) -> Array:
     return found
 
 
-def harmonics(count: int = 4) -> tuple[float, ...]:
+def harmonics(count: int) -> tuple[float, ...]:
     """Variances of cos and sin of the first orders."""
     return tuple(v for v in HARMONICS[:count] for _ in range(2))

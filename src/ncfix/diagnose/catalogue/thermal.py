@@ -33,7 +33,7 @@ FREE = 0.4
 BADLY = 0.25
 """Variance of the temperatures beside that of the course of time, where they say little."""
 FOREIGN = 0.3
-"""Variance of a sensor that is likely of another body."""
+"""Variance of a sensor that is likely of another body, or of the air about it."""
 CLOSELY = 0.05
 """Variance of the course of time beside that of a body's own sensors."""
 AIR = ("ambient", "air", "hall", "room")
@@ -86,7 +86,8 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
     if not clocked and not reach.sensors:
         return
     inside = {name: FOREIGN if _of(name, HOT) else 1.0 for name in reach.sensors if not _of(name, AIR)}
-    driven = _drive(reach, inside, FRAMES, clocked)
+    around = {name: FOREIGN for name in reach.sensors if name not in inside}
+    driven = _drive(reach, inside | around, FRAMES, clocked)
     yield _growth(reach, inside, clocked)
     yield from _drifts(reach, driven, clocked)
     for axis in reach.linear:

@@ -21,6 +21,8 @@ from ncfix.measure.measurement import Array
 POWERS = (0, 1, 2, 3, 4)
 FOOT = 30.0
 """mm: how far the point about which a sagging slide turns lies from the reference point stated."""
+TILTED = 0.2
+"""How much more or less than the slope a slide tilts, as a share: it is as long as its carriages are apart."""
 LOAD: dict[str, Any] = {"times": "load_kg", "times_center": 0.0, "times_scale": 100.0}
 BOW = np.array([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0.5, 0], [0, 0, 0.3]])
 """Columns: u^2, u^3, u^4 with their sizes: a bed between its supports."""
@@ -84,13 +86,13 @@ def _deflected(
 
 
 def _sloped(form: Array, factor: float) -> Array:
-    """The loading of [f, f', shifts of a foot elsewhere] for f with these columns of powers.
+    """The loading of [f, f' or nearly, shifts of a foot elsewhere] for f with these columns of powers.
 
     The shifts are without mean and slope, which are constants of the machine: where an axis lies, and its gain.
     """
     slope = np.zeros_like(form)
     slope[:-1] = factor * form[1:] * np.arange(1, len(form))[:, None]
-    both = np.concatenate([_bent(form), slope])
+    both = np.block([[_bent(form), np.zeros_like(form)], [slope, TILTED * slope]])
     return stacked(both, _bent(FOOT * slope), _bent(FOOT * slope))
 
 

@@ -1,0 +1,45 @@
+"""Names that act in the same way in these data: what the one shows, the other can show, and the other way about.
+
+A spindle that grows and a frame that drifts along a tool that never turns differ in the course that is assumed of them,
+a bed and a ram that sag in the power of their curve. Odds between such names are odds of what is assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ncfix.diagnose.evidence import Court, Member
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
+
+SAME = 0.8
+"""Share of what either may show, its squares beside what is free, that the other must be able to show."""
+TOLD = 6.0
+"""Squared noise units of what the first shows that the second cannot, from which on data tell them apart."""
+
+
+def acts_alike(court: Court, members: Sequence[Member], own: Member, other: str) -> bool:
+    """Whether a name has a form that can do what `own`, one of the members, does in these data."""
+    share = court.share(members)
+    first = _white(court, own.group, share)
+    shown = first @ court.numbers(members, share)[list(members).index(own)]
+    return any(_alike(first, shown, _white(court, form, share)) for form in court.forms[other])
+
+
+def _white(court: Court, group: int, share: float) -> Array:
+    """The columns of a form in units of noise and background, (n, p)."""
+    white: Array = court.columns[:, court.part(group)] / np.sqrt(court.background.variance(share))[:, None]
+    return white
+
+
+def _alike(first: Array, shown: Array, second: Array) -> bool:
+    """Whether the second columns can show what is shown, and either what the other may show."""
+    left = without(orthonormal(second), shown[:, None])
+    return float((left**2).sum()) < TOLD and min(_held(first, second), _held(second, first)) > SAME
+
+
+def _held(columns: Array, by: Array) -> float:
+    """Share of the squares of some columns that others can show."""
+    return 1.0 - float((without(orthonormal(by), columns) ** 2).sum() / (columns**2).sum())
