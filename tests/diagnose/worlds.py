@@ -117,16 +117,17 @@ class World:
             numbers = np.zeros(loading.shape[1])
             numbers[:2] = 1.0, random.uniform(-0.8, 0.8)
         elif kind in ("radial", "axial", "wobble", "encoder"):
-            numbers = numbers * np.tile(np.repeat([1.0, 0.35, 0.1, 0.0], 2), len(candidate.effects))
+            numbers = numbers * np.tile(np.repeat([1.0, 0.35, 0.1, *(0.0,) * 5], 2), len(candidate.effects))
             loading = np.eye(len(candidate.effects) * lead.basis.size)
         return self.view.design(candidate.effects) @ (loading @ numbers)
 
     def _warmed(self, candidate: Candidate, random: Generator) -> Array:
         """The pattern of a thermal effect in space, with a course in time that is not the catalogue's."""
-        still = {(e.name, e.times, e.times_center): replace(e, **STILL) for e in candidate.effects}
-        places = {key[2] for key in still}
-        place = sorted(places, key=str)[random.integers(len(places))]
-        parts = [each for key, each in still.items() if key[2] == place]
+        still = {(e.name, e.times): replace(e, **STILL) for e in candidate.effects}
+        parts = list(still.values())
+        if candidate.name.startswith("thermal scale"):
+            held = float(random.uniform(*self.view.reach.spans[candidate.axis]))
+            parts = [replace(each, times_center=held) for each in parts if each.times]
         pattern = self.view.design(parts) @ random.normal(size=len(parts))
         course = self.warmth.course(candidate.name, self.view.column("time_s"), random)
         return pattern * (course - course.mean())[self.view.row]

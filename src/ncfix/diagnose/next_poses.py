@@ -106,8 +106,8 @@ def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
     name = next((each for each in selected.named if aliases(selected, each)), selected.named[0])
     court = scale.court
     runners = selected.runners[name]
-    reach = ALIKE if aliases(selected, name) else NEAR
-    near = [n for n in sorted(runners, key=lambda n: -runners[n]) if runners[n] > selected.odds[name] - reach]
+    ordered = sorted(runners, key=lambda n: -runners[n])
+    near = aliases(selected, name) or [n for n in ordered if runners[n] > selected.odds[name] - NEAR]
     owners = {group.owner.name: group.owner for group in court.groups}
     near = [n for n in near if not owners[n].grows][:RIVALS_MOST]
     if not near or owners[name].grows:

@@ -25,7 +25,7 @@ def acts_alike(court: Court, members: Sequence[Member], own: Member, other: str)
     share = court.share(members)
     first = _white(court, own.group, share)
     shown = first @ court.numbers(members, share)[list(members).index(own)]
-    return any(_alike(first, shown, _white(court, form, share)) for form in court.forms[other])
+    return any(alike(first, shown, _white(court, form, share)) for form in court.forms[other])
 
 
 def _white(court: Court, group: int, share: float) -> Array:
@@ -34,7 +34,7 @@ def _white(court: Court, group: int, share: float) -> Array:
     return white
 
 
-def _alike(first: Array, shown: Array, second: Array) -> bool:
+def alike(first: Array, shown: Array, second: Array) -> bool:
     """Whether the second columns can show what is shown, and either what the other may show."""
     left = without(orthonormal(second), shown[:, None])
     return float((left**2).sum()) < TOLD and min(_held(first, second), _held(second, first)) > SAME

@@ -39,7 +39,7 @@ def text(found: Diagnosis) -> str:
     for finding in found.findings:
         lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(found, finding)}"]
         if finding.aliases:
-            lines.append(f"  as likely: {', '.join(finding.aliases)}")
+            lines.append(f"  may as well be: {', '.join(finding.aliases)}")
         lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(found, finding)) if said]
     if found.unknown_um:
         lines += ["", rest(found)]

@@ -89,7 +89,7 @@ def _finding(found: Diagnosis, finding: Finding) -> Section:
     candidate = finding.candidate
     parts: list[Part] = [Text(f"{candidate.title}. {why(found, finding)}.")]
     if finding.aliases:
-        parts.append(Text(f"As likely with these data: {', '.join(finding.aliases)}."))
+        parts.append(Text(f"With these data it may as well be: {', '.join(finding.aliases)}."))
     if candidate.remedy:
         parts.append(Text(f"Remedy: {candidate.remedy}."))
     parts += [

@@ -73,7 +73,7 @@ def _backlash(reach: Reach, axis: Axis, own: int) -> Candidate:
 
 
 def _seat(reach: Reach, axis: Axis) -> Iterator[Candidate]:
-    """The seat of a rotary axis gives way with the place of a linear axis; of which one is found out."""
+    """The seat of a rotary axis yields with the place of a linear axis: of which one, and which way, is found out."""
     if not reach.linear:
         return
     wave = Fourier(order=(1,))
@@ -81,7 +81,9 @@ def _seat(reach: Reach, axis: Axis) -> Iterator[Candidate]:
     effects = zero([Effect(f"E{letter}{axis.name}", (), wave, **reach.factor(other)) for other, letter in places])
     columns = np.eye(2 * len(effects))
     each = 2 * len(LETTERS)
-    loadings = tuple(columns[:, each * k : each * (k + 1)] for k in range(len(reach.linear)))
+    every = [slice(each * k, each * (k + 1)) for k in range(len(reach.linear))]
+    single = [slice(2 * k, 2 * k + 2) for k in range(len(places))]
+    loadings = tuple(columns[:, part] for part in (*every, *single))
     title = f"rotary seat of {axis.name}: an error of its turn that grows with a linear position"
     name = f"rotary seat {axis.name}"
     yield Candidate(name, title, axis.name, f"{axis.name} turning", effects, loadings, (), "check the seat")

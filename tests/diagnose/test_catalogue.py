@@ -1,0 +1,84 @@
+"""What the candidates can show, against effects that are as physics has them; and which names act in the same way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.worlds import World
+from ncfix.diagnose.diagnosis import diagnose
+from ncfix.diagnose.twins import TOLD, alike
+from ncfix.machine import Effect
+from ncfix.machine.smooth import Fourier
+from ncfix.measure.measurement import Array
+from ncfix.measure.solve import orthonormal, without
+
+ROUNDING = 1e-9
+HARDLY = 2e-3
+"""Share of squares that a form may lack: `groups.NEGLIGIBLE` is 3e-3 of all that it may show, and half is usual."""
+
+
+@pytest.fixture(scope="module")
+def world() -> World:
+    return World.of("wCBXFZYSt", 3, 60)
+
+
+def missed(world: World, name: str, shown: Array) -> float:
+    """Share of squares of an error that the best form of a name cannot show, beside what is free."""
+    base = orthonormal(world.view.base)
+    left = without(base, shown[:, None])
+    forms = [group.columns for group in world.gathered.groups if group.owner.name == name]
+    rests = [without(orthonormal(without(base, form)), left) for form in forms]
+    return min(float((rest**2).sum()) for rest in rests) / float((left**2).sum())
+
+
+@pytest.mark.parametrize("held", [-0.8, -0.3, 0.1, 0.55])
+def test_a_scale_may_be_held_anywhere(world: World, held: float) -> None:
+    low, high = world.view.reach.spans["X"]
+    place = (low + high) / 2 + held * (high - low) / 2
+    unit = world.view.design([Effect("EXX", (0.0,), times="X", times_center=place, times_scale=100.0)])[:, 0]
+    time = world.view.column("time_s")[world.view.row]
+    clock = 2 * (time - time.mean()) / np.ptp(time)
+    assert missed(world, "thermal scale X", unit * np.sin(2.5 * clock)) < HARDLY
+
+
+@pytest.mark.parametrize("ratio", [0.75, 1.0, 1.3])
+def test_a_slide_tilts_by_nearly_the_slope(world: World, ratio: float) -> None:
+    """A bow u^2 without its mean, and its slope 2 u times the ratio, are within one of the loadings."""
+    sag, (low, high) = world.candidate("bed sag X"), world.view.reach.spans["X"]
+    assert [effect.name for effect in sag.effects[4:6]] == ["EZX", "EBX"]
+    units = np.where([[effect.rotational] for effect in sag.effects], (high - low) / 2, 1.0)
+    asked, rests = np.zeros((2, len(sag.effects), 5)), []
+    asked[:, 4, :3] = -1 / 3, 0.0, 1.0
+    asked[:, 5, 1] = 2 * ratio, -2 * ratio
+    for each in sag.loadings:
+        span = orthonormal((units[..., None] * each.reshape(*asked.shape[1:], -1)).reshape(len(each), -1))
+        rests += [without(span, coefficients.reshape(-1, 1)) for coefficients in asked]
+    assert min(np.abs(rest).max() for rest in rests) < ROUNDING
+
+
+def test_an_encoder_has_overtones(world: World) -> None:
+    orders = (1, 5, 7)
+    columns = world.view.design([Effect("ECC", (0.0,) * 6, Fourier(order=orders))])
+    assert missed(world, "encoder C", columns @ np.array([1.0, 0.2, 0.1, 0.0, 0.05, 0.05])) < HARDLY
+
+
+def test_names_are_alike_if_either_shows_what_the_other_does() -> None:
+    random = np.random.default_rng(2)
+    own = random.normal(size=(60, 4))
+    turned, richer = own @ random.normal(size=(4, 4)), np.concatenate([own, 3 * random.normal(size=(60, 4))], axis=1)
+    shown = own @ np.ones(4)
+    assert alike(own, shown, turned)
+    assert not alike(own, shown, richer)  # which shows more than this: nine tenths of its squares
+    apart = turned + 0.3 * random.normal(size=turned.shape)
+    assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD
+    assert not alike(own, shown, apart)  # the data tell them
+
+
+def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:
+    """On three axes either moves the tip alike; their courses are assumed, and the set holds both."""
+    world, random = World.of("three_axis", 5, 90), np.random.default_rng(5)
+    data = world.measured(world.effect("spindle growth", 10.0, random), random)
+    found = diagnose([data], world.machine)
+    first = found.findings[0]
+    assert {"spindle growth", "drift Z"} <= {first.candidate.name, *first.aliases}
