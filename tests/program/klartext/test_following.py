@@ -194,6 +194,7 @@ def test_mirrored_arcs_turn_the_other_way() -> None:
         ("M104\nL X+1", "the datum that was set last"),
         ("CYCL DEF 291 COUPLG.TURNG.INTERP. Q560=1\nL X+1", "cycle 291 may change coordinates"),
         ("TRANS ROTATION ABOUT+5\nL X+1", "TRANS ROTATION"),
+        ("TRANS MIRRORPGM A\nL X+1", "TRANS MIRROR"),
     ],
 )
 def test_what_is_not_sure_is_refused(body: str, reason: str) -> None:

@@ -90,6 +90,8 @@ def test_flat_patterns_are_corrected(body: str) -> None:
         'SEL PATTERN "TNC:\\HOLES.PNT"\nCYCL CALL PAT',
         "PATTERN DEF ROW1 (X+Q99 Y+0 D+8 NUM1 ROT+0 Z+0)\nCYCL CALL PAT",
         "CYCL CALL PAT",
+        "PATTERN DEF FRAME1 (X+0 Y+0 DX+1 DY+1 NUMX99999 NUMY99999 ROT+0 Z+0)\nCYCL CALL PAT",
+        "CYCL DEF 221 LINES Q225=+0 Q226=+0 Q237=+1 Q238=+1 Q242=99999 Q243=99999 Q224=+0",
     ],
 )
 def test_patterns_that_are_not_known(body: str) -> None:

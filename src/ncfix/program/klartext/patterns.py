@@ -14,6 +14,9 @@ from dataclasses import dataclass
 from ncfix.program.klartext.calculate import Parameters
 
 ON_CIRCLE, ON_LINES = 220, 221
+MOST_HOLES = 100_000
+"""A pattern of more counts as one whose holes are not known."""
+
 KINDS = re.compile(r"(POS|ROW|PAT|FRAME|PITCHCIRC|CIRC)\s*\d*\s*\(([^()]*)\)", re.IGNORECASE)
 WORDS = re.compile(
     r"(I?[XY]|Z|DX|DY|D|NUMX|NUMY|NUM|ROTX|ROTY|ROT|START|STEP|END)\s*([+-]?)\s*(Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)",
@@ -41,7 +44,7 @@ def pattern_of(text: str, parameters: Parameters) -> tuple[Place, ...] | None:
     found: list[Place] = []
     for kind, inside in KINDS.findall(code):
         values = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
-        if not understood(inside, values):
+        if not understood(inside, values) or holes(values) > MOST_HOLES:
             return None
         found += FORMS[kind.upper()](values, found)
     rest = KINDS.sub(" ", code).split()
@@ -51,6 +54,11 @@ def pattern_of(text: str, parameters: Parameters) -> tuple[Place, ...] | None:
 def understood(inside: str, values: Values) -> bool:
     """Every word was read, and the pattern is not bent."""
     return not WORDS.sub(" ", inside).strip() and not values.get("ROTX") and not values.get("ROTY")
+
+
+def holes(values: Values) -> float:
+    """How many holes a pattern has at most."""
+    return max(values.get("NUM", 0.0), values.get("NUMX", 0.0) * values.get("NUMY", 0.0))
 
 
 def number(sign: str, text: str, parameters: Parameters) -> float:
@@ -129,7 +137,7 @@ def pattern_of_cycle(cycle: int, parameters: Parameters) -> tuple[Place, ...] | 
     names = CIRCLE_WORDS if cycle == ON_CIRCLE else LINE_WORDS
     parameters.touched = False
     values = {word: parameters.get(name) for word, name in names.items()}
-    if parameters.touched:
+    if parameters.touched or holes(values) > MOST_HOLES:
         return None
     if cycle == ON_LINES:
         return tuple(lines(values, []))

@@ -11,7 +11,7 @@ import re
 from ncfix.program.klartext.control import Control
 from ncfix.program.rs274.coordinates import INDEX
 
-FORM = re.compile(r"TRANS\s+(?P<kind>[A-Z]+)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
+FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 NUMBER = re.compile(r"(?P<word>IROT|ROT|SCL)\s*(?P<value>[+-]?\s*(\d+([.,]\d*)?|[.,]\d+))\Z", re.IGNORECASE)
 AXES = re.compile(r"AXIS(\s+[XYZ])+\Z", re.IGNORECASE)
 FROM_TABLE = "the datum of the axis {} comes from a table that is not given"
@@ -22,7 +22,7 @@ BOTH = "TRANS {} and a cycle of the same kind at once: how they add up is not su
 def transform(control: Control, text: str) -> None:
     """A TRANS function but DATUM AXIS and DATUM RESET."""
     found = FORM.match(text)
-    assert found is not None, "the grammar asks for a word"
+    assert found is not None, "the grammar asks for one of these"
     kind, rest = found["kind"].upper(), found["rest"].strip()
     if kind == "DATUM":
         control.shaky |= {INDEX[letter]: FROM_TABLE for letter in "XYZABCUVW"}
