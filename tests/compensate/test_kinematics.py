@@ -7,7 +7,14 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect
 from ncfix.compensate.findings import PoseError
-from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands, linear_columns
+from ncfix.compensate.kinematics import (
+    affine_tip,
+    commands_from_joints,
+    joints_from_commands,
+    linear_columns,
+    moves_as_one,
+    solve,
+)
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Axis, Machine
 
@@ -50,6 +57,17 @@ def test_with_rotary_axes_at_zero_a_tcp_program_means_the_same_with_the_tool_len
     np.testing.assert_allclose(machine.tip(q, 80.0), machine.tip(commands, 0.0), rtol=0, atol=ROUNDING)
     z = linear_columns(machine)[2]
     np.testing.assert_allclose(q[:, z] - commands[:, z], 80.0, atol=ROUNDING)
+
+
+def test_leading_axes_straight_back_finds_what_solving_for_them_does(machine: Machine) -> None:
+    if not moves_as_one(machine):
+        pytest.skip("a rotary axis turns some of X, Y and Z only")
+    q, lengths = poses(machine, 5), np.random.default_rng(6).uniform(0, 200, N)
+    x, y, z = linear_columns(machine).tolist()
+    wanted = machine.tip(poses(machine, 7), lengths)
+    maps, offset = affine_tip(machine, q, lengths)
+    solved = solve(maps, wanted - offset)
+    np.testing.assert_allclose(machine.placed(q, (x, y, z), wanted, lengths), solved, rtol=0, atol=ROUNDING)
 
 
 def test_the_tip_stays_when_rotary_axes_turn(machine: Machine) -> None:

@@ -114,6 +114,8 @@ class Intent:
     def meant(self, rows: Index, commands: Array) -> Array:
         """Where commands (k, n_axes) of motions `rows` (k,) take the tip of a perfect machine, (k, 3) mm."""
         tcp = self.moves.tcp[rows]
+        if tcp.all():
+            return programmed_tip(self.machine, commands)
         tip: Array = self.machine.tip(commands, self.lengths(rows))
         if tcp.any():
             tip[tcp] = programmed_tip(self.machine, commands[tcp])
@@ -182,7 +184,7 @@ class Intent:
     def follows(self, rows: Index, commands: Array) -> Array:
         """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""
         tcp = self.moves.tcp[rows]
-        programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands)
+        programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands[:1] if tcp.all() else commands)
         maps = regular(tip_maps(self.machine, programmed))[0]
         return np.broadcast_to(maps, (len(rows), 3, 3))
 

@@ -91,14 +91,25 @@ def reached_joints(machine: Machine, commands: Array, tcp: Mask, tool_length: Ar
     reached = np.ones(len(commands), dtype=bool)
     if not tcp.any():
         return commands, reached
-    q = commands.copy()
+    q, columns = commands.copy(), linear_columns(machine)
     rows = np.flatnonzero(tcp)
-    wanted = programmed_tip(machine, commands[rows])
-    maps, offset = affine_tip(machine, commands[rows], _of_rows(tool_length, rows))
+    led = commands if len(rows) == len(commands) else commands[rows]
+    wanted, length = programmed_tip(machine, led), _of_rows(tool_length, rows)
+    if moves_as_one(machine):
+        x, y, z = columns.tolist()
+        q[rows[:, None], columns] = machine.placed(led, (x, y, z), wanted, length)
+        return q, reached
+    maps, offset = affine_tip(machine, led, length)
     maps, fine = regular(maps)
-    q[rows[:, None], linear_columns(machine)] = solve(maps, wanted - offset)
+    q[rows[:, None], columns] = solve(maps, wanted - offset)
     reached[rows] = fine
     return q, reached
+
+
+def moves_as_one(machine: Machine) -> bool:
+    """Whether X, Y and Z reach every point wherever rotary axes are, since none of these turns some of them only."""
+    ways = machine.linear_ways
+    return ways is not None and not abs(volume(*ways.T)[0]) < FLAT
 
 
 def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: ArrayLike) -> Array:
@@ -108,20 +119,38 @@ def commands_from_joints(machine: Machine, q: Array, tcp: Mask, tool_length: Arr
     """
     if not tcp.any():
         return q
-    commands = q.copy()
+    commands, columns = q.copy(), linear_columns(machine)
     rows = np.flatnonzero(tcp)
-    columns = linear_columns(machine)
-    maps, offset = affine_tip(machine, _rotary_at_zero(machine, q[rows]))
-    tip = machine.tip(q[rows], _of_rows(tool_length, rows))
+    led = q if len(rows) == len(q) else q[rows]
+    tip = machine.tip(led, _of_rows(tool_length, rows))
+    if moves_as_one(machine):
+        others = np.setdiff1d(np.flatnonzero(~machine.rotary), columns)
+        maps, offset = machine.at_zero[1][None, columns].swapaxes(1, 2), _led_at_zero(machine, led, others)
+    else:
+        maps, offset = affine_tip(machine, _rotary_at_zero(machine, led))
     commands[rows[:, None], columns] = solve(regular(maps)[0], tip - offset)
     return commands
 
 
 def programmed_tip(machine: Machine, commands: Array) -> Array:
     """Where in the workpiece commands (n, n_axes) with tool-centre-point control want the tip, (n, 3) mm."""
+    if moves_as_one(machine):
+        return _led_at_zero(machine, commands, np.flatnonzero(~machine.rotary))
     maps, offset = affine_tip(machine, _rotary_at_zero(machine, commands))
     tip: Array = (maps @ commands[:, linear_columns(machine), None])[..., 0] + offset
     return tip
+
+
+def _led_at_zero(machine: Machine, q: Array, axes: Index) -> Array:
+    """Where some linear axes at q (n, n_axes) take the tip, the other axes at zero, (n, 3) mm; summed axis by axis."""
+    offset, ways = machine.at_zero
+    tip = np.empty((3, len(q)))
+    tip[:] = offset[:, None]
+    for axis in axes.tolist():
+        for row, way in zip(tip, ways[axis].tolist(), strict=True):
+            if way:
+                row += way * q[:, axis]
+    return np.ascontiguousarray(tip.T)
 
 
 def _rotary_at_zero(machine: Machine, q: Array) -> Array:

@@ -179,6 +179,17 @@ class Machine:
         assert self._perfect_route is not None
         return self._perfect_route.ways_together(names) if len(names) == 3 else None
 
+    @cached_property
+    def at_zero(self) -> tuple[Array, Array]:
+        """Of a perfect machine with its rotary axes at zero: the tip with all linear axes at zero and no tool, (3,) mm,
+
+        and how it follows each linear axis, (n_axes, 3) mm per mm; zeros for rotary ones.
+        """
+        nowhere, ways = np.zeros(len(self.axes)), np.zeros((len(self.axes), 3))
+        linear = np.flatnonzero(~self.rotary)
+        ways[linear] = self.follows(nowhere, tuple(linear.tolist())).T
+        return self.tip(nowhere), ways
+
     # -- what it does -------------------------------------------------------------------------------------------------
 
     def tip(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
@@ -260,6 +271,22 @@ class Machine:
         for part, chunk in poses.chunks():
             out[:, :, part] = self._perfect_route.follows(chunk, axes)
         return _poses_first(out, shape)
+
+    def placed(self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
+        """Where X, Y and Z (columns `axes`) of a perfect machine have to be for the tip to be at `target` (n, 3) mm.
+
+        q  (n, n_axes) where all other axes are
+
+        Shape (n, 3). Only with `linear_ways` that span space.
+        """
+        assert self.linear_ways is not None
+        assert self._perfect_route is not None
+        _, poses = flatten(q, State(tool_length), self.axes, frozenset())
+        goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
+        back, out = np.linalg.inv(self.linear_ways), np.empty_like(goal)
+        for part, chunk in poses.chunks():
+            out[:, part] = self._perfect_route.placed(chunk, axes, back, goal[:, part])
+        return np.ascontiguousarray(out.T)
 
     def axis_jacobian(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """The derivative of the nominal tip pose by the axis positions, shape (..., 6, n_axes); see `Jacobians`."""

@@ -68,6 +68,17 @@ class Route:
             out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, *turns)
         return out
 
+    def placed(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
+        """Where linear axes have to be for the tip to be at `target` (3, n) mm, (3, n); of a route without errors.
+
+        back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
+        """
+        way = steps.brought_back(self.plain[0], axes, *target, poses.tool_length, poses.positions, self.turns(poses))
+        out = np.empty(target.shape)
+        for row, each in zip(out, back.tolist(), strict=True):
+            row[:] = steps.dot(each, way)
+        return out
+
     def ways_together(self, axes: Sequence[int]) -> Array | None:
         """The directions of linear axes as columns; None if they are none, or if others turn some of them only."""
         legs, found = self.plain[0], []

@@ -256,6 +256,32 @@ def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
     return x, y, z
 
 
+def brought_back(
+    steps: Steps, axes: Sequence, x: Number, y: Number, z: Number, length: Number, q: Numbers, turns: Any
+) -> Any:
+    """What linear axes have yet to do, together, to bring a tool tip to x y z: along x, y, z; steps without errors.
+
+    axes   their columns; no rotary axis stands between them
+    turns  sines and versines of the rotary ones
+    """
+    start, d, p, (sine, versine) = steps.start, steps.direction, steps.point, turns
+    ax, ay, az = start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
+    led = [i for i, axis in enumerate(steps.axis) if steps.kind[i] == SHIFT and axis in axes]
+    for i in range(led[0]):
+        axis, j = steps.axis[i], 3 * i
+        if steps.kind[i] == SHIFT:
+            ax, ay, az = ax + d[j] * q[axis], ay + d[j + 1] * q[axis], az + d[j + 2] * q[axis]
+        else:
+            ax, ay, az = turned(ax, ay, az, *d[j : j + 3], *p[j : j + 3], sine[axis], versine[axis])
+    for i in reversed(range(led[0], len(steps.kind))):
+        axis, j = steps.axis[i], 3 * i
+        if steps.kind[i] == TURN:
+            x, y, z = turned(x, y, z, *d[j : j + 3], *p[j : j + 3], -sine[axis], versine[axis])
+        elif axis not in axes:
+            x, y, z = x - d[j] * q[axis], y - d[j + 1] * q[axis], z - d[j + 2] * q[axis]
+    return x - ax, y - ay, z - az
+
+
 def volume(a: Any, b: Any, c: Any) -> Any:
     """What three vectors x y z span, and their cross products b x c, c x a and a x b."""
     p = b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]

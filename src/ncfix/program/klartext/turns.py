@@ -32,9 +32,8 @@ def on_its_side(source: bytes, letter: str, nominal: float, angle: float, step: 
     """A corrected angle, degrees; not below zero or past a full turn where the program never is. `step`: one digit."""
     if abs(angle - nominal) < UNCORRECTED:
         return angle
-    lowest, highest = extremes(source, letter)
-    if nominal >= 0.0 > angle and lowest >= 0.0:
+    if nominal >= 0.0 > angle and extremes(source, letter)[0] >= 0.0:
         return 0.0
-    if nominal < FULL <= angle and highest < FULL:
+    if nominal < FULL <= angle and extremes(source, letter)[1] < FULL:
         return FULL - step
     return angle

@@ -11,8 +11,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import NUMERIC, find_numbers, table
-from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, odd_blocks, shape_keys
+from ncfix.program.numbers import find_numbers, is_numeric, runs_of, table
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, first_numbers, odd_blocks, shape_keys
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -37,27 +37,28 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     quiet = np.array([match.span() for match in PASSIVE.finditer(source)], dtype=np.int64).reshape(-1, 2)
     final = [match.span() for match in PASSIVE.finditer(source) if match["comment"] is not None]
     comments = np.array(final, dtype=np.int64).reshape(-1, 2)
-    numeric = NUMERIC[text] & ~cover(len(text), quiet[:, 0], quiet[:, 1]) & ~in_names(text, source)
+    numeric = is_numeric(text)
+    numeric &= ~in_names(text, source)
+    if len(quiet):
+        numeric &= ~cover(len(text), quiet[:, 0], quiet[:, 1])
     numbers = find_numbers(text, numeric, FIXED)
-    owner = block_of(blocks, numbers.spans[:, 0])
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    shapes = shape_keys(text, blocks, numbers.spans, comments, marks)
+    shapes = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
     heads = np.array([match.start() for match in PATH.finditer(source)], dtype=np.int64)
-    for block in {*owner[numbers.broken].tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}:
+    broken = block_of(blocks, numbers.spans[numbers.broken, 0])
+    for block in {*broken.tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}:
         shapes[block] = None
-    first = np.searchsorted(owner, np.arange(len(blocks) + 1))
-    return Scan(shapes, comment, first, numbers.spans, numbers.values)
+    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
 
 
 def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
     """(n,) the digits that belong to a name of two letters or more, or to an extended address."""
-    word = NAMES[text]
-    begins = word & ~np.concatenate(([False], word[:-1]))
-    start = np.maximum.accumulate(np.where(begins, np.arange(len(text)), 0))
+    words = runs_of(NAMES[text])
+    start = words[:, 0]
     second = text[np.minimum(start + 1, len(text) - 1)]
-    named = word & LETTER[text[start]] & LETTER[second]
+    named = cover(len(text), *words[LETTER[text[start]] & LETTER[second]].T)
     for match in EXTENSION.finditer(source):
         named[slice(*match.span(1))] = True
     return np.asarray(named)
