@@ -19,16 +19,14 @@ FIXED = table(b"GgMmRr")
 
 LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
 LETTER = table(LETTERS)
-NAMES = table(LETTERS + b"0123456789")
+DIGITS, BLANKS = b"0123456789", b" \t"
+NAMES = table(LETTERS + DIGITS)
 
 PASSIVE = re.compile(rb'"[^"\r\n]*"|(?P<comment>;[^\r\n]*)')
 """Strings and comments: there are no numbers in them."""
 
 PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
 """The line of an archive that says where a program belongs: no comment, though it looks like one."""
-
-EXTENSION = re.compile(rb"(?<![A-Za-z_$])[A-Za-z](\d+)(?=[ \t]*=)")
-"""The number of an extended address."""
 
 
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
@@ -59,6 +57,18 @@ def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
     start = words[:, 0]
     second = text[np.minimum(start + 1, len(text) - 1)]
     named = cover(len(text), *words[LETTER[text[start]] & LETTER[second]].T)
-    for match in EXTENSION.finditer(source):
-        named[slice(*match.span(1))] = True
-    return np.asarray(named)
+    for place in np.flatnonzero(text == ord("=")).tolist():
+        named[slice(*extension(source, place))] = True
+    return named
+
+
+def extension(source: bytes, place: int) -> tuple[int, int]:
+    """Where the number of an extended address stands before an equals sign at `place`; nowhere if it is none."""
+    stop = place
+    while stop and source[stop - 1] in BLANKS:
+        stop -= 1
+    start = stop
+    while start and source[start - 1] in DIGITS:
+        start -= 1
+    alone = start > 0 and source[start - 1] in LETTERS[:-2] and (start == 1 or source[start - 2] not in LETTERS)
+    return (start, stop) if alone else (stop, stop)
