@@ -14,14 +14,14 @@ halved.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.ragged import largest, offsets, owners, places
-from ncfix.compensate.rows import lengths, picked, spread
+from ncfix.compensate.ragged import largest, offsets
 
 
 class Cuttable(Protocol):
@@ -38,7 +38,7 @@ class Cuttable(Protocol):
         """Which pieces are arcs (p,), and their centres (p, 3)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Grid:
     """Nodes of motions, flat, all nodes of a motion next to each other.
 
@@ -56,17 +56,25 @@ class Grid:
     def deviations(self, first: Index, last: Index) -> Array:
         """The largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
         inner = last - first - 1
-        piece = owners(inner)
-        node = first[piece] + 1 + places(inner)
-        a, b = first[piece], last[piece]
-        share = (self.fraction[node] - self.fraction[a]) / (self.fraction[b] - self.fraction[a])
-        before, axes = picked(self.command, a), self.command.shape[1]
-        command = before + spread(share, axes) * (picked(self.command, b) - before)
-        short, follow = command - picked(self.command, node), picked(self.follow, node)
-        off = follow[:, :, 0] * short[:, None, 0]
-        for j in range(1, short.shape[1]):
-            off += follow[:, :, j] * short[:, None, j]
-        return largest(lengths(off), inner)
+        begin = offsets(inner)
+        node = np.arange(int(begin[-1])) + np.repeat(first + 1 - begin[:-1], inner)
+        fraction = self.fraction
+        begun, way = (np.repeat(each, inner) for each in (fraction[first], fraction[last] - fraction[first]))
+        share = (fraction[node] - begun) / way
+        off = np.zeros((3, len(node)))
+        for command, follow in self._columns:
+            start, way = (np.repeat(each, inner) for each in (command[first], command[last] - command[first]))
+            short = start + share * way - command[node]
+            for row, each in zip(off, follow, strict=True):
+                row += each[node] * short
+        square: Array = largest(off[0] * off[0] + off[1] * off[1] + off[2] * off[2], inner)
+        return np.sqrt(square)
+
+    @cached_property
+    def _columns(self) -> list[tuple[Array, Array]]:
+        """Commands (k,) of the axes that the tip follows at all, and how it follows them (3, k)."""
+        axes = np.flatnonzero(self.follow.any(axis=(0, 1))).tolist()
+        return [(self.command[:, j].copy(), np.ascontiguousarray(self.follow[:, :, j].T)) for j in axes]
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
         """No piece is an arc."""
