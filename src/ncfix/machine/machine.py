@@ -181,9 +181,9 @@ class Machine:
 
     @cached_property
     def at_zero(self) -> tuple[Array, Array]:
-        """Of a perfect machine with its rotary axes at zero: the tip with all linear axes at zero and no tool, (3,) mm,
+        """Where a perfect machine with all axes at zero and no tool has its tip, (3,) mm.
 
-        and how it follows each linear axis, (n_axes, 3) mm per mm; zeros for rotary ones.
+        And how the tip follows each linear axis there, (n_axes, 3) mm per mm; zeros for rotary ones.
         """
         nowhere, ways = np.zeros(len(self.axes)), np.zeros((len(self.axes), 3))
         linear = np.flatnonzero(~self.rotary)
@@ -283,7 +283,8 @@ class Machine:
         assert self._perfect_route is not None
         _, poses = flatten(q, State(tool_length), self.axes, frozenset())
         goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
-        back, out = np.linalg.inv(self.linear_ways), np.empty_like(goal)
+        back: Array = np.linalg.inv(self.linear_ways).astype(np.float64)
+        out = np.empty_like(goal)
         for part, chunk in poses.chunks():
             out[:, part] = self._perfect_route.placed(chunk, axes, back, goal[:, part])
         return np.ascontiguousarray(out.T)

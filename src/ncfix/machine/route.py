@@ -73,7 +73,8 @@ class Route:
 
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
         """
-        way = steps.brought_back(self.plain[0], axes, *target, poses.tool_length, poses.positions, self.turns(poses))
+        x, y, z = target
+        way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))
         out = np.empty(target.shape)
         for row, each in zip(out, back.tolist(), strict=True):
             row[:] = steps.dot(each, way)

@@ -271,14 +271,16 @@ def brought_back(
         axis, j = steps.axis[i], 3 * i
         if steps.kind[i] == SHIFT:
             ax, ay, az = ax + d[j] * q[axis], ay + d[j + 1] * q[axis], az + d[j + 2] * q[axis]
-        else:
-            ax, ay, az = turned(ax, ay, az, *d[j : j + 3], *p[j : j + 3], sine[axis], versine[axis])
+            continue
+        line = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
+        ax, ay, az = turned(ax, ay, az, *line, sine[axis], versine[axis])
     for i in reversed(range(led[0], len(steps.kind))):
         axis, j = steps.axis[i], 3 * i
+        line = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
         if steps.kind[i] == TURN:
-            x, y, z = turned(x, y, z, *d[j : j + 3], *p[j : j + 3], -sine[axis], versine[axis])
+            x, y, z = turned(x, y, z, *line, -sine[axis], versine[axis])
         elif axis not in axes:
-            x, y, z = x - d[j] * q[axis], y - d[j + 1] * q[axis], z - d[j + 2] * q[axis]
+            x, y, z = x - line[0] * q[axis], y - line[1] * q[axis], z - line[2] * q[axis]
     return x - ax, y - ay, z - az
 
 

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
+from ncfix.program.bulk_missing import missing, with_those_before
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
-from ncfix.program.number_text import ROUNDED, Styles, in_style, is_plain, plain, rounded, styles_of
+from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, line_end
@@ -255,7 +256,7 @@ class Stretch:
     values    (k, n_axes) what will stand there: as written now, as written anew, or where the axis is left
     rewrite   words that get another value
     add       axes that get a word
-    styles    of all words, in the order of `words[words >= 0]`
+    styles    of the words that get another value, in the order of `words[rewrite]`
     """
 
     bulk: Bulk
@@ -287,16 +288,22 @@ class Stretch:
         original = np.where(worded, program.numbers[np.maximum(words, 0)], wanted)
         rewrite = present & ((np.abs(wanted - original) >= half) | np.append(further[1:], False)[:, None])
         signed = bulk.layouts.manner.signed
-        styles = styles_of(bulk.text, program.number_spans[words[worded]], signed=signed)
+        anew = worded & rewrite
+        styles = styles_of(bulk.text, program.number_spans[words[anew]], signed=signed)
         digits = np.broadcast_to(decimals, words.shape).copy()
-        digits[worded] = np.maximum(digits[worded], styles.decimals)
+        digits[anew] = np.maximum(digits[anew], styles.decimals)
         clear = is_plain(wanted, digits) | (present & ~rewrite)
-        clear[worded] &= styles.clear | ~rewrite[worded]
+        clear[anew] &= styles.clear
         values = np.where(present & ~rewrite, original, rounded(wanted, digits))
         add = np.zeros_like(present)
-        if not present.all():
-            stays = ~present & bulk.layouts.nameless(program, block)
-            add = _missing(frame.program(position.copy()), values, present, wanted, half, clear, stays)
+        lacking = np.flatnonzero(~present.all(axis=1))
+        if len(lacking):
+            near = with_those_before(lacking, len(present))
+            few, fine = present[near], clear[near]
+            stays = ~few & bulk.layouts.nameless(program, block[near])
+            start = frame.program(position.copy())
+            add[near] = missing(start, values[near], few, wanted[near], half, fine, stays)
+            clear[near] = fine
             clear[further & ~add.any(axis=1)] = False
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
@@ -306,7 +313,7 @@ class Stretch:
         if fine.all():
             return self
         count = int(np.flatnonzero(~self.further[: int(np.argmin(fine)) + 1])[-1])
-        styles = self.styles.rows(np.arange(np.count_nonzero(self.words[:count] >= 0)))
+        styles = self.styles.rows(np.arange(np.count_nonzero(self.rewrite[:count])))
         columns = ("block", "further", "words", "wanted", "values", "rewrite", "add", "clear")
         return replace(self, styles=styles, **{name: getattr(self, name)[:count] for name in columns})
 
@@ -330,7 +337,7 @@ class Stretch:
         numbers = self.words[self.rewrite]
         order = np.argsort(numbers, kind="stable")
         rows, columns = (index[order] for index in np.nonzero(self.rewrite))
-        styles = self.styles.rows(np.flatnonzero(self.rewrite[self.words >= 0])[order])
+        styles = self.styles.rows(order)
         texts = in_style(self.wanted[rows, columns], styles, self.decimals[columns])
         spans = self.bulk.program.number_spans[numbers[order]]
         return Splices(spans[:, 0], spans[:, 1], texts.length, texts.data)
@@ -354,39 +361,6 @@ class Stretch:
             return words
         first, last = np.flatnonzero(begins), np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
         return with_lines(words, *lines_of(program, layouts, blocks[first], line_end(program.source)), (first, last))
-
-
-def _missing(
-    start: FloatArray,
-    values: FloatArray,
-    present: Mask,
-    wanted: FloatArray,
-    half: FloatArray,
-    clear: Mask,
-    stays: Mask,
-) -> Mask:
-    """Axes without a word that must stand elsewhere by half an output step; marks in `clear` where that is clear.
-
-    start  (n_axes,) program numbers of where the control stands before the stretch
-    stays  (k, n_axes) axes that get no word; where one must stand elsewhere by more than what rounding does to it, that
-           is not clear
-
-    After its last word an axis is left there until it is off by half a step; from then on it is on the digits, and gets
-    a word whenever the nearest digits change.
-    """
-    rows = np.arange(len(values))[:, None]
-    last_word = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
-    left_at = np.where(last_word >= 0, np.take_along_axis(values, np.maximum(last_word, 0), axis=0), start)
-    away = ~(np.abs(wanted - left_at) < half)
-    last_away = np.maximum.accumulate(np.where(away & ~present, rows, -1), axis=0)
-    held = np.vstack((np.full(len(start), -1), last_away[:-1])) <= last_word
-    before = np.where(held, left_at, np.vstack((start, values[:-1])))
-    add: Mask = ~present & ~(np.abs(wanted - before) < half)
-    clear |= ~present & held & ~away
-    if stays.any():
-        add &= ~stays
-        clear[stays] = (np.abs(wanted - left_at) <= ROUNDED * half)[stays]
-    return add
 
 
 def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:

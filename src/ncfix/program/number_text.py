@@ -55,7 +55,7 @@ def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False)
     starts, stops = spans[:, 0], spans[:, 1]
     signs = text[starts]
     first = starts + SIGN[signs]
-    found = digits_of(text, np.stack((first, stops), axis=1))
+    found = digits_of(text, np.stack((first, stops), axis=1), valued=False)
     whole = stops - first - found.decimals - found.points
     return Styles(
         decimals=found.decimals,
@@ -104,7 +104,10 @@ def in_style(values: FloatArray, styles: Styles, decimals: IntArray) -> Texts:
     value = np.copysign(steps / POWERS[digits], values) + 0.0
     kept = digits.copy()
     for _ in range(int(digits.max(initial=0))):
-        zero = (kept > styles.decimals) & (steps % 10 == 0)
+        longer = kept > styles.decimals
+        if not longer.any():
+            break
+        zero = longer & (steps % 10 == 0)
         if not zero.any():
             break
         steps[zero] //= 10
@@ -139,15 +142,26 @@ def _laid_out(
     heads: NDArray[np.uint8] | None = None,
 ) -> Texts:
     """Sign, whole digits, point and decimals in fixed columns, of which those that are wanted are taken."""
-    power = TENS[decimals]
+    right = int(decimals.max(initial=0))
+    alike = int(decimals.min(initial=right)) == right
+    power = TENS[right] if alike else TENS[decimals]  # numpy divides by one number much faster than by many
     whole = steps // power
     fraction = steps - whole * power
-    left, right = max(len(str(int(whole.max(initial=0)))), int(width.max(initial=0))), int(decimals.max(initial=0))
-    digits = np.maximum(np.searchsorted(TENS[1:], whole, side="right") + 1, width)
+    most = len(str(int(whole.max(initial=0))))
+    left = max(most, int(width.max(initial=0)))
+    digits = np.ones_like(steps)
+    for place in range(1, most):
+        digits += whole >= TENS[place]
+    digits = np.maximum(digits, width)
     digits[(whole == 0) & ~leading_zero & (decimals > 0)] = 0
     pointed = point | (decimals > 0)
     signs, points = sign[:, None].astype(np.uint8), np.full((len(steps), 1), POINT, dtype=np.uint8)
-    parts = [signs, _in_quads(whole, left), points, _in_quads(fraction * TENS[right - decimals], right)]
+    parts = [
+        signs,
+        _in_quads(whole, left),
+        points,
+        _in_quads(fraction if alike else fraction * TENS[right - decimals], right),
+    ]
     masks = [signs != 0, AT_END[left][digits], pointed[:, None], AT_START[right][decimals]]
     if heads is not None:
         parts, masks = [heads, *parts], [heads != 0, *masks]

@@ -148,16 +148,17 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     return values, broken
 
 
-def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> Digits:
-    """What stands in runs of digits and points; of long ones in their last sixteen bytes."""
+def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64], *, valued: bool = True) -> Digits:
+    """What stands in runs of digits and points; of long ones in their last sixteen bytes. Values only if `valued`."""
     stops, lengths = runs[:, 1], runs[:, 1] - runs[:, 0]
     padded = np.concatenate((np.zeros(2 * EIGHT, dtype=np.uint8), text))
     words = np.ndarray(len(text) + EIGHT + 1, dtype="<u8", buffer=padded.data, strides=(1,))
-    found = Digits.of(words[stops + EIGHT], np.minimum(lengths, EIGHT))
+    found = Digits.of(words[stops + EIGHT], np.minimum(lengths, EIGHT), valued)
     long = np.flatnonzero(lengths > EIGHT)
     if len(long):
-        front = Digits.of(words[stops[long]], np.minimum(lengths[long] - EIGHT, EIGHT))
-        found.value[long] += front.value * 10 ** (EIGHT - found.points[long])
+        front = Digits.of(words[stops[long]], np.minimum(lengths[long] - EIGHT, EIGHT), valued)
+        if valued:
+            found.value[long] += front.value * 10 ** (EIGHT - found.points[long])
         found.decimals[long] += np.where(front.points > 0, front.decimals + EIGHT, 0)
         found.points[long] += front.points
         found.pure[long] &= front.pure
@@ -170,6 +171,8 @@ def repeated(byte: int) -> np.uint64:
 
 
 ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
+OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIGHT + 1))], dtype=np.uint64)
+"""The highest so many bytes of eight."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
 """Every second group of so many bits."""
 POWERS = 10.0 ** np.arange(23)
@@ -186,26 +189,30 @@ class Digits:
     pure: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64]) -> Digits:
+    def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64], valued: bool = True) -> Digits:
         """Of the last `lengths` bytes of words in which the first character is the lowest byte.
 
         Eight digits are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits",
         2018). A point shows as the only zero byte when its code is taken from all bytes; the characters before it move
         up by one.
         """
-        high = ((EIGHT - lengths) * 8).astype(np.uint64)
-        words = words >> high << high
+        own = OWN[lengths]
+        words = words & own
         rest = words ^ POINTS
         points = (rest - ONES) & ~rest & TOPS
         digits = words ^ ZEROS
         others = (((digits & ~TOPS) + ABOVE) | digits) & TOPS
-        pure = others == points | (TOPS ^ TOPS >> high << high)
+        pure = others == points | (TOPS & ~own)
         point, pointed = points >> np.uint64(7), points != 0
-        behind = ~((point << np.uint64(8)) - np.uint64(1))
-        words = np.where(pointed, words & behind | (words & (point - np.uint64(1))) << np.uint64(8), words)
-        value = words & FOURS
-        for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
-            value = value * np.uint64((weight << bits) + 1) >> np.uint64(bits) & np.uint64(MASKS[bits])
+        value = np.zeros_like(words)
+        if valued:
+            behind = ~((point << np.uint64(8)) - np.uint64(1))
+            words = np.where(pointed, words & behind | (words & (point - np.uint64(1))) << np.uint64(8), words)
+            value = words & FOURS
+            for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
+                value *= np.uint64((weight << bits) + 1)
+                value >>= np.uint64(bits)
+                value &= np.uint64(MASKS[bits])
         power = point.astype(np.float64).view(np.int64) >> 52
         decimals = np.where(pointed, EIGHT - 1 - (power - 1023 >> 3), 0)
         several = (points & (points - np.uint64(1))) != 0
