@@ -114,6 +114,46 @@ def spliced(source: bytes, splices: Splices) -> bytes:
         columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
         writing_kernels.spliced(text, *columns, data, out)
         return out.tobytes()
+    other = np.flatnonzero(splices.length != stop - start)
+    if FEW * len(other) > len(splices):
+        return _laid_out(source, splices)
+    return _put_in(*_in_place(source, splices, other), splices, other)
+
+
+FEW = 4
+"""Where no more than one in so many edits changes the length of the text, the others are made where they stand."""
+
+
+def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> tuple[memoryview, list[bytes]]:
+    """The source with all edits made but the `other` ones, which change its length; and the replacements of these."""
+    ends = np.cumsum(splices.length)
+    text, kept, left, done = bytearray(source), [], [], 0
+    for begin, end in zip((ends - splices.length)[other].tolist(), ends[other].tolist(), strict=True):
+        kept.append(splices.data[done:begin])
+        left.append(splices.data[begin:end])
+        done = end
+    kept.append(splices.data[done:])
+    fitting = np.ones(len(splices), dtype=np.bool_)
+    fitting[other] = False
+    cells = np.frombuffer(text, dtype=np.uint8)
+    cells[_cover(len(text), splices.start[fitting], splices.stop[fitting])] = np.frombuffer(b"".join(kept), np.uint8)
+    return memoryview(text), left
+
+
+def _put_in(text: memoryview, texts: list[bytes], splices: Splices, other: NDArray[np.int64]) -> bytes:
+    """The text with the `other` edits made, too."""
+    pieces: list[bytes | memoryview] = []
+    done = 0
+    starts, stops = splices.start[other].tolist(), splices.stop[other].tolist()
+    for start, stop, new in zip(starts, stops, texts, strict=True):
+        pieces += (text[done:start], new)
+        done = stop
+    return b"".join([*pieces, text[done:]])
+
+
+def _laid_out(source: bytes, splices: Splices) -> bytes:
+    """The source with all edits made, by masks of what is kept and of what is new."""
+    start, stop = splices.start, splices.stop
     kept = ~_cover(len(source), start, stop)
     ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
     out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
