@@ -183,6 +183,15 @@ def test_many_edits_as_single_ones(source: bytes, data: st.DataObject) -> None:
         assert spliced(source, Splices.joined(halves)) == apply(source, edits)
 
 
+@EXAMPLES
+@given(st.integers(20, 60), st.sets(st.integers(0, 19), max_size=5), st.binary(min_size=1, max_size=3))
+def test_many_edits_of_which_few_change_the_length(count: int, other: set[int], text: bytes) -> None:
+    source = bytes(range(65, 65 + 26)) * count
+    edits = [Edit(7 * k, 7 * k + 4, text if k in other else b"%04d" % k) for k in range(count)]
+    edits += [Edit(7 * count, 7 * count, text)]
+    assert spliced(source, Splices.of(edits)) == apply(source, edits)
+
+
 def test_edits_that_overlap_are_refused() -> None:
     with pytest.raises(ValueError, match="overlap"):
         spliced(b"abcdef", Splices.of([Edit(0, 3, b""), Edit(2, 4, b"")]))
