@@ -7,11 +7,10 @@ mixed  as full, with what interrupts programs of CAM systems: comments, rapids, 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from programs import nearer as point
+from programs import nearer, save, surface
 
 STYLES = ("full", "mixed")
 START = "G0 X100. Y100. B0. C0."
@@ -65,10 +64,7 @@ def lines(blocks: int, style: str) -> Iterator[str]:
 
 def _body(blocks: int, style: str) -> Iterator[str]:
     yield from ("G17 G21 G40 G49 G80 G90 G94", "G54", "G5.1 Q1", *begin(1))
-    rows = max(1, int(math.sqrt(blocks / 6)))
-    per_row = max(2, blocks // rows)
-    for k in range(blocks):
-        at = point(k, per_row, rows)
+    for k, at in surface(blocks, nearer):
         x, y, z, b, c = at
         if style == "mixed":
             yield from odd_blocks(k, at)
@@ -78,5 +74,4 @@ def _body(blocks: int, style: str) -> Iterator[str]:
 
 def write(path: Path, blocks: int, style: str) -> None:
     """Write a program."""
-    with path.open("w", newline="") as file:
-        file.writelines(line + "\n" for line in lines(blocks, style))
+    save(path, lines(blocks, style))

@@ -11,10 +11,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from programs import point
+from programs import point, save, surface
 
 STYLES = ("full", "modal", "mixed", "tcp")
 START = "L X+200 Y+200 Z+50 B+0 C+0 FMAX"
+
+
+def half_as_wide(k: int, per_row: int, rows: int) -> tuple[float, ...]:
+    """The surface half as wide and about the middle of the table."""
+    x, y, *others = point(k, per_row, rows)
+    return 100 + x / 2, 100 + y / 2, *others
 
 
 def odd_blocks(k: int, at: tuple[float, ...], on: list[str], off: list[str]) -> list[str]:
@@ -50,13 +56,8 @@ def _body(blocks: int, style: str) -> Iterator[str]:
     on, off = (["M128"], ["M129"]) if style == "tcp" else ([], [])
     yield "BEGIN PGM LONG MM"
     yield from ("BLK FORM 0.1 Z X-10 Y-10 Z-30", "BLK FORM 0.2 X+410 Y+410 Z+20", "TOOL CALL 1 Z S12000", *on, START)
-    rows = max(1, int((blocks / 6) ** 0.5))
-    per_row = max(2, blocks // rows)
     last: dict[str, str] = {}
-    for k in range(blocks):
-        at = point(k, per_row, rows)
-        if style == "tcp":
-            at = 100 + at[0] / 2, 100 + at[1] / 2, *at[2:]
+    for k, at in surface(blocks, half_as_wide if style == "tcp" else point):
         words = dict(zip("XYZBC", (f"{value:+.4f}" for value in at), strict=True))
         yield from odd_blocks(k, at, on, off) if style in ("mixed", "tcp") else []
         if style == "modal":
@@ -71,5 +72,4 @@ def _body(blocks: int, style: str) -> Iterator[str]:
 
 def write(path: Path, blocks: int, style: str) -> None:
     """Write a program."""
-    with path.open("w", newline="") as file:
-        file.writelines(line + "\n" for line in lines(blocks, style))
+    save(path, lines(blocks, style))

@@ -8,7 +8,7 @@ mixed  modal, with rapids, comments, arcs, a dwell that may be skipped, a parame
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 STYLES = ("full", "modal", "mixed")
@@ -43,6 +43,15 @@ def nearer(k: int, per_row: int, rows: int) -> tuple[float, ...]:
     return 100 + x / 2, 100 + y / 2, z / 2, b, c
 
 
+def surface(
+    blocks: int, place: Callable[[int, int, int], tuple[float, ...]] = point
+) -> Iterator[tuple[int, tuple[float, ...]]]:
+    """So many points of the surface, or of the one that `place` gives, row by row: the number of each, and where."""
+    rows = max(1, int(math.sqrt(blocks / 6)))
+    per_row = max(2, blocks // rows)
+    return ((k, place(k, per_row, rows)) for k in range(blocks))
+
+
 def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
     """What interrupts a mixed program at some of its points."""
     x, y, z, b, c = at
@@ -65,11 +74,8 @@ def odd_blocks(k: int, at: tuple[float, ...]) -> list[str]:
 def lines(blocks: int, style: str) -> Iterator[str]:
     """The lines of a program with about so many blocks."""
     yield from HEAD[style]
-    rows = max(1, int(math.sqrt(blocks / 6)))
-    per_row = max(2, blocks // rows)
     last: dict[str, str] = {}
-    for k in range(blocks):
-        at = point(k, per_row, rows)
+    for k, at in surface(blocks):
         words = dict(zip("XYZBC", (f"{value:.4f}" for value in at), strict=True))
         if style == "full":
             text = " ".join(letter + value for letter, value in words.items())
@@ -85,5 +91,10 @@ def lines(blocks: int, style: str) -> Iterator[str]:
 
 def write(path: Path, blocks: int, style: str) -> None:
     """Write a program."""
+    save(path, lines(blocks, style))
+
+
+def save(path: Path, text: Iterator[str]) -> None:
+    """Write lines into a file."""
     with path.open("w", newline="") as file:
-        file.writelines(line + "\n" for line in lines(blocks, style))
+        file.writelines(line + "\n" for line in text)

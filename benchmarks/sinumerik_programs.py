@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from programs import nearer as point
+from programs import nearer, save, surface
 
 STYLES = ("full", "vectors", "mixed")
 START = "G0 X100. Y100. Z50. B0. C0."
@@ -83,10 +83,7 @@ def lines(blocks: int, style: str) -> Iterator[str]:
 
 def _body(blocks: int, style: str) -> Iterator[str]:
     yield from HEAD
-    rows = max(1, int(math.sqrt(blocks / 6)))
-    per_row = max(2, blocks // rows)
-    for k in range(blocks):
-        at = point(k, per_row, rows)
+    for k, at in surface(blocks, nearer):
         x, y, z, b, c = at
         if style == "mixed":
             yield from odd_blocks(k, at)
@@ -103,5 +100,4 @@ def _body(blocks: int, style: str) -> Iterator[str]:
 
 def write(path: Path, blocks: int, style: str) -> None:
     """Write a program."""
-    with path.open("w", newline="") as file:
-        file.writelines(line + "\n" for line in lines(blocks, style))
+    save(path, lines(blocks, style))
