@@ -203,8 +203,8 @@ def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> 
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
     tools, states = intent.lengths(move), intent.states(move, at)
     commands = written.segments.at(piece, fraction)
-    intended, done = intent.joints_at(move, at), intent.joints(move, commands)
-    tip = intent.machine.tip(intended, tools)
+    programmed = intent.segments.at(move, at)
+    intended, done, tip = intent.joints(move, programmed), intent.joints(move, commands), intent.meant(move, programmed)
     before, after = (
         lengths(correctable(intent, move, commands, intent.machine.actual_tip(q, states) - tip))
         for q in (intended, done)

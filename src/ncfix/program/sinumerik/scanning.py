@@ -32,8 +32,9 @@ PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block."""
     text = np.frombuffer(source, dtype=np.uint8)
-    quiet = np.array([match.span() for match in PASSIVE.finditer(source)], dtype=np.int64).reshape(-1, 2)
-    final = [match.span() for match in PASSIVE.finditer(source) if match["comment"] is not None]
+    passive = list(PASSIVE.finditer(source)) if b";" in source or b'"' in source else []
+    quiet = np.array([match.span() for match in passive], dtype=np.int64).reshape(-1, 2)
+    final = [match.span() for match in passive if match["comment"] is not None]
     comments = np.array(final, dtype=np.int64).reshape(-1, 2)
     numeric = is_numeric(text)
     numeric &= ~in_names(text, source)
@@ -44,7 +45,8 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
     shapes = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
-    heads = np.array([match.start() for match in PATH.finditer(source)], dtype=np.int64)
+    paths = PATH.finditer(source) if b";" in source else ()
+    heads = np.array([match.start() for match in paths], dtype=np.int64)
     broken = block_of(blocks, numbers.spans[numbers.broken, 0])
     for block in {*broken.tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}:
         shapes[block] = None
