@@ -186,8 +186,7 @@ class Machine:
         And how the tip follows each linear axis there, (n_axes, 3) mm per mm; zeros for rotary ones.
         """
         nowhere, ways = np.zeros(len(self.axes)), np.zeros((len(self.axes), 3))
-        linear = np.flatnonzero(~self.rotary)
-        ways[linear] = self.follows(nowhere, tuple(linear.tolist())).T
+        ways[~self.rotary] = self.follows(nowhere, tuple(np.flatnonzero(~self.rotary).tolist())).T
         return self.tip(nowhere), ways
 
     # -- what it does -------------------------------------------------------------------------------------------------
