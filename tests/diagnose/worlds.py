@@ -117,7 +117,9 @@ class World:
             numbers = np.zeros(loading.shape[1])
             numbers[:2] = 1.0, random.uniform(-0.8, 0.8)
         elif kind in ("radial", "axial", "wobble", "encoder"):
-            numbers = numbers * np.tile(np.repeat([1.0, 0.35, 0.1, *(0.0,) * 5], 2), len(candidate.effects))
+            numbers = numbers * np.tile(
+                np.repeat([1.0, 0.35, 0.1, *(0.0,) * 5][: lead.basis.size // 2], 2), len(candidate.effects)
+            )
             loading = np.eye(len(candidate.effects) * lead.basis.size)
         return self.view.design(candidate.effects) @ (loading @ numbers)
 

@@ -14,6 +14,8 @@ from ncfix.machine.smooth import Backlash, Fourier
 from ncfix.measure.measurement import Array
 
 ORDERS = (1, 2, 3, 4, 5, 6, 7, 8)
+SCALE_ORDERS = ORDERS[:4]
+"""Those of an encoder: more waves a turn are a worm's, which swells along the turn, too."""
 TEETH = tuple(range(5, 181))
 """Errors per turn that a worm, gear or encoder may have."""
 
@@ -47,8 +49,9 @@ def _motions(axis: Axis, own: int) -> Iterator[Candidate]:
         ),
     )
     for name, title, letters, remedy in sorts:
-        effects = zero([Effect(f"E{letter}{q}", (), Fourier(order=ORDERS)) for letter in letters])
-        loading = stacked(*[weighed(shapes.harmonics(len(ORDERS)))] * len(letters))
+        orders = SCALE_ORDERS if name.startswith("encoder") else ORDERS
+        effects = zero([Effect(f"E{letter}{q}", (), Fourier(order=orders)) for letter in letters])
+        loading = stacked(*[weighed(shapes.harmonics(len(orders)))] * len(letters))
         yield Candidate(name, title, q, f"{q} turning", effects, (loading,), (), remedy)
 
 
