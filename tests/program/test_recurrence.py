@@ -9,7 +9,7 @@ import pytest
 from ncfix.diagnostics import SourceError
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
-from ncfix.program.recurrence import MOST, NEVER_ENDS, Recurrence
+from ncfix.program.recurrence import MOST, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
 
@@ -60,6 +60,12 @@ COUNTING = {
 def moves_of(dialect: str, text: str) -> Moves:
     program = read(text.encode(), "part", dialect)
     return trace(program, replace(SETUP, most_blocks=20_000), ("X", "Y", "Z"), frozenset()).moves
+
+
+def test_a_loop_that_waits_for_the_machine_is_not_said_to_be_endless() -> None:
+    with pytest.raises(SourceError) as error:
+        moves_of("fanuc", "%\nO1\nWHILE[#1000 EQ 0]DO1\nG4 X1.\nEND1\nG0 X1.\nM30\n%")
+    assert WAITS in str(error.value)
 
 
 @pytest.mark.parametrize("name", ENDLESS)

@@ -11,6 +11,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"
+WAITS = "the program goes round here until something changes that only the machine knows"
 MOST = 100_000
 """Jumps that are remembered; from different calls, one jump is another."""
 

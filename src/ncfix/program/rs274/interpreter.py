@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
+from ncfix.program.recurrence import NEVER_ENDS, WAITS, Recurrence, too_many
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
 from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.flow import Course, FlowControl
+from ncfix.program.rs274.flow import RUNTIME_BRANCH, Course, FlowControl
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
@@ -130,7 +130,7 @@ class Interpreter:
         jump = id(flow.unit), block, flow.block, flow.under_way()
         if self.recurrence.seen(jump, self.control.parameters.changes):
             flow.block = block + 1
-            raise Fault(ENDLESS, NEVER_ENDS)
+            raise Fault(ENDLESS, WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS)
 
     def takes_stretches(self) -> bool:
         """Whether plain motions may be taken many at once: nothing is done between them."""
