@@ -137,6 +137,12 @@ def test_what_comes_back_in_several_blocks_is_not_put_down_to_the_correction() -
     assert found(machine, moves, result) == {"NCF405": [0, 1]}
 
 
+def test_what_goes_beyond_from_nobody_knows_where_is_not_put_down_to_the_correction() -> None:
+    machine = shifted(0.1)
+    moves = motions(machine, (np.nan, np.nan, np.nan), [(1.5 * STROKE, 0, 0)])
+    assert found(machine, moves, corrected(machine, moves)) == {"NCF405": [0]}
+
+
 @pytest.mark.parametrize(("size", "refused"), [(0.499, False), (0.5, False), (0.501, True), (5.0, True)])
 def test_a_correction_above_the_machines_limit_is_refused_never_cut_short(size: float, refused: bool) -> None:
     machine = shifted(size)

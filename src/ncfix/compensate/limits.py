@@ -70,7 +70,7 @@ def beyond_ranges(written: Written) -> tuple[Finding, Finding]:
     """
     programmed, corrected = programmed_excess(written), _corrected_excess(written)
     if (corrected > FUZZ).any():
-        programmed = np.maximum(programmed, _begun_beyond(written, corrected))
+        programmed = np.fmax(programmed, _begun_beyond(written, corrected))
         corrected[programmed > FUZZ] = -np.inf
     outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
     over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
