@@ -67,3 +67,22 @@ def test_conditions_of_the_setup_reach_the_error_model() -> None:
     assert cool.text == program.source
     with pytest.raises(UsageError, match="temp_spindle"):
         fix_program(program, machine, SETUP)
+
+
+TILTING_GUIDE = """
+[[effect]]
+name = "EBX"
+basis = "polynomial"
+degree = [1]
+coefficients = [1e-7]
+"""
+
+
+@pytest.mark.parametrize(("code", "length"), [("G43", -300.0), ("G44", 100.0)])
+def test_an_offset_below_zero_is_no_length_where_the_errors_depend_on_it(code: str, length: float) -> None:
+    """A distance by which the tool was touched off would turn the lever of the tool round."""
+    program = read(b"G21 G90 G54\nT1 M6\n%b H1\nG0 X10. Y0. Z10.\nM30\n" % code.encode(), "a.nc", "fanuc")
+    setup = Setup(assume_zero=True, tools={1: Tool(length)})
+    with pytest.raises(UsageError, match="does not say how long"):
+        follow(program, loads(ROTARY_TABLE + TILTING_GUIDE), setup)
+    assert follow(program, loads(ROTARY_TABLE), setup).trace.moves.tool_length[-1] == -abs(length)

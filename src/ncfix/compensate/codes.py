@@ -161,4 +161,12 @@ CODES = {
         "Loops, subprogram calls and expressions are gone from the program that is written.",
         "Keep the original: changes are better made there.",
     ),
+    "NCF446": Code(
+        "length offset that is no length",
+        "The length offset in force is below zero: a distance by which the tool was touched off, or one that is taken "
+        "off (G44). The errors of this machine depend on how long the tool is, and such a distance does not say that.",
+        "Give the length from the gauge line to the tip (`--tool 1=120`), and make the work offset lower by the "
+        "difference between that and the offset: with H1 = -300 and a tool of 120 mm, Z of the work offset is 420 mm "
+        "lower. With G44 use G43 and such a length.",
+    ),
 }

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands
 from ncfix.diagnostics import Message, UsageError
@@ -86,21 +87,42 @@ def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: S
     """The trace with every tool length known.
 
     Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
-    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero.
+    raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero, and NCF446 naming every
+    tool with a length below zero, which is a distance of another kind.
     """
     moves = found.moves
+    if machine.depends_on_tool_length:
+        _require_lengths(program, moves)
     unknown = np.isnan(moves.tool_length)
     known = replace(found, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
     unknown &= moves.rule == Rule.CORRECT
     if not machine.depends_on_tool_length or not unknown.any():
         return known
-    tools, rows = np.unique(np.where(unknown, moves.tool, -1), return_index=True)
-    first = {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
+    first = _first_motions(moves, unknown)
     if not setup.assume_zero:
         raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
     notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
     assumed = (*found.assumed, *(f"length of tool {tool}" for tool in first))
     return replace(known, messages=(*found.messages, *notes), assumed=assumed)
+
+
+def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
+    """Tool -> the first of the chosen motions (n,) that is made with it."""
+    tools, rows = np.unique(np.where(chosen, moves.tool, -1), return_index=True)
+    return {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
+
+
+def _require_lengths(program: Program, moves: Moves) -> None:
+    """Raises UsageError NCF446: a length offset below zero does not say how long the tool is."""
+    below = _first_motions(moves, (moves.tool_length < 0) & (moves.rule == Rule.CORRECT))
+    if below:
+        raise UsageError.collected(_no_length(program, moves, tool, row) for tool, row in below.items())
+
+
+def _no_length(program: Program, moves: Moves, tool: int, row: int) -> Message:
+    text = f"the length offset of tool {tool} is {moves.tool_length[row]:g} mm: that does not say how long the tool is"
+    hint = "give its length from the gauge line to the tip, and the work offset lower by the difference"
+    return Message("NCF446", text, program.place(int(moves.block[row])), hint)
 
 
 def _tool_needed(program: Program, moves: Moves, tool: int, row: int) -> Message:
