@@ -115,6 +115,13 @@ def test_after_an_offset_of_nothing_the_tool_is_as_long_as_without_one() -> None
     assert (iso.tool_length.tolist(), iso.end[:, 2].tolist()) == ([50, 100], [51, 2])
 
 
+def test_an_offset_that_is_assumed_to_be_zero_is_one() -> None:
+    """What is lacking is said once: the length of the tool of the offset, not that of the spindle as well."""
+    followed = follow("T2 M6\nG43 H1\nG0 X1. Y1. Z1.", dialect="fanuc", tools={}, assume_zero=True)
+    assert (followed.moves.tool.tolist(), followed.moves.tool_length.tolist()) == ([1], [0.0])
+    assert followed.assumed.count("length of tool 1") == 1
+
+
 # -- rotation of ISO controls -----------------------------------------------------------------------------------------
 
 

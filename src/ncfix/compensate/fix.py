@@ -111,6 +111,10 @@ def _written(program: Program, settled: Settled, machine: Machine, options: FixO
     return spliced(program.source, Splices.joined([settled.emission.splices, Splices.of([edit])]))
 
 
+SHORT_LINE = 250
+"""Characters that a line may have on any control."""
+
+
 def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: tuple[str, ...]) -> str:
     """The text of the stamp that a corrected program gets; `assumed` names what was taken as zero."""
     words = (
@@ -118,7 +122,7 @@ def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: t
     )
     if assumed:
         words += f", assumed zero: {', '.join(assumed)}"
-    return words[: (program.dialect.line_limit or 250) - 10]
+    return words[: min(program.dialect.line_limit or SHORT_LINE, SHORT_LINE) - 10]
 
 
 def _errors(machine: Machine, settled: Settled, split_rapids: bool) -> PathError:

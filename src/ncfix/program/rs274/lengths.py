@@ -43,7 +43,8 @@ def change_tool(control: Control, block: Block, code: int) -> None:
 def tool_offset(control: Control, block: Block, code: int) -> None:
     """G43, G43.1, G43.2, G43.4, G43.5, G44 and G49.
 
-    An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells.
+    An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells. One that
+    was not given and is taken as zero is one.
     """
     tool, number = zeros(), None
     if code in (431, 432):
@@ -60,7 +61,8 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     if on or control.tcp:
         tcp.switch(control, tool, on)
     control.places.shift(mask_of((X, Y, Z) if on else (Z,)))
-    control.offsets.tool, control.tools.offset = tool, number if any(tool) or on else None
+    is_one = on or any(tool) or (code not in (431, 432) and number and is_lacking(control, number))
+    control.offsets.tool, control.tools.offset = tool, number if is_one else None
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()
 
@@ -88,6 +90,11 @@ def numbered_tool(control: Control, block: Block) -> int:
     if number < 0:
         raise Fault(BAD_LENGTH, f"H{number} is negative")
     return control.tools.spindle if number == 0 and control.rules.strict else number
+
+
+def is_lacking(control: Control, number: int) -> bool:
+    """Whether nobody has said how long a tool is."""
+    return number not in control.tools.lengths and control.knowledge.known_tool_length(number) is None
 
 
 def length_of(control: Control, number: int) -> float:
