@@ -91,7 +91,8 @@ def test_an_offset_below_zero_is_no_length_where_the_errors_depend_on_it(code: s
 def test_a_stamp_fits_on_a_line_of_any_control_whatever_was_assumed() -> None:
     tools = "".join(f"T{number} M6\nG43 H{number}\nG0 X{number}. Y1. Z1.\n" for number in range(1, 41))
     program = read(f"G21 G90 G54\n{tools}M30\n".encode(), "a.nc", "iso")
-    machine = loads(ROTARY_TABLE + '[[effect]]\nname = "EXX"\nbasis = "polynomial"\ndegree = [1]\ncoefficients = [1e-4]\n')
+    stretched = TILTING_GUIDE.replace("EBX", "EXX").replace("1e-7", "1e-3")
+    machine = loads(ROTARY_TABLE + stretched)
     stamp = next(line for line in fix_program(program, machine, SETUP).text.splitlines() if b"ncfix" in line)
     assert b"work offset G54" in stamp
     assert len(stamp) <= 250
