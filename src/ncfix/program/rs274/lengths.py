@@ -15,6 +15,9 @@ from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"
+BY_WORDS = (431, 432)
+"""G43.1 and G43.2."""
+
 DIFFERS = "what G10 L{} sets differs from control to control (--dialect says which one it is)"
 
 
@@ -46,13 +49,8 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     An offset without any length (H0, G43.1 Z0) is none: how long the tool is, the one in the spindle tells. One that
     was not given and is taken as zero is one.
     """
-    tool, number = zeros(), None
-    if code in (431, 432):
-        tool, number = offset_by_words(control, block, added=code == 432)
-    elif code != 490:
-        number = numbered_tool(control, block)
-        tool[Z] = length_of(control, number) * (-1.0 if code == 440 else 1.0)
-    if "H" in block.runtime or (code in (431, 432) and block.runtime):
+    tool, number, lacking = offset_of(control, block, code)
+    if "H" in block.runtime or (code in BY_WORDS and block.runtime):
         control.refusal = control.refusal or "a tool length offset is known only at run time"
     if code == 435:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
@@ -61,10 +59,20 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
     if on or control.tcp:
         tcp.switch(control, tool, on)
     control.places.shift(mask_of((X, Y, Z) if on else (Z,)))
-    is_one = on or any(tool) or (code not in (431, 432) and number and is_lacking(control, number))
-    control.offsets.tool, control.tools.offset = tool, number if is_one else None
+    control.offsets.tool, control.tools.offset = tool, number if on or any(tool) or lacking else None
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()
+
+
+def offset_of(control: Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:
+    """What a code sets: the offset, the number of its tool (None: there is none any more), and if its length is lacking."""
+    if code == 490:
+        return zeros(), None, False
+    if code in BY_WORDS:
+        return *offset_by_words(control, block, added=code == 432), False
+    tool, number = zeros(), numbered_tool(control, block)
+    tool[Z] = length_of(control, number) * (-1.0 if code == 440 else 1.0)
+    return tool, number, number > 0 and is_lacking(control, number)
 
 
 def offset_by_words(control: Control, block: Block, *, added: bool) -> tuple[Vector, int]:
