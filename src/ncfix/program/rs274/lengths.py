@@ -65,7 +65,7 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
 
 
 def offset_of(control: Control, block: Block, code: int) -> tuple[Vector, int | None, bool]:
-    """What a code sets: the offset, the number of its tool (None: there is none any more), and if its length is lacking."""
+    """What a code sets: the offset, the number of its tool (None without one), and whether its length is lacking."""
     if code == 490:
         return zeros(), None, False
     if code in BY_WORDS:
