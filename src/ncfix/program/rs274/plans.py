@@ -35,9 +35,10 @@ NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
 POLAR = frozenset("@^")
+"""Addresses that together stand for X and Y."""
+
 SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
-"""Addresses that together stand for X and Y."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
 CONFLICT = "NCF208"
