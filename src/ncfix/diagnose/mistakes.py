@@ -75,16 +75,25 @@ def find(measurements: Sequence[Measurement], machine: Machine, refused: Sequenc
     if agrees and not any(_looks_typed(effect) for effect in machine.effects):
         return None
     names = {plain(name) for name in refused}
-    tried = [_tried(each, left) for each in _offered(data, machine) if plain(each.name) not in names]
-    least = min((each.after_um for each in tried), default=np.inf)
+    return _convincing([_tried(each, left) for each in _offered(data, machine) if plain(each.name) not in names], now)
+
+
+def _convincing(tried: Sequence[Mistake], now: Misfit) -> Mistake | None:
+    """The simplest that leaves as little as any: one that the file itself looks like, or that explains nearly all."""
+    left, least = now.left(), min((each.after_um for each in tried), default=np.inf)
     alike = [each for each in tried if each.after_um <= AS_SIMPLE * least]
-    typed = [each for each in alike if each.likely]
-    if typed and now.count * np.log(left / typed[0].after_um) > LIKELIER:
-        return typed[0]
+    typed = next((each for each in alike if each.likely), None)
+    if typed is not None and now.count * np.log(left / typed.after_um) > LIKELIER:
+        return typed
     if not alike or not _explains(least, left, now):
         return None
-    same = tuple(each.name for each in alike[1:] if each.name.split()[0] == alike[0].name.split()[0])
-    return replace(alike[0], aliases=tuple(name for name in same if name != alike[0].name))
+    return replace(alike[0], aliases=_of_its_kind(alike))
+
+
+def _of_its_kind(alike: Sequence[Mistake]) -> tuple[str, ...]:
+    """The names of the others that begin with the same word as the first: `pivot B` beside `pivot C`."""
+    first = alike[0].name
+    return tuple(each.name for each in alike[1:] if each.name.split()[0] == first.split()[0] and each.name != first)
 
 
 def _tried(mistake: Mistake, before: float) -> Mistake:

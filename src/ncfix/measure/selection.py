@@ -89,25 +89,41 @@ def select(
 
     point = None if reference is None else (float(reference[0]), float(reference[1]), float(reference[2]))
     if wanted in MODELS:
-        new = MODELS[wanted].effects(machine)
-        return _joined(machine.replace(effects=()), new)
+        return _with_new((), (), MODELS[wanted].effects(machine))
     if wanted is None and machine.effects:
         return Selection(machine.effects, (True,) * len(machine.effects))
-    names = [name.strip() for name in (wanted or ALL).split(",") if name.strip()]
-    physical = library(machine)
-    named = [effect for name in names if name in physical for effect in physical[name].effects]
-    names = [name for name in names if name not in physical]
-    forms = {form(effect) for effect in named}
-    free = [any(_matches(each.name, name) for name in names) or form(each) in forms for each in machine.effects]
-    present = {effect.name for effect in machine.effects}
-    there = {form(effect) for effect in machine.effects}
-    new = [effect for effect in named if form(effect) not in there]
-    new += [effect for name in names for effect in _new(machine, name, present, point, knots)]
-    return Selection((*machine.effects, *dict.fromkeys(new)), (*free, *(True for _ in dict.fromkeys(new))))
+    meant = _Meant.of(machine, wanted or ALL)
+    present, there = {effect.name for effect in machine.effects}, {form(effect) for effect in machine.effects}
+    new = [effect for effect in meant.physical if form(effect) not in there]
+    new += [effect for name in meant.patterns for effect in _new(machine, name, present, point, knots)]
+    return _with_new(machine.effects, [meant.has(effect) for effect in machine.effects], new)
 
 
-def _joined(machine: Machine, new: Sequence[Effect]) -> Selection:
-    return Selection((*machine.effects, *new), (*(False for _ in machine.effects), *(True for _ in new)))
+@dataclass(frozen=True, slots=True)
+class _Meant:
+    """What a list of names means: names and patterns of errors, and the effects of names of the library."""
+
+    patterns: tuple[str, ...]
+    physical: tuple[Effect, ...]
+
+    @staticmethod
+    def of(machine: Machine, text: str) -> _Meant:
+        """A list such as `EC0Y,E?X,wind-up-X`."""
+        names = [name.strip() for name in text.split(",") if name.strip()]
+        known = library(machine)
+        physical = tuple(effect for name in names if name in known for effect in known[name].effects)
+        return _Meant(tuple(name for name in names if name not in known), physical)
+
+    def has(self, effect: Effect) -> bool:
+        """Whether an effect that is there is meant."""
+        named = any(_matches(effect.name, pattern) for pattern in self.patterns)
+        return named or any(form(effect) == form(each) for each in self.physical)
+
+
+def _with_new(there: Sequence[Effect], free: Sequence[bool], new: Sequence[Effect]) -> Selection:
+    """Effects that are there, estimated or held, and new ones, each of them once."""
+    added = tuple(dict.fromkeys(new))
+    return Selection((*there, *added), (*free, *(True for _ in added)))
 
 
 def _matches(name: str, pattern: str) -> bool:
