@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.diagnostics import UsageError
 from ncfix.tables.control import Assumption, Files, Option, Request
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import reversals
+from ncfix.tables.settings import Form, one_of
 from ncfix_fanuc.pitch_text import parameter_text, read_records
 
 NAME = "backlash.txt"
@@ -36,9 +36,15 @@ ASSUMPTION = Assumption(
     "Parameter 1006#5 (ZMI) is the direction of the return. Turn an axis round under a dial gauge with 1851 at zero, "
     "and as written: the play must have gone, not doubled.",
 )
+HOMING = Form(
+    "axes of X, Y and Z, like XY",
+    lambda text: set(text.upper()) <= set(AXES) and len(set(text.upper())) == len(text),
+)
 OPTIONS: Mapping[str, Option] = {
-    "play": Option("yes", "yes: play goes into the backlash compensation of the axes; no: it is left"),
-    "home_minus": Option("", "axes of X, Y and Z whose reference position return goes towards minus, e.g. XY"),
+    "play": Option(
+        "yes", "yes: play goes into the backlash compensation of the axes; no: it is left", one_of("yes", "no")
+    ),
+    "home_minus": Option("", "axes of X, Y and Z whose reference position return goes towards minus, e.g. XY", HOMING),
 }
 STEP = (
     "Is there a backlash.txt? Add its amounts to what parameter 1851 holds (the machine was measured with that); set "
@@ -57,10 +63,6 @@ class Backlash:
     def of(cls, request: Request, settings: Mapping[str, str], unit: float) -> Backlash:
         """The play of a machine, as it is written; unit: detection unit, mm."""
         home = "".join(sorted(settings["home_minus"].upper()))
-        if not set(home) <= set(AXES) or len(set(home)) != len(home):
-            raise UsageError.of("NCF485", f"home_minus={settings['home_minus']}", hint="axes of X, Y and Z, like XY")
-        if settings["play"] not in ("yes", "no"):
-            raise UsageError.of("NCF485", f"play={settings['play']}", hint="yes or no")
         if settings["play"] == "no":
             return cls(home_minus=home)
         found = {

@@ -14,10 +14,24 @@ from ncfix.diagnostics import Message
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.settings import Form, one_of, whole
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
-from ncfix_fanuc.filling import TEMPLATE, GridFilling
-from ncfix_fanuc.records import NAME, SIDE, TABLE, TEXT, Volc, csv_text, json_text, read_volc, template_text
-from ncfix_fanuc.units import SIGN, UNITS
+from ncfix_fanuc.filling import AXES, FITS, SAID, TEMPLATE, GridFilling
+from ncfix_fanuc.records import (
+    MOST_NUMBER,
+    NAME,
+    SIDE,
+    TABLE,
+    TEXT,
+    Volc,
+    csv_text,
+    json_text,
+    read_volc,
+    template_text,
+)
+from ncfix_fanuc.units import UNITS, sign_option
+
+ORDER = Form("XYZ, ZYX, ...: each axis once", lambda text: sorted(text) == list(AXES))
 
 
 class Fanuc(Control):
@@ -77,17 +91,21 @@ class Fanuc(Control):
         ASSUMPTION,
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": SIGN,
+        "sign": sign_option("FANUC-1"),
         "detection_unit_um": UNITS["detection_unit_um"],
-        "largest": Option("127", "largest value of a point"),
-        "order": Option("XYZ", "the axes from the one whose number runs fastest"),
-        "first_number": Option("1", "number of the first point"),
+        "largest": Option("127", "largest value of a point", whole(1, MOST_NUMBER)),
+        "order": Option("XYZ", "the axes from the one whose number runs fastest", ORDER),
+        "first_number": Option("1", "number of the first point", whole(0, MOST_NUMBER)),
         "template": Option("", f"a line of the text file, ASSUMED, e.g. {TEMPLATE}"),
         "fit": Option(
-            "auto", "nodes: exact at the points; area: least squares around them; auto: area if nodes miss more"
+            "auto",
+            "nodes: exact at the points; area: least squares around them; auto: area if nodes miss more",
+            one_of(*FITS),
         ),
         "rotary": Option(
-            "zero", "zero: exact with the rotary axes at zero; middle: between what all their angles ask for"
+            "zero",
+            "zero: exact with the rotary axes at zero; middle: between what all their angles ask for",
+            one_of(*SAID),
         ),
         **OPTIONS,
     }

@@ -14,16 +14,15 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_even_nodes, of_functions
 from ncfix.tables.mesh import AIM, Mesh, search
 from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import choice, number, whole, wrong
+from ncfix.tables.settings import wrong
 from ncfix.tables.volume import Volume
 from ncfix_fanuc.backlash import Backlash
-from ncfix_fanuc.records import MOST_MAGNIFICATION, MOST_NUMBER, SIDE, TEXT, Style, Volc, check_template
-from ncfix_fanuc.units import SIGNS, sense_of
+from ncfix_fanuc.records import MOST_MAGNIFICATION, SIDE, TEXT, Style, Volc, check_template
+from ncfix_fanuc.units import sense_of
 
 AXES = ("X", "Y", "Z")
 TEMPLATE = "N{no}A1P{dx}A2P{dy}A3P{dz};"
 FITS = {"auto": (False, True), "nodes": (False,), "area": (True,)}
-ROTARY = ("zero", "middle")
 SAID = {
     "zero": "The grid is that of rotary axes at zero; at other angles more is left (rotary=middle shares it out).",
     "middle": "The grid lies in the middle of what all angles of the rotary axes ask for, and is exact at none.",
@@ -54,9 +53,9 @@ class GridFilling:
         if not set(AXES) <= set(request.machine.axis_names):
             text = f"the grid is over X, Y and Z; the machine has {' '.join(request.machine.axis_names)}"
             raise RefusedError.of("NCF484", text, hint="correct its programs instead: ncfix fix")
-        sign = choice(settings, "sign", SIGNS, f"{' or '.join(SIGNS)}; FANUC-1 says how to find out")
-        unit = number(settings, "detection_unit_um", 0.001, 10) / 1000
-        fit, rotary = choice(settings, "fit", tuple(FITS)), choice(settings, "rotary", ROTARY)
+        sign = settings["sign"]
+        unit = float(settings["detection_unit_um"]) / 1000
+        fit, rotary = settings["fit"], settings["rotary"]
         return cls(request, sign, unit, _style(settings), Backlash.of(request, settings, unit), fit, rotary)
 
     def volc(self) -> tuple[Volc, Mesh]:
@@ -151,9 +150,7 @@ def _magnification(values: Array, largest: float) -> int:
 
 
 def _style(settings: Mapping[str, str]) -> Style:
-    if sorted(settings["order"]) != list(AXES):
-        raise wrong(settings, "order", "XYZ, ZYX, ...: each axis once")
-    first, largest = whole(settings, "first_number", 0, MOST_NUMBER), whole(settings, "largest", 1, MOST_NUMBER)
+    first, largest = int(settings["first_number"]), int(settings["largest"])
     template = settings["template"]
     try:
         if template:

@@ -14,11 +14,10 @@ from ncfix.tables.axes import DEGREE, TURNING, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
-from ncfix.tables.settings import choice
 from ncfix_fanuc.increments import at_zero, curves, pitch_of
 from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
 from ncfix_fanuc.pitch_text import MOST, NUMBERS, Pitch, parameter_text, pitch_text
-from ncfix_fanuc.units import SIGN, SIGNS, UNITS, sense_of, units_of
+from ncfix_fanuc.units import UNITS, sense_of, sign_option, units_of
 
 FIRST_NUMBER = 1
 
@@ -65,7 +64,7 @@ class FanucPitch(Control):
         ),
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": SIGN,
+        "sign": sign_option("PITCH-1"),
         **UNITS,
     }
     steps = (
@@ -80,7 +79,7 @@ class FanucPitch(Control):
     def write(self, request: Request) -> Written:
         """The increments of every axis that has something to correct, and the parameters."""
         settings = self.settings(request.settings)
-        sense = sense_of(choice(settings, "sign", SIGNS))
+        sense = sense_of(settings["sign"])
         units = units_of(settings)
         axes = in_order(request.machine)
         tables, notes = curves(request), []

@@ -25,11 +25,11 @@ from ncfix.tables.neutral import NOTHING, Compensation
 from ncfix.tables.poses import corners
 from ncfix.tables.residual import residual
 from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import choice, whole
+from ncfix.tables.settings import one_of, whole
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
 from ncfix_fanuc.rotary_fill import PART, LatticeFilling, table_axes
 from ncfix_fanuc.rotary_records import LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
-from ncfix_fanuc.units import SIGN, SIGNS, UNITS, units_of
+from ncfix_fanuc.units import UNITS, sign_option, units_of
 
 NAME, SECOND = "rotary.json", "rotary-axes.json"
 
@@ -110,7 +110,7 @@ class FanucRotary(Control):
             "The sign of lengths and angles is what --set sign says.",
             "none public; patents speak of an amount that is added",
             "none: it must be given",
-            "Load lin = [100, 0, 0] at all points: which way does X move?",
+            "Load lin = [100, 0, 0] at all points: does X move towards plus (correction) or minus (error)?",
         ),
         Assumption(
             "FROT-2",
@@ -140,11 +140,17 @@ class FanucRotary(Control):
         ASSUMPTION,
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": SIGN,
+        "sign": sign_option("FROT-1"),
         **UNITS,
-        "rotary": Option("yes", "yes: a second lattice, over the rotary axes of a table (FROT-4); no: none"),
+        "rotary": Option(
+            "yes", "yes: a second lattice, over the rotary axes of a table (FROT-4); no: none", one_of("yes", "no")
+        ),
         **OPTIONS,
-        "rotary_points": Option("72", "most points along a rotary axis; how many the control takes is not public"),
+        "rotary_points": Option(
+            "72",
+            "most points along a rotary axis; how many the control takes is not public",
+            whole(2, MOST_ROTARY),
+        ),
     }
     steps = (
         "Settle FROT-1 to FROT-4 on the machine.",
@@ -162,7 +168,7 @@ class FanucRotary(Control):
     def write(self, request: Request) -> Written:
         """`rotary.json`, and `rotary-axes.json` for machines with a table that turns."""
         settings = self.settings(request.settings)
-        sign, rotary = choice(settings, "sign", SIGNS), choice(settings, "rotary", ("yes", "no"))
+        sign, rotary = settings["sign"], settings["rotary"]
         machine = request.machine
         in_order(machine)
         if not set(LINEAR) <= set(machine.axis_names):
@@ -170,7 +176,7 @@ class FanucRotary(Control):
         if not np.allclose(machine.tool.direction, (0, 0, 1), atol=1e-9):
             raise RefusedError.of("NCF484", "the tool of this machine is not along Z", hint="use the control fanuc")
         units = units_of(settings)
-        most = whole(settings, "rotary_points", 2, MOST_ROTARY)
+        most = int(settings["rotary_points"])
         backlash = Backlash.of(request, settings, units[0])
         filling = LatticeFilling(request, sign, units, backlash)
         two = rotary == "yes" and bool(table_axes(request))

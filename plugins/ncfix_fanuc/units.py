@@ -6,14 +6,19 @@ from collections.abc import Mapping
 
 from ncfix.tables.axes import DEGREE
 from ncfix.tables.control import Option
-from ncfix.tables.settings import number
+from ncfix.tables.settings import number, one_of
 
 SIGNS = ("correction", "error")
-SIGN = Option(None, "correction: values are added to the command; error: they are taken off it")
+SIGNED = "correction: values are added to the command; error: they are taken off it"
 UNITS: Mapping[str, Option] = {
-    "detection_unit_um": Option("0.1", "detection unit of linear axes, um"),
-    "detection_unit_deg": Option("0.0001", "detection unit of rotary axes and of angles, degree"),
+    "detection_unit_um": Option("0.1", "detection unit of linear axes, um", number(1e-3, 10)),
+    "detection_unit_deg": Option("0.0001", "detection unit of rotary axes and of angles, degree", number(1e-6, 10)),
 }
+
+
+def sign_option(settled: str) -> Option:
+    """The option `sign`, with the assumption that it is about."""
+    return Option(None, SIGNED, one_of(*SIGNS), settled)
 
 
 def sense_of(sign: str) -> int:
@@ -23,5 +28,5 @@ def sense_of(sign: str) -> int:
 
 def units_of(settings: Mapping[str, str]) -> tuple[float, float]:
     """Detection units, mm and rad."""
-    length, angle = (number(settings, key, 1e-6, 10) for key in UNITS)
+    length, angle = (float(settings[key]) for key in UNITS)
     return length / 1000, angle * DEGREE

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ncfix.diagnostics import Message, RefusedError, UsageError
+from ncfix.diagnostics import Message, RefusedError
 from ncfix.tables.additive import Line, additive
 from ncfix.tables.axes import DEGREE, ORDER, in_order, unit_of
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
@@ -19,13 +19,14 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_sums
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
-from ncfix.tables.settings import choice, whole
+from ncfix.tables.settings import one_of, whole
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
 
 MOST = 256
 """Entries of a file of the older controls; of the newer ones no number is public."""
 SIGN = "sign.txt"
+SIGNS = ("error", "correction")
 LARGEST = 9.9999
 """mm, degree: what the columns of the peer's files hold."""
 
@@ -87,10 +88,14 @@ class Heidenhain(Control):
         ),
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": Option(None, "error: values are taken off the command; correction: they are added"),
-        "family": Option("tnc640", "tnc640: NCK controls; itnc530: datum and distance in the first line"),
-        "backlash": Option("off", "on: a column BACKLASH; off: the mean of both ways"),
-        "points": Option(str(MOST), f"most rows of a file, at most {MOST}"),
+        "sign": Option(
+            None, "error: values are taken off the command; correction: they are added", one_of(*SIGNS), "HEID-1"
+        ),
+        "family": Option(
+            "tnc640", "tnc640: NCK controls; itnc530: datum and distance in the first line", one_of("tnc640", "itnc530")
+        ),
+        "backlash": Option("off", "on: a column BACKLASH; off: the mean of both ways", one_of("off", "on")),
+        "points": Option(str(MOST), f"most rows of a file, at most {MOST}", whole(2, MOST)),
     }
     steps = (
         "Settle HEID-1 on the machine.",
@@ -108,11 +113,11 @@ class Heidenhain(Control):
         """A `.COM` file for each axis over which anything changes, `config.cma`, and the sign in words."""
         settings = self.settings(request.settings)
         sense = sign_of(settings["sign"])
-        old = choice(settings, "family", ("tnc640", "itnc530")) == "itnc530"
-        both = choice(settings, "backlash", ("off", "on")) == "on"
+        old = settings["family"] == "itnc530"
+        both = settings["backlash"] == "on"
         axes = in_order(request.machine)
         machine = request.machine
-        most = whole(settings, "points", 2, MOST)
+        most = int(settings["points"])
         lines = additive(machine, request.space, request.tool_length, most, request.target, both=both)
         kept = [line for line in map(_rounded, lines) if line.values.any() or line.reverse.any()]
         tables = {line.input: f"AXIS{'-' if old else '_'}{line.input}.COM" for line in kept}
@@ -225,9 +230,7 @@ def _check_size(com: Com, name: str) -> None:
 
 
 def sign_of(text: str) -> float:
-    """What turns a correction into a value."""
-    if text not in ("error", "correction"):
-        raise UsageError.of("NCF485", f"sign={text}", hint="error or correction; HEID-1 says how to find out")
+    """What turns a correction into a value, for one of SIGNS."""
     return 1.0 if text == "correction" else -1.0
 
 

@@ -15,11 +15,11 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import reversal_note
-from ncfix.tables.settings import choice, whole
+from ncfix.tables.settings import one_of, whole
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
 from ncfix_heidenhain.cma import CONFIG, cma_text, read_cma
 from ncfix_heidenhain.com import LARGE, Com, old_text, read_com
-from ncfix_heidenhain.control import MOST, sign_of
+from ncfix_heidenhain.control import MOST, SIGNS, sign_of
 from ncfix_heidenhain.described import Component, component, rows
 
 TABLE = "kinematics.tab"
@@ -86,12 +86,16 @@ class KinematicsComp(Control):
         ),
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "sign": Option(None, "error: entries say how the machine is wrong; correction: the opposite"),
-        "angle_unit": Option(None, "deg or rad"),
-        "backlash": Option(
-            "off", "on: play of the axes, in their own columns and BACKLASH; off: the mean of both ways"
+        "sign": Option(
+            None, "error: entries say how the machine is wrong; correction: the opposite", one_of(*SIGNS), "KINE-2"
         ),
-        "points": Option(str(MOST), f"most rows of an axis table, at most {MOST}"),
+        "angle_unit": Option(None, "deg or rad", one_of(*ANGLES), "KINE-3"),
+        "backlash": Option(
+            "off",
+            "on: play of the axes, in their own columns and BACKLASH; off: the mean of both ways",
+            one_of("off", "on"),
+        ),
+        "points": Option(str(MOST), f"most rows of an axis table, at most {MOST}", whole(2, MOST)),
     }
     steps = (
         "Settle KINE-1 to KINE-3 on the machine.",
@@ -107,10 +111,10 @@ class KinematicsComp(Control):
         """The kinematics table, an axis table for each axis, and `config.cma`."""
         settings = self.settings(request.settings)
         sense = -sign_of(settings["sign"])
-        angle = ANGLES[choice(settings, "angle_unit", tuple(ANGLES))]
+        angle = ANGLES[settings["angle_unit"]]
         machine, axes = request.machine, _axes(request.machine)
-        most = whole(settings, "points", 2, MOST)
-        play = choice(settings, "backlash", ("off", "on")) == "on"
+        most = int(settings["points"])
+        play = settings["backlash"] == "on"
         found = [component(machine, request.space, i, most, request.target, play) for i in range(len(axes))]
         components = [each for each, _ in found]
         chain = rows(machine, components, angle, sense)

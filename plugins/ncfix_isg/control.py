@@ -22,7 +22,7 @@ from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import AIM, search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import Reversal, reversal_note, reversals
-from ncfix.tables.settings import choice, whole, wrong
+from ncfix.tables.settings import one_of, whole, wrong
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, read_configuration
 from ncfix_isg.csv_file import grid_text, parameters, read_grids
@@ -31,12 +31,6 @@ from ncfix_isg.leadscrew import MOST, NAME, list_text, read_leadscrews
 TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
 LINEAR = "XYZ"
-CHOICES = {
-    "fit": ("nodes", "area"),
-    "steps": ("uneven", "even"),
-    "grids": ("auto", "one", "sum"),
-    "play": ("yes", "no"),
-}
 MOST_NODES = 1_000_000
 ONE = 3
 """Up to so many inputs a single grid does."""
@@ -103,14 +97,26 @@ class Isg(Control):
     options: ClassVar[Mapping[str, Option]] = {
         "folder": Option("C:\\vc", "where the control finds the grid file"),
         "axes": Option("", "logical axis numbers, e.g. X:1,Y:2,Z:3,B:4,C:5"),
-        "filter_steps": Option("20", "over how many cycles the control spreads a change"),
-        "fit": Option("nodes", "nodes: exact at the nodes; area: least squares over what is around them"),
-        "grids": Option("auto", "one: a grid over all axes that matter; sum: several over fewer axes each; or auto"),
-        "steps": Option("uneven", "uneven: nodes where the error bends; even: evenly spaced (ISG-4)"),
-        "play": Option(
-            "yes", "yes: what the way of an axis changes goes into its leadscrew compensation; no: it is left"
+        "filter_steps": Option("20", "over how many cycles the control spreads a change", whole(0, MOST_NODES)),
+        "fit": Option(
+            "nodes",
+            "nodes: exact at the nodes; area: least squares over what is around them",
+            one_of("nodes", "area"),
         ),
-        "points": Option("20000", "most nodes in all; vol_comp[0].max_records must allow them"),
+        "grids": Option(
+            "auto",
+            "one: a grid over all axes that matter; sum: several over fewer axes each; or auto",
+            one_of("auto", "one", "sum"),
+        ),
+        "steps": Option(
+            "uneven", "uneven: nodes where the error bends; even: evenly spaced (ISG-4)", one_of("uneven", "even")
+        ),
+        "play": Option(
+            "yes",
+            "yes: what the way of an axis changes goes into its leadscrew compensation; no: it is left",
+            one_of("yes", "no"),
+        ),
+        "points": Option("20000", "most nodes in all; vol_comp[0].max_records must allow them", whole(8, MOST_NODES)),
     }
     steps = (
         "Copy the grid files, volcomp0.csv and on, to the folder that volcomp.lis names.",
@@ -131,11 +137,9 @@ class Isg(Control):
     def write(self, request: Request) -> Written:
         """`volcomp.lis` and the grids over the axes that matter."""
         settings = self.settings(request.settings)
-        most = whole(settings, "points", 8, MOST_NODES)
-        filter_steps = whole(settings, "filter_steps", 0, MOST_NODES)
+        most = int(settings["points"])
+        filter_steps = int(settings["filter_steps"])
         numbers = _numbers(request, settings["axes"])
-        for key, allowed in CHOICES.items():
-            choice(settings, key, allowed)
         inputs = inputs_that_matter(request.machine, request.space, request.tool_length)
         inputs = tuple(sorted(inputs, key=LETTERS.index))
         volume = Volume.of(request.machine, inputs, request.space, request.tool_length, settings["fit"] == "area")

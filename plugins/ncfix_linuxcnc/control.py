@@ -16,7 +16,7 @@ from ncfix.tables.control import Assumption, Control, Files, Option, Properties,
 from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.positioning import positioning
-from ncfix.tables.settings import choice, whole, wrong
+from ncfix.tables.settings import one_of, whole, wrong
 from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, read_joints
 
 
@@ -56,9 +56,9 @@ class LinuxCnc(Control):
         ),
     )
     options: ClassVar[Mapping[str, Option]] = {
-        "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions"),
+        "type": Option("1", "COMP_FILE_TYPE: 1 corrections, 0 actual positions", one_of("0", "1")),
         "coordinates": Option("", "axis letters in the order of the joints, e.g. XYZBC"),
-        "points": Option(str(MOST), "most points of one file, at most 256"),
+        "points": Option(str(MOST), "most points of one file, at most 256", whole(2, MOST)),
     }
     steps = (
         "Save the ini file, and note the values of BACKLASH: a joint with COMP_FILE ignores it.",
@@ -72,8 +72,8 @@ class LinuxCnc(Control):
     def write(self, request: Request) -> Written:
         """One file for each axis that has something to correct, and `comp.ini`."""
         settings = self.settings(request.settings)
-        kind = choice(settings, "type", ("0", "1"))
-        most = whole(settings, "points", 2, MOST)
+        kind = settings["type"]
+        most = int(settings["points"])
         letters = _coordinates(request, settings["coordinates"])
         tables = positioning(request.machine, request.space, request.tool_length, most, request.target)
         joints = _joints(tables, letters)

@@ -53,13 +53,26 @@ class Siemens(Control):
     steps: ClassVar[tuple[str, ...]] = STEPS
     switch_off = OFF
 
+    def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
+        """Whoever has not settled the sign has not settled the products either: both are asked for at once."""
+        missing = tuple(super()._missing(given))
+        yield from missing
+        if missing and "product_terms" not in given:
+            yield self._wanting(f"where tables are multiplied: {OPTIONS['product_terms'].text}")
+
+    def _wanting(self, why: str) -> Message:
+        text = f"siemens needs the option 'product_terms' {why}"
+        return Message("NCF485", text, hint=f"--set product_terms=VALUE{self._how(OPTIONS['product_terms'])}")
+
     def write(self, request: Request) -> Written:
         """`NC_CEC.INI`, and an EEC file for each axis if `positioning=eec`."""
         settings = checked(self.settings(request.settings), request.machine)
         scheme = _scheme(request, settings)
         own = [term for term in scheme.tables.terms if settings.eec and _own(term)]
         others = [term for term in scheme.tables.terms if not (settings.eec and _own(term))]
-        reading = _reading(settings, others)
+        if any(len(term.factors) > 1 for term in others) and not settings.terms:
+            raise UsageError((self._wanting("for these tables, since some are multiplied"),))
+        reading = Reading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
         cec = tables_of(others, reading)
         if len(cec) > settings.limits.tables:
             text = f"{len(cec)} tables are needed, and {settings.model} has {settings.limits.tables}"
@@ -126,13 +139,6 @@ def _largest(request: Request, scheme: Scheme) -> Array:
 
 def _own(term: Term) -> bool:
     return len(term.factors) == 1 and term.way is None and term.factors[0].inputs == term.outputs
-
-
-def _reading(settings: Settings, terms: Sequence[Term]) -> Reading:
-    if any(len(term.factors) > 1 for term in terms) and not settings.terms:
-        text = "siemens needs the option 'product_terms' for these tables, since some are multiplied"
-        raise UsageError.of("NCF485", text, hint="--probe settles it; the 802D manual leans to only")
-    return Reading(settings.axes, 1 if settings.sign == "correction" else -1, settings.terms)
 
 
 def _heads(settings: Settings) -> list[str]:

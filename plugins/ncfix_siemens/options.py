@@ -10,7 +10,7 @@ from ncfix.machine import Machine
 from ncfix.tables.axes import in_order
 from ncfix.tables.control import Option
 from ncfix.tables.scheme import Limits
-from ncfix.tables.settings import choice, whole, wrong
+from ncfix.tables.settings import one_of, whole, wrong
 from ncfix_siemens.cec import Style
 from ncfix_siemens.combine import TERMS
 
@@ -21,18 +21,30 @@ SCHEMES = ("auto", "poly25", "trigo23", "fik40", "fik20")
 SIGNS = ("error", "correction")
 AXIS = re.compile(r"\w{1,16}", re.ASCII)
 
+YES_NO = one_of("yes", "no")
+
 OPTIONS: Mapping[str, Option] = {
-    "value_sign": Option(None, "error: values are taken off commands; correction: they are added. --probe settles it"),
-    "product_terms": Option("", "what a product adds: only, plus_multiplier, plus_base, plus_both. --probe settles it"),
-    "scheme": Option("auto", "auto, or the thesis's poly25, trigo23, fik40, fik20"),
-    "model": Option("840D", "840D (40 tables of 1000 points), 828D (8 of 200), 802D (2 of 350)"),
-    "tables": Option("", "most tables, if not those of the model"),
-    "points": Option("", "most points of a table, if not those of the model"),
-    "rotary": Option("auto", "correct the rotary axes, too: correct, keep, or auto: unless the tip is better without"),
-    "positioning": Option("cec", "where an axis over itself goes: cec, or eec, the encoder tables"),
+    "value_sign": Option(
+        None, "error: values are taken off commands; correction: they are added", one_of(*SIGNS), "SIEMENS-1"
+    ),
+    "product_terms": Option(
+        "", "what a product adds: only, plus_multiplier, plus_base, plus_both", one_of(*TERMS), "SIEMENS-2"
+    ),
+    "scheme": Option("auto", "auto, or the thesis's poly25, trigo23, fik40, fik20", one_of(*SCHEMES)),
+    "model": Option("840D", "840D (40 tables of 1000 points), 828D (8 of 200), 802D (2 of 350)", one_of(*MODELS)),
+    "tables": Option("", "most tables, if not those of the model", whole(1, MOST_TABLES)),
+    "points": Option("", "most points of a table, if not those of the model", whole(3, MOST_POINTS)),
+    "rotary": Option(
+        "auto",
+        "correct the rotary axes, too: correct, keep, or auto: unless the tip is better without",
+        one_of("auto", "correct", "keep"),
+    ),
+    "positioning": Option(
+        "cec", "where an axis over itself goes: cec, or eec, the encoder tables", one_of("cec", "eec")
+    ),
     "axes": Option("", "machine axes, e.g. X:AX1,Y:AX2,Z:AX3,A:AX4,C:AX5"),
-    "brackets": Option("yes", "axis names in brackets, (AX1), as in the manuals"),
-    "metric_line": Option("no", "a line METRIC at the top"),
+    "brackets": Option("yes", "axis names in brackets, (AX1), as in the manuals", YES_NO),
+    "metric_line": Option("no", "a line METRIC at the top", YES_NO),
     "path_line": Option("", "a path for a line ;$PATH=..."),
 }
 
@@ -58,25 +70,14 @@ class Settings:
 
 def checked(given: Mapping[str, str], machine: Machine) -> Settings:
     """The settings for a machine; raises `UsageError` NCF485, `RefusedError` NCF484."""
-    model = choice(given, "model", tuple(MODELS))
+    model = given["model"]
     tables, points = MODELS[model]
-    eec = choice(given, "positioning", ("cec", "eec")) == "eec"
-    limits = Limits(
-        whole(given, "tables", 1, MOST_TABLES) if given["tables"] else tables,
-        whole(given, "points", 3, MOST_POINTS) if given["points"] else points,
-        eec,
-    )
-    style = Style(_yes(given, "brackets"), _yes(given, "metric_line"), given["path_line"])
-    return Settings(
-        choice(given, "value_sign", ("", *SIGNS)),
-        choice(given, "product_terms", ("", *TERMS)),
-        choice(given, "scheme", SCHEMES),
-        model,
-        limits,
-        choice(given, "rotary", ("auto", "correct", "keep")),
-        machine_axes(given["axes"], machine),
-        style,
-    )
+    most = int(given["tables"] or tables), int(given["points"] or points)
+    limits = Limits(*most, given["positioning"] == "eec")
+    style = Style(given["brackets"] == "yes", given["metric_line"] == "yes", given["path_line"])
+    axes = machine_axes(given["axes"], machine)
+    terms, rotary = given["product_terms"], given["rotary"]
+    return Settings(given["value_sign"], terms, given["scheme"], model, limits, rotary, axes, style)
 
 
 def machine_axes(given: str, machine: Machine) -> dict[str, str]:
@@ -91,7 +92,3 @@ def machine_axes(given: str, machine: Machine) -> dict[str, str]:
     if not fine or sorted(found) != sorted(names):
         raise wrong({"axes": given}, "axes", f"LETTER:AXIS for each of {' '.join(names)}, separated by commas")
     return {name: found[name] for name in ordered}
-
-
-def _yes(given: Mapping[str, str], key: str) -> bool:
-    return choice(given, key, ("yes", "no")) == "yes"

@@ -162,6 +162,30 @@ def test_settings_that_are_strange_or_missing_are_all_said_at_once() -> None:
     assert [message.code for message in caught.value.messages] == ["NCF485"] * 3
 
 
+@pytest.mark.parametrize(
+    ("control", "given", "asked"),
+    [
+        ("siemens", {}, ["value_sign", "product_terms"]),
+        ("siemens", {"product_terms": "maybe", "model": "9", "tables": "x"}, ["maybe", "=9", "=x", "value_sign"]),
+        ("heidenhain-kinematics", {"points": "1"}, ["points=1", "'sign'", "angle_unit"]),
+        ("fanuc", {"sign": "plus", "order": "XYY", "largest": "no"}, ["plus", "XYY", "no"]),
+        ("isg", {"steps": "odd", "points": "3", "play": ""}, ["odd", "=3", "play="]),
+    ],
+)
+def test_all_settings_are_asked_for_at_once(control: str, given: dict[str, str], asked: list[str]) -> None:
+    with pytest.raises(UsageError) as caught:
+        get_control(control).settings(given)
+    assert len(caught.value.messages) == len(asked)
+    assert all(word in message.text for word, message in zip(asked, caught.value.messages, strict=True))
+
+
+def test_a_sign_that_is_asked_for_comes_with_the_way_to_find_it_out() -> None:
+    for control in ("fanuc", "fanuc-pitch", "fanuc-rotary", "heidenhain", "heidenhain-kinematics", "siemens"):
+        with pytest.raises(UsageError, match="sign") as caught:
+            get_control(control).settings({})
+        assert "on the machine: " in caught.value.messages[0].hint, control
+
+
 def test_a_perfect_machine_gets_tables_that_do_nothing() -> None:
     for control in ("fanuc", "heidenhain", "heidenhain-kinematics", "isg", "linuxcnc", "gcode"):
         made = exported(control, single_error("EXX").replace(effects=()))

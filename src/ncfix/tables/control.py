@@ -9,7 +9,7 @@ range worked in; running that is the emulation. A plugin registers a function th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
@@ -18,6 +18,7 @@ from ncfix.machine import Machine
 from ncfix.plugins import registry
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
+from ncfix.tables.settings import Form
 
 Files = Mapping[str, bytes]
 """File name (no folder) -> content."""
@@ -64,10 +65,22 @@ class Assumption:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """A setting of a control, `--set name=value`; a default of None means that it must be given."""
+    """A setting of a control, `--set name=value`.
+
+    default  None: it must be given
+    text     what it is, for people
+    form     what it may be; the default may be anything
+    settled  id of the assumption that says how to find out on the machine which value is right
+    """
 
     default: str | None
     text: str
+    form: Form | None = None
+    settled: str = ""
+
+    def odd(self, text: str) -> bool:
+        """Whether the control has no use for this text."""
+        return self.form is not None and text != self.default and not self.form.fits(text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,21 +174,34 @@ class Control(ABC):
         raise UsageError.of("NCF485", text, hint="its assumptions say how to check them")
 
     def settings(self, given: Mapping[str, str], complete: bool = True) -> dict[str, str]:
-        """All options with those given; all that are unknown or, if `complete`, missing are `UsageError` NCF485."""
-        known = ", ".join(self.options) or "none"
-        strange = [
-            Message("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
-            for key in given
-            if key not in self.options
-        ]
-        missing = [
-            Message("NCF485", f"{self.name} needs the option {key!r}: {option.text}", hint=f"--set {key}=VALUE")
-            for key, option in self.options.items()
-            if complete and option.default is None and key not in given
-        ]
-        if strange or missing:
-            raise UsageError.collected((*strange, *missing))
+        """All options with those given.
+
+        All that are unknown, of another form or, if `complete`, missing are named in one `UsageError` NCF485.
+        """
+        faults = [*self._strange(given), *(self._missing(given) if complete else ())]
+        if faults:
+            raise UsageError.collected(faults)
         return {key: given.get(key, option.default or "") for key, option in self.options.items()}
+
+    def _strange(self, given: Mapping[str, str]) -> Iterator[Message]:
+        for key, text in given.items():
+            option = self.options.get(key)
+            if option is None:
+                known = ", ".join(self.options) or "none"
+                yield Message("NCF485", f"{self.name} has no option {key!r}", hint=f"its options: {known}")
+            elif option.form is not None and option.odd(text):
+                yield Message("NCF485", f"{key}={text}", hint=f"{option.form.hint}{self._how(option)}")
+
+    def _missing(self, given: Mapping[str, str]) -> Iterator[Message]:
+        for key, option in self.options.items():
+            if option.default is None and key not in given:
+                text = f"{self.name} needs the option {key!r}: {option.text}"
+                yield Message("NCF485", text, hint=f"--set {key}=VALUE{self._how(option)}")
+
+    def _how(self, option: Option) -> str:
+        """How to find out on the machine what a setting must be."""
+        found = [each.verify for each in self.assumptions if each.id == option.settled]
+        return f"; on the machine: {found[0]}" if found else ""
 
     def described(self) -> dict[str, Any]:
         """Properties and assumptions as plain data."""
