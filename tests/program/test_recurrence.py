@@ -7,8 +7,9 @@ from dataclasses import replace
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Moves, Rule
 from ncfix.program.reader import read
+from ncfix.program.recurrence import ENDLESS as CODE
 from ncfix.program.recurrence import MOST, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.setup import Setup, Tool
 from ncfix.program.trace import trace
@@ -89,6 +90,48 @@ def test_what_counts_is_followed(name: str) -> None:
 def test_a_count_up_without_end_runs_into_the_limit() -> None:
     with pytest.raises(SourceError, match="seems to be endless"):
         moves_of("siemens", "R1=0\nAA: R1=R1+1\nGOTOB AA\nM30")
+
+
+HOLE = "G0 X1. Y1. Z9.\nF100.\n"
+TWICE = "0 BEGIN PGM T MM\n1 LBL 1\n2 LBL 2\n3 L X+1\n4 CALL LBL 2 REP {n}\n5 CALL LBL 1 REP {n}\n6 END PGM T MM"
+PATTERN = "4 CYCL CALL PAT\n5 CALL LBL 1 REP {n}\n6 END PGM T MM"
+DRILL = "1 CYCL DEF 200 DRILLING Q200=2 Q201=-5 Q206=100 Q202=5 Q210=0 Q203=0 Q204=2 Q211=0\n"
+HOLES = DRILL + "2 PATTERN DEF ROW1 (X+0 Y+0 D+1 NUM500 ROT+0 Z+0)\n3 LBL 1\n"
+REPEATED = {
+    "linuxcnc, a cycle": ("linuxcnc", HOLE + "G81 X1 Z1 R2 L{n}\nM2"),
+    "linuxcnc, a subprogram": ("linuxcnc", "M98 P2 L{n}\nM2\nO2\nM99"),
+    "linuxcnc, a loop": ("linuxcnc", "o1 repeat [{n}]\no1 endrepeat\nM2"),
+    "fanuc, a cycle": ("fanuc", f"%\nO1\n{HOLE}G81 X1. Z1. R2. K{{n}}\nM30\n%"),
+    "fanuc, a subprogram": ("fanuc", "%\nO1\nM98 P2 L{n}\nM30\nO2\nM99\n%"),
+    "fanuc, a macro": ("fanuc", "%\nO1\nG65 P2 L{n}\nM30\nO2\nM99\n%"),
+    "siemens, a subprogram": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nM17"),
+    "siemens, of nothing": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nWORK P{n}\n%_N_WORK_SPF\n"),
+    "siemens, a section": ("siemens", "AA: G0 X1\nBB: G0 X2\nREPEAT AA BB P={n}\nM30"),
+    "klartext, a section": ("heidenhain", TWICE),
+    "klartext, a pattern": ("heidenhain", "0 BEGIN PGM T MM\n" + HOLES + PATTERN),
+}
+"""Dialect and program that repeats something `n` times."""
+
+
+@pytest.mark.parametrize("name", REPEATED)
+@pytest.mark.parametrize("times", [25_000, 99_999_999])
+def test_repeats_count_as_blocks(name: str, times: int) -> None:
+    dialect, text = REPEATED[name]
+    with pytest.raises(SourceError) as caught:
+        moves_of(dialect, text.format(n=times))
+    assert caught.value.code == CODE
+    assert "seems to be endless" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_few_repeats_are_followed(name: str) -> None:
+    dialect, text = REPEATED[name]
+    moves_of(dialect, text.format(n=3))
+
+
+def test_a_pattern_of_no_columns_is_none() -> None:
+    lines = "2 PATTERN DEF PAT1 (X+0 Y+0 DX+1 DY+1 NUMX0 NUMY999999999 ROT+0 ROTX+0 ROTY+0 Z+0)\n3 CYCL CALL PAT\n"
+    assert moves_of("heidenhain", f"0 BEGIN PGM T MM\n{DRILL}{lines}4 END PGM T MM").rule.tolist() == [Rule.REFUSE]
 
 
 def test_a_jump_is_another_when_something_has_changed() -> None:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-MOST_BLOCKS = 4_000_000
-"""Blocks that are executed beyond those of a program's own text before it counts as endless: under a minute."""
+MOST_BLOCKS = 1_000_000
+"""Blocks that are executed beyond those of a program's own text before it counts as endless: under half a minute."""
 
 
 class Increments(NamedTuple):

@@ -178,8 +178,8 @@ TRACE_CODES: dict[str, Code] = {
     "NCF233": Code(
         "Endless program",
         "The program jumps back where it did before, and nothing has changed in between, or would as long as the "
-        "machine changes nothing; or more blocks were executed than most_blocks allows (4 million beyond those of "
-        "the text).",
+        "machine changes nothing; or it executes more blocks than most_blocks allows (a million beyond those of the "
+        "text): repeats of cycles and of subprograms count, too, and are told before they are begun.",
         "Check the condition of the loop; most_blocks in the setup file allows more.",
     ),
     "NCF234": Code(

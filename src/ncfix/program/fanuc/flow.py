@@ -182,6 +182,7 @@ class MacroFlow:
 
     def enter(self, call: Call) -> None:
         """Go to where a call leads."""
+        self.control.budget.foresee(call.remaining)
         self.calls.append(call)
         self.start(call)
 

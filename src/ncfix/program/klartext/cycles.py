@@ -206,6 +206,7 @@ def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> No
         control.refuse_here(reason)
         return
     control.settle(tuple(control.unknown))
+    control.budget.spend(len(places))
     for place in places:
         where = led(control, Words({"X": place.x, "Y": place.y}, frozenset()))
         bottom, clear, refusal = levels(control, where.inner[Z])

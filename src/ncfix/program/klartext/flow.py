@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from ncfix.program.klartext.calculate import Parameters
 from ncfix.program.klartext.units import Unit
+from ncfix.program.recurrence import Budget
 from ncfix.program.rs274.faults import Fault
 
 NO_LABEL = "NCF276"
@@ -35,6 +36,7 @@ class FlowControl:
 
     unit, block  the block that comes next
     parameters   the Q parameters
+    budget       how much may still be executed
     calls        the calls that are open
     repeats      how often a repeat has still to be made
     selected     the program that CALL SELECTED PGM calls; empty where it is chosen at run time
@@ -43,6 +45,7 @@ class FlowControl:
     unit: Unit
     find: Callable[[str], Unit | None]
     parameters: Parameters
+    budget: Budget
     block: int = 0
     calls: list[Call] = field(default_factory=list)
     repeats: dict[tuple[int, int], int] = field(default_factory=dict)
@@ -62,6 +65,7 @@ class FlowControl:
             return
         key = id(self.unit), self.block
         left = self.repeats.get(key, times)
+        self.budget.foresee(left)
         if left > 0:
             self.repeats[key] = left - 1
             self.jump(label)

@@ -60,7 +60,8 @@ class PartInterpreter(Interpreter):
 
     def run_part(self, last: bool, max_blocks: int) -> None:
         """Follow the part to its end, or to that of the program."""
-        self.budget, self.last, self.ended = max_blocks, last, True
+        self.control.budget.left = max_blocks
+        self.last, self.ended = last, True
         with self.stopping():
             self.walk(self.flow or self.begun())
 

@@ -27,13 +27,12 @@ from ncfix.program.klartext.unread import unread_line
 from ncfix.program.language import Resolve
 from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
+from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.places import mask_of
 from ncfix.program.tree import Opaque, Program, Span
 
-ENDLESS = "NCF233"
 NO_END = "NCF234"
 SKIPPED_BLOCKS = "NCF235"
 WRITTEN_AT_RUN_TIME = "NCF237"
@@ -57,7 +56,7 @@ class Interpreter:
     def __init__(self, control: Control, program: Program, resolve: Resolve | None, max_blocks: int) -> None:
         self.control = control
         self.resolve = resolve
-        self.budget = max_blocks
+        control.budget.left = max_blocks
         self.recurrence = Recurrence()
         self.files: dict[str, Unit | None] = {}
         self.program = program
@@ -102,7 +101,7 @@ class Interpreter:
     def begun(self) -> FlowControl:
         """The program before its first block."""
         main = Unit(self.program, self.axes)
-        self.flow = FlowControl(main, self.find, self.control.scope.parameters, main.begin)
+        self.flow = FlowControl(main, self.find, self.control.scope.parameters, self.control.budget, main.begin)
         self.control.unit = main.mm
         self.control.recompose()
         return self.flow
@@ -118,7 +117,7 @@ class Interpreter:
             flow.block += 1
             if plan.empty:
                 continue
-            self.spend(1)
+            control.budget.spend(1)
             control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
             control.external = unit.name
             if not unit.name:
@@ -152,14 +151,8 @@ class Interpreter:
         done, worth = run_lane(self.control, flow.unit, flow.block)
         self.no_lane = flow.unit, range(flow.block + done, worth)
         flow.block += done
-        self.spend(done)
+        self.control.budget.spend(done)
         return done > 0
-
-    def spend(self, blocks: int) -> None:
-        """Count blocks that are executed; raises `Fault` when there are too many."""
-        self.budget -= blocks
-        if self.budget < 0:
-            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     def is_skipped(self) -> bool:
         """Whether blocks with `/` are passed over."""

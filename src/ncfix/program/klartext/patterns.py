@@ -44,7 +44,7 @@ def pattern_of(text: str, parameters: Parameters) -> tuple[Place, ...] | None:
     found: list[Place] = []
     for kind, inside in KINDS.findall(code):
         values = {name.upper(): number(sign, value, parameters) for name, sign, value in WORDS.findall(inside)}
-        if not understood(inside, values) or holes(values) > MOST_HOLES:
+        if not understood(inside, values) or holes(values) + len(found) > MOST_HOLES:
             return None
         found += FORMS[kind.upper()](values, found)
     rest = KINDS.sub(" ", code).split()
@@ -58,7 +58,7 @@ def understood(inside: str, values: Values) -> bool:
 
 def holes(values: Values) -> float:
     """How many holes a pattern has at most."""
-    return max(values.get("NUM", 0.0), values.get("NUMX", 0.0) * values.get("NUMY", 0.0))
+    return max(values.get("NUM", 0.0), max(values.get("NUMX", 0.0), 1.0) * max(values.get("NUMY", 0.0), 1.0))
 
 
 def number(sign: str, text: str, parameters: Parameters) -> float:

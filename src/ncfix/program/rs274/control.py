@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
 from ncfix.program.moves import Kind, Kinematics, Rule
+from ncfix.program.recurrence import Budget
 from ncfix.program.rs274 import contour
 from ncfix.program.rs274.builder import Arc, Builder, Style
 from ncfix.program.rs274.coordinates import (
@@ -90,6 +91,7 @@ class Control:
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     saved      the modal states that M70 saved, one place for each call level
     places     which axes the program itself has brought to where they stand
+    budget     how much may still be executed
     """
 
     def __init__(
@@ -112,6 +114,7 @@ class Control:
         self.offsets = Offsets()
         self.parameters = Parameters()
         self.knowledge = Knowledge(setup, self.place)
+        self.budget = Budget(setup.most_blocks, setup.most_blocks)
         self.tools = Tools()
         self.saved: list[Saved | None] = [None]
         self.messages: dict[str, Message] = {}

@@ -92,6 +92,7 @@ def repeats(control: Control, block: Block) -> int:
     """How many times the block drills: L, or K of most ISO controls."""
     letter = next((each for each in control.rules.repeats if each in block.values), "L")
     count = whole(block.get(letter, 1.0), letter)
+    control.budget.spend(max(count, 0))
     if count < 1 and control.rules.strict:
         raise Fault(BAD_CYCLE, "L, the number of repeats, must be 1 or more")
     return count

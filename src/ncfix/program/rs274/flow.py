@@ -244,6 +244,7 @@ class FlowControl:
 
     def call_by_code(self, label: str, times: int) -> None:
         """M98 P.. L..: the subprogram shares #1 to #30 with its caller."""
+        self.control.budget.foresee(times)
         if times > 0:
             self.begin(Call(label, self.unit, self.block, by_code=True, remaining=times - 1))
 
@@ -367,6 +368,7 @@ class FlowControl:
         self.skipping = None
         if label.repeats < 0:
             label.repeats = round(self.argument(flow))
+            self.control.budget.foresee(label.repeats)
         if label.repeats > 0:
             label.repeats -= 1
             self.control.parameters.changes += 1

@@ -38,7 +38,7 @@ class PartInterpreter(Interpreter):
 
     def run_part(self, last: bool, max_blocks: int) -> None:
         """Follow the part to its end, or to that of the program."""
-        self.budget = max_blocks
+        self.control.budget.left = max_blocks
         self.last = last
         self.ended = True
         self.run()

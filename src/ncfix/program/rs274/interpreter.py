@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, WAITS, Recurrence, too_many
+from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
@@ -26,7 +26,6 @@ from ncfix.program.rs274.unroll import Recorder
 from ncfix.program.rs274.wordcheck import check_words
 from ncfix.program.tree import Constant, Program, Span, Word
 
-ENDLESS = "NCF233"
 NO_END = "NCF234"
 CALL, RETURN = 980, 990
 PROGRAM_ENDS = (20, 300)
@@ -51,7 +50,7 @@ class Interpreter:
     ) -> None:
         self.control = control
         self.resolve = resolve
-        self.budget = max_blocks
+        control.budget.left = max_blocks
         self.recurrence = Recurrence()
         self.files: dict[str, Unit | None] = {}
         self.axes = sum(1 << index for index in control.machine)
@@ -113,12 +112,12 @@ class Interpreter:
                     if self.recorder:
                         self.recorder.stretch(flow.unit, flow.block, done)
                     flow.block += done
-                    self.spend(done)
+                    self.control.budget.spend(done)
                     continue
             unit, block = flow.unit, flow.block
             flow.block += 1
             self.span = None
-            self.spend(1)
+            self.control.budget.spend(1)
             if self.execute(plan):
                 return
             if flow.unit is unit and flow.block <= block:
@@ -135,12 +134,6 @@ class Interpreter:
     def takes_stretches(self) -> bool:
         """Whether plain motions may be taken many at once: nothing is done between them."""
         return not self.control.unnamed
-
-    def spend(self, blocks: int) -> None:
-        """Count executed blocks; raises `Fault` when there are too many."""
-        self.budget -= blocks
-        if self.budget < 0:
-            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     def at_end_of_text(self) -> None:
         """The text is over without M2, M30 or `%`."""

@@ -93,6 +93,7 @@ class Course:
         else:
             ends = [block for block in self.unit.blocks_of("ENDLABEL") if block > start]
             stop = ends[0] if ends else here
+        self.control.budget.foresee(times * (stop - start))
         if times > 0 and stop > start:
             self.sections.append(Section(start, stop, self.block, times))
             self.block = start
@@ -274,6 +275,7 @@ class Course:
             raise Fault(TOO_DEEP, f"subprograms are nested more than {MAX_CALLS} deep")
         if times < 1:
             return
+        self.control.budget.foresee(times)
         values: list[Value] = [argument(self.control) for argument in arguments]
         local, results = Local(), {}
         for place, parameter in enumerate(unit.parameters):
@@ -297,6 +299,7 @@ class Course:
 
     def finish(self) -> None:
         """Return from a subprogram, or execute it once more."""
+        self.control.budget.spend(1)
         call = self.calls[-1]
         if call.left:
             call.left -= 1

@@ -60,7 +60,7 @@ class PartInterpreter(Interpreter):
 
     def run_part(self, last: bool, max_blocks: int) -> None:
         """Follow the part to its end, or to that of the program."""
-        self.budget = max_blocks
+        self.control.budget.left = max_blocks
         try:
             self.ended = self.walk() or last
         except AtRuntimeError:

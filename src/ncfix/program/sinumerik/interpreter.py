@@ -13,7 +13,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
-from ncfix.program.recurrence import NEVER_ENDS, Recurrence, too_many
+from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.places import mask_of
@@ -35,7 +35,6 @@ from ncfix.program.sinumerik.unroll import Recorder
 from ncfix.program.sinumerik.vectors import run_vectors
 from ncfix.program.tree import Program, Span
 
-ENDLESS = "NCF233"
 SKIPPED_BLOCKS = "NCF235"
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
@@ -58,7 +57,7 @@ class Interpreter:
     ) -> None:
         self.control = control
         self.resolve = resolve
-        self.budget = max_blocks
+        control.budget.left = max_blocks
         self.recurrence = Recurrence()
         self.units = units_of(program)
         self.files: dict[str, Unit | None] = {unit.name: unit for unit in self.units[1:] if unit.name}
@@ -135,11 +134,11 @@ class Interpreter:
                     self.stand(done)
                     course.block += done
                     control.head_on()
-                    self.spend(done)
+                    control.budget.spend(done)
                     continue
             unit, block = course.unit, course.block
             course.block += 1
-            self.spend(1)
+            control.budget.spend(1)
             if self.execute(plan):
                 return True
             if course.unit is unit and course.block <= block:
@@ -174,12 +173,6 @@ class Interpreter:
             if any(plan.vector is not None for plan in plans):
                 named |= mask_of(turning(control))
             stand(control, named, by_machine=False)
-
-    def spend(self, blocks: int) -> None:
-        """Count executed blocks; raises `Fault` when there are too many."""
-        self.budget -= blocks
-        if self.budget < 0:
-            raise Fault(ENDLESS, *too_many(self.control.setup.most_blocks))
 
     # -- one block ----------------------------------------------------------------------------------------------------
 

@@ -64,6 +64,7 @@ def points_of(control: Sinumerik, step: Calling) -> Points:
     known = [value for value in values if value is not None]
     if len(known) < len(values) or any(known[ARGUMENTS:]) or not 1 <= known[ARGUMENTS - 1] <= MOST:
         return ()
+    control.budget.spend(round(known[ARGUMENTS - 1]))
     points = PATTERNS[step.name](known[:ARGUMENTS])
     return points[::-1] if step.name == "holes1" and is_nearer(control, points[-1], points[0]) else points
 
