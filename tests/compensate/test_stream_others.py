@@ -18,8 +18,8 @@ from ncfix.compensate.following import traced
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.program import emit
+from ncfix.program.follow.lane import take
 from ncfix.program.reader import read
-from ncfix.program.rs274.lane import take
 from ncfix.program.sinumerik import vectors
 from ncfix.program.sinumerik.language import SINUMERIK
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ncfix.diagnostics import SourceError
+from ncfix.program.follow.arcs import centre_from_radius, check_closure, sweep_angle
+from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Moves
-from ncfix.program.rs274.arcs import centre_from_radius, check_closure, sweep_angle
-from ncfix.program.rs274.faults import Fault
 from program.tracing import follow
 
 

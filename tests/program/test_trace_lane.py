@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from ncfix import fast
 from ncfix.diagnostics import NcfixError
+from ncfix.program.follow import lane
 from ncfix.program.moves import Moves
-from ncfix.program.rs274 import lane
 from program.tracing import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1

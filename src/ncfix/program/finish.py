@@ -6,8 +6,8 @@ from typing import Protocol
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.program import stamp
+from ncfix.program.follow.knowledge import Knowledge
 from ncfix.program.moves import Moves, Trace
-from ncfix.program.rs274.knowledge import Knowledge
 from ncfix.program.tree import Program
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 
 ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"

@@ -12,7 +12,7 @@ every block of the shape, however long its numbers are, and however long the com
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -349,3 +349,8 @@ class Program:
 
     def __iter__(self) -> Iterator[int]:
         return iter(range(len(self)))
+
+
+def view(array: NDArray[Any]) -> Sequence[Any]:
+    """An array as a sequence of plain Python numbers, made one at a time."""
+    return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ncfix.program.rs274.arithmetic import ARITHMETIC, divide, exponential, inverse, logarithm, power, square_root
+from ncfix.program.follow.arithmetic import ARITHMETIC, FUNCTIONS, divide, power
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.expressions import Evaluate, Scope
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.tree import Binary, Constant, Expression, Literal, Parameter, Unary
 
 VACANT = math.nan
@@ -75,25 +75,17 @@ def arc_tangent(y: float, x: float) -> float:
 
 
 UNARY: dict[str, Callable[[float], float]] = {
+    **FUNCTIONS,
     "-": lambda a: -a,
     "+": lambda a: a,
-    "abs": abs,
-    "acos": inverse(math.acos, "ACOS"),
     "adp": lambda a: a,
-    "asin": inverse(math.asin, "ASIN"),
     "atan": lambda a: math.degrees(math.atan(a)),
     "bcd": to_bcd,
     "bin": from_bcd,
-    "cos": lambda a: math.cos(math.radians(a)),
-    "exp": exponential,
     "fix": truncated,
     "fup": raised,
-    "ln": logarithm,
     "rnd": rounded,
     "round": rounded,
-    "sin": lambda a: math.sin(math.radians(a)),
-    "sqrt": square_root,
-    "tan": lambda a: math.tan(math.radians(a)),
 }
 
 BINARY: dict[str, Callable[[float, float], float]] = {

@@ -6,11 +6,12 @@ import re
 
 from lark import Token, UnexpectedInput
 
+from ncfix.program.block_checks import check_exponents, check_numbers
 from ncfix.program.build import Branch, Builder, Node, Parsed, TooDeepError, build, edges, kind
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError, explain
 from ncfix.program.grammar import Squeezed, parse
-from ncfix.program.rs274.blocks import check_exponents, check_numbers, check_repeats
+from ncfix.program.rs274.blocks import check_repeats
 from ncfix.program.tree import Binary, Expression, Flow, Item, Literal
 
 PIECE = re.compile(r"\([^()]*(?:\([^()]*\)[^()]*)*\)|;.*|[^ \t]", re.DOTALL)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow.modal import NO_MOTION
+from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.modal import NO_MOTION
-from ncfix.program.rs274.places import mask_of
 
 LOCKED = range(8000, 10000)
 NOT_AT_HAND = "NCF246"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.parameters import Store
 
 ONCE = dict(

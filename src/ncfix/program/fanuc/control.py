@@ -9,11 +9,10 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.rules import RULES
 from ncfix.program.fanuc.scaling import Scaling
 from ncfix.program.fanuc.variables import Variables
+from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.moves import Kinematics
 from ncfix.program.pointing import Pointing
-from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.setup import POINTLESS, Setup
 from ncfix.program.tree import Template
 
@@ -46,7 +45,6 @@ class MacroControl(Control):
         kinematics: Kinematics | None = None,
     ) -> None:
         super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
-        rollover.watch(self)
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
         self.scaling: Scaling | None = None

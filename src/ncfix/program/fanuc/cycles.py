@@ -6,10 +6,10 @@ level and the depth from R, in the block that names them.
 
 from __future__ import annotations
 
+from ncfix.program.follow.coordinates import LETTERS
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import LETTERS
 from ncfix.program.rs274.cycles import BAD_CYCLE, drill, place_hole, repeats
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.systems import check_system, words_of
 
 BACK_BORING = 870

@@ -5,11 +5,11 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 
 from __future__ import annotations
 
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.settings import AFTER_UNFOLLOWED
 from ncfix.program.rs274.systems import (
     SYSTEM_NAMES,

@@ -13,9 +13,9 @@ import numpy as np
 
 from ncfix.program.fanuc import tilt
 from ncfix.program.fanuc.vectors import turning
+from ncfix.program.follow.coordinates import Rotation, X, Y, Z, as_rotation
 from ncfix.program.moves import TcpState
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.coordinates import Rotation, X, Y, Z, as_rotation
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from ncfix.program.fanuc import builder
 from ncfix.program.fanuc.arithmetic import number
 from ncfix.program.fanuc.outline import Outline
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.expressions import Evaluate
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import NO_SUBPROGRAM, RUNTIME_BRANCH, TOO_DEEP
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine, has_words

@@ -16,12 +16,13 @@ from ncfix.program.fanuc.corners import CORNER, letters_of
 from ncfix.program.fanuc.flow import MacroFlow
 from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.fanuc.outline import head_of
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.following import PartFollower
 from ncfix.program.language import Run
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import NO_SUBPROGRAM
-from ncfix.program.rs274.following import PartFollower, PartInterpreter
+from ncfix.program.rs274.following import PartInterpreter
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Flow, Program, Template
 

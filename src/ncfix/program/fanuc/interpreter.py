@@ -16,16 +16,16 @@ from ncfix.program.fanuc.flow import BAD_JUMP, MacroFlow
 from ncfix.program.fanuc.lengths import LENGTH_IN_STEPS, lone_number
 from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
+from ncfix.program.follow.coordinates import INCH, LETTERS, PLANES, Z
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.coordinates import INCH, LETTERS, PLANES, Z
 from ncfix.program.rs274.expressions import Evaluate
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import NON_MODAL, ROTATION
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.order import DWELL, MACHINE
 from ncfix.program.rs274.parameters import Store
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 

@@ -17,10 +17,10 @@ from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.fanuc.render import render
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
+from ncfix.program.follow import rollover
 from ncfix.program.language import BulkLayout, Run
 from ncfix.program.layout import CENTRE_LETTERS, Layout
 from ncfix.program.moves import Trace
-from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.language import RS274, writable
 from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.shapes import Scan, scan

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from ncfix.program.fanuc.data import CHANGED
 from ncfix.program.fanuc.vectors import INCLINED, turning
+from ncfix.program.follow.coordinates import Z
+from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274 import lengths
 from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.coordinates import Z
 from ncfix.program.rs274.groups import LENGTH
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.tree import Comment, Tape, Word
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, X, Y, Z, as_rotation, zeros
+from ncfix.program.follow.coordinates import IDENTITY, LETTERS, X, Y, Z, as_rotation, zeros
 from ncfix.program.rs274.settings import unfollowed
 from ncfix.program.rs274.systems import turned_back, words_of
 

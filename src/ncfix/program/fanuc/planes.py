@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.rs274.coordinates import IDENTITY, PLANES, Rotation, about, as_rotation, product
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.coordinates import IDENTITY, PLANES, Rotation, about, as_rotation, product
+from ncfix.program.follow.faults import Fault
 
 FloatArray = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ncfix.program.rs274.coordinates import LETTERS
+from ncfix.program.follow.coordinates import LETTERS
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z
 from ncfix.program.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
 from ncfix.program.rs274.settings import unfollowed
 

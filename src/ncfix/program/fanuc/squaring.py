@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.coordinates import DEGREE, Vector, X, Y, Z
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import Pointing
-from ncfix.program.rs274.coordinates import DEGREE, Vector, X, Y, Z
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

@@ -13,7 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ncfix.program.fanuc.data import keep_length
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.systems import activate, before_persistent
 
 if TYPE_CHECKING:

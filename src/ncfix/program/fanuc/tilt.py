@@ -13,10 +13,8 @@ import numpy as np
 
 from ncfix.program.fanuc.planes import are_square, by_axes, by_points, euler, in_order
 from ncfix.program.fanuc.squaring import SQUARED, turned_square
-from ncfix.program.moves import Kind
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.coordinates import (
+from ncfix.program.follow import tcp
+from ncfix.program.follow.coordinates import (
     IDENTITY,
     LETTERS,
     Rotation,
@@ -25,6 +23,8 @@ from ncfix.program.rs274.coordinates import (
     Z,
     zeros,
 )
+from ncfix.program.moves import Kind
+from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.settings import unfollowed
 from ncfix.program.rs274.shifts import rotate_system
 from ncfix.program.rs274.systems import turned_back

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ncfix.program.fanuc.arithmetic import VACANT
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, Parameters, Store
 
 LOCAL = range(1, 34)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.fanuc.squaring import pointing_of
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, dot
+from ncfix.program.follow.faults import Fault
 from ncfix.program.pointing import Pointing, within
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS, dot
-from ncfix.program.rs274.faults import Fault
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

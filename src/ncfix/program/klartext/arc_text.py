@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.arcs import sweep_angle
 from ncfix.program.klartext.number_text import Style, value_of
-from ncfix.program.rs274.arcs import sweep_angle
 
 FloatArray = NDArray[np.float64]
 

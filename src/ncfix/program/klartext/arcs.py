@@ -7,6 +7,10 @@ turns round, as on the control.
 import math
 from dataclasses import dataclass
 
+from ncfix.program.follow.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.coordinates import IDENTITY, Plane, Vector, dot, rotated
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.step import Step, somewhere, with_increments
 from ncfix.program.klartext.targets import (
@@ -23,14 +27,9 @@ from ncfix.program.klartext.targets import (
     starts_unknown,
 )
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.arcs import centre_from_radius, check_closure, sweep_angle
-from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.coordinates import IDENTITY, Plane, Vector, dot, rotated
-from ncfix.program.rs274.faults import Fault
 
 BAD_ARC = "NCF220"
 
-CLOCKWISE, COUNTER = 20, 30
 NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
 AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
 FLAT = 1e-9

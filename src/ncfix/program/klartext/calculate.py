@@ -10,10 +10,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.arithmetic import ARITHMETIC
+from ncfix.program.follow.faults import Fault
 from ncfix.program.tree import Binary, Call, Constant, Expression, Literal, NamedParameter, Text, Unary
 
-BAD_ARITHMETIC = "NCF210"
 EQUAL = 1e-9
 
 
@@ -147,7 +147,7 @@ def computed(operator: str, function: Callable[..., float], *operands: Evaluate)
         if not isinstance(result, float) or not math.isfinite(result):
             if scope.parameters.touched:
                 return 0.0
-            raise Fault(BAD_ARITHMETIC, f"{operator.upper()} cannot be computed here")
+            raise Fault(ARITHMETIC, f"{operator.upper()} cannot be computed here")
         return result
 
     return evaluate

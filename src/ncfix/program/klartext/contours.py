@@ -10,12 +10,12 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 
+from ncfix.program.follow.coordinates import PLANES, X, Y, dot, rotated
 from ncfix.program.klartext.control import FREELY, Control
 from ncfix.program.klartext.free import Element, Leg, solved
 from ncfix.program.klartext.step import IN_PLANE, somewhere
 from ncfix.program.klartext.targets import command_of, here, pole_frame
 from ncfix.program.klartext.units import Unit
-from ncfix.program.rs274.coordinates import PLANES, X, Y, dot, rotated
 
 FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
 WRITTEN_OUT = "a free contour (FK): --flatten writes it as lines and arcs"

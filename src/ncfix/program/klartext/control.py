@@ -7,19 +7,19 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow import control as base
+from ncfix.program.follow import tcp
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.control import AT_START, Unknown, first_reason
+from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
+from ncfix.program.follow.knowledge import WORK_OFFSET
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.calculate import Parameters, Scope
 from ncfix.program.klartext.free import Leg
 from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.moves import Kind, Kinematics, Rule
 from ncfix.program.pointing import Pointing
-from ncfix.program.rs274 import control as base
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.control import AT_START, Unknown, first_reason
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
-from ncfix.program.rs274.knowledge import WORK_OFFSET
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Setup, Tool
 
 START = "PRESET"
@@ -170,9 +170,7 @@ class Control(base.Control):
             self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
 
     def anchors(self) -> list[Hashable]:
-        """As for the RS274 family, but shift, rotation, mirror and scale are stated by the program in numbers."""
-        if not hasattr(self, "preset"):
-            return [None] * len(LETTERS)
+        """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""
         trans, tool = self.transformations, zeros() if self.tcp else self.offsets.tool
         stated = self.tcp, trans.tilt if trans.tilted else None
         length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ncfix.program.follow.coordinates import DEGREE, INDEX, X, Y, Z
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, PRESET, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
@@ -16,8 +18,6 @@ from ncfix.program.klartext.targets import Where, Words, command_of, led, polar,
 from ncfix.program.klartext.tilting import cycle_19
 from ncfix.program.klartext.trans import FROM_TABLE, note_source
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, X, Y, Z
-from ncfix.program.rs274.faults import Fault
 
 NO_CYCLE = "NCF272"
 DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.calculate import Parameters
 from ncfix.program.klartext.units import Unit
 from ncfix.program.recurrence import Budget
-from ncfix.program.rs274.faults import Fault
 
 NO_LABEL = "NCF276"
 NO_PROGRAM = "NCF231"

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow.following import PartFollower
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.interpreter import Interpreter
@@ -25,7 +26,6 @@ from ncfix.program.klartext.turns import FULL
 from ncfix.program.language import Run
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
-from ncfix.program.rs274.following import PartFollower
 from ncfix.program.tree import Command, Program, Template
 
 ELSEWHERE = re.compile(r"CALL\b|SEL\s+PGM\b|F(LT?|CT?)(?=\s|$)", re.IGNORECASE)

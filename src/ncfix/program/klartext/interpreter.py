@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from typing import Protocol
 
 from ncfix.diagnostics import Place, SourceError
+from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext import cycles, lines, tilting
 from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
@@ -28,9 +31,6 @@ from ncfix.program.language import Resolve
 from ncfix.program.reach import UNREAD
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
-from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.tree import Opaque, Program, Span
 
 NO_END = "NCF234"

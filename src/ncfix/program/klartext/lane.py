@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
+from ncfix.program.follow.builder import Stretch
+from ncfix.program.follow.contour import plane_of, resting_of_many
+from ncfix.program.follow.lane import LONGEST, SHORTEST, before_placing, filled, followed, followed_compiled
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.lane_tables import FEED, RAPID
 from ncfix.program.klartext.layout import CORNERS
 from ncfix.program.klartext.lines import FLAT
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
-from ncfix.program.rs274.builder import Stretch
-from ncfix.program.rs274.contour import plane_of, resting_of_many
-from ncfix.program.rs274.lane import LONGEST, SHORTEST, before_placing, filled, followed, followed_compiled
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

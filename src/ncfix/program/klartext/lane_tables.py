@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow import lane_tables as shared
+from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.klartext.plans import LETTERS, Plan
-from ncfix.program.rs274 import unit as rs274
-from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.rs274.plans import Lane
 from ncfix.program.tree import Constant, Literal, Template
 
 STRAIGHT = frozenset({"", "l", "ln"})
@@ -36,13 +36,13 @@ class LaneTables:
     open   (s,) blocks of the shape may go through the fast lane
     empty  (s,) they do nothing
     side   (s,) what radius compensation is from them on, -1 if it stays
-    words  axes, feed and motion as in the lane of the RS274 family; motion is that of blocks with axis words
+    words  axes, feed and motion as in every lane; motion is that of blocks with axis words
     """
 
     open: NDArray[np.bool_]
     empty: NDArray[np.bool_]
     side: NDArray[np.int64]
-    words: rs274.LaneTables
+    words: shared.LaneTables
 
     @classmethod
     def of(cls, templates: Sequence[Template], plans: Sequence[Plan], axes: int) -> LaneTables:
@@ -53,7 +53,7 @@ class LaneTables:
             np.array([lane is not None for lane in lanes], dtype=np.bool_),
             np.array([plan.empty for plan in plans], dtype=np.bool_),
             np.array(sides, dtype=np.int64),
-            rs274.LaneTables.of(lanes),
+            shared.LaneTables.of(lanes),
         )
 
 

@@ -6,6 +6,10 @@ Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellane
 import math
 from collections.abc import Sequence
 
+from ncfix.program.follow import tcp
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import LETTERS, Vector, dot
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import DEPARTED, Control
 from ncfix.program.klartext.posture import angles_for
 from ncfix.program.klartext.step import Step, refuse, with_increments
@@ -22,10 +26,6 @@ from ncfix.program.klartext.targets import (
 from ncfix.program.klartext.tilting import check_normal
 from ncfix.program.klartext.transformations import unit
 from ncfix.program.moves import Kind
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.control import Unknown
-from ncfix.program.rs274.coordinates import LETTERS, Vector, dot
-from ncfix.program.rs274.places import mask_of
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z, as_rotation, zeros
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import Pointing, within
-from ncfix.program.rs274.coordinates import Rotation, Vector, X, Y, Z, as_rotation, zeros
 
 FloatArray = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.arcs import CLOCKWISE
 from ncfix.program.klartext.arc_text import POLE_DIGITS, ArcText, PieceOfArc, arc_text
 from ncfix.program.klartext.control import BY_DEPTH, FROM_START
 from ncfix.program.klartext.holes_text import HoleWriter
@@ -28,7 +29,6 @@ SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
 WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
-CLOCKWISE = 20
 EXACT = 1e-9
 
 

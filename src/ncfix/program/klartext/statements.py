@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.codes import tip_control
 from ncfix.program.klartext.contours import follow_free
 from ncfix.program.klartext.control import AFTER_PROBING, PRESET, Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.patterns import pattern_of
 from ncfix.program.klartext.trans import transform
-from ncfix.program.rs274.faults import Fault
 
 PROBING = "probing"
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"

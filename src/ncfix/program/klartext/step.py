@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import Vector, X, Y
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.targets import Words
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.control import Unknown
-from ncfix.program.rs274.coordinates import Vector, X, Y
 
 IN_PLANE = 1 << X | 1 << Y
 

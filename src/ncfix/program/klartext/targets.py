@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ncfix.program.follow.control import ADRIFT, AT_START, Unknown
+from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import SPATIAL, Control
-from ncfix.program.rs274.control import ADRIFT, AT_START, Unknown
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
-from ncfix.program.rs274.faults import Fault
 
 BAD_POLE = "NCF271"
 POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"

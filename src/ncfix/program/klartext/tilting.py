@@ -10,14 +10,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ncfix.program.follow import tcp
+from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
 from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
 from ncfix.program.klartext.transformations import euler, from_points, from_vectors, projected, spatial
 from ncfix.program.moves import Kind
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
-from ncfix.program.rs274.faults import Fault
 
 BAD_PLANE = "NCF273"
 RETRACTING = "mb max"

@@ -5,11 +5,11 @@ The control applies the length along the tool axis from TOOL CALL on; there is n
 
 from __future__ import annotations
 
+from ncfix.program.follow import tcp
+from ncfix.program.follow.coordinates import Z, zeros
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import TOOL, Control
 from ncfix.program.klartext.targets import Words
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.coordinates import Z, zeros
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Tool
 
 NAMED = -1

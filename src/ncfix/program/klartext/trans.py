@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 
+from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.klartext.control import Control
-from ncfix.program.rs274.coordinates import INDEX
 
 FORM = re.compile(r"TRANS\s+(?P<kind>MIRROR|ROTATION|SCALE|DATUM)\s*(?P<rest>.*)", re.IGNORECASE | re.DOTALL)
 NUMBER = re.compile(r"(?P<word>IROT|ROT|SCL)\s*(?P<value>[+-]?\s*(\d+([.,]\d*)?|[.,]\d+))\Z", re.IGNORECASE)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.coordinates import (
+from ncfix.program.follow.coordinates import (
     IDENTITY,
     INDEX,
     PLANES,

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.lane_tables import LaneTables
 from ncfix.program.klartext.plans import Plan, plan_of
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.unit import view
-from ncfix.program.tree import Program
+from ncfix.program.tree import Program, view
 
 NO_BEGIN = "NCF275"
 BEGIN = re.compile(r"BEGIN\s+PGM(?P<rest>.*)", re.IGNORECASE | re.DOTALL)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import Control
-from ncfix.program.rs274.faults import Fault
 
 UNREADABLE = "NCF236"
 NOT_KLARTEXT = "this line is not understood; if it is no Klartext, the control stops at it"

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ncfix.program.flatten import TOO_LONG, FlatLine
+from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.calculate import Scope, compiled
 from ncfix.program.klartext.contours import written_out
 from ncfix.program.klartext.control import Control
@@ -20,7 +21,6 @@ from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_
 from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.units import Unit
 from ncfix.program.number_style import decimals_for
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.tree import Assignment, Constant, Expression, Literal, Opaque, Program, Span, Text, Word
 
 LEAST = 4

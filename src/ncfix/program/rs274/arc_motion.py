@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, IDENTITY, INCH, Plane, dot
+from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.arcs import ARC_FAULT, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.builder import Arc
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import CENTRE_LETTERS, IDENTITY, INCH, Plane, Vector, dot
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.feeds import check_feed
 from ncfix.program.rs274.targets import destination
 
-CLOCKWISE = 20
 SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
 
 
@@ -26,7 +25,7 @@ def arc(control: Control, block: Block, code: int) -> None:
     check_words(control, block, plane)
     control.settle(tuple(control.unknown))
     target, unknown = destination(control, block)
-    step = in_frame(control, [b - a for a, b in zip(control.position, target, strict=True)])
+    step = control.in_frame([b - a for a, b in zip(control.position, target, strict=True)])
     end = step[plane.first], step[plane.second]
     doubtful = bool(unknown or control.unknown or block.runtime or control.shaky)
     clockwise = code == CLOCKWISE
@@ -100,13 +99,6 @@ def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clock
     tolerance = control.dialect.closure_mm * (1.0 if unit == 1.0 else INCH / 10)
     check_closure((first, second), end, tolerance, control.dialect.closure_relative)
     return first, second
-
-
-def in_frame(control: Control, step: Vector) -> Vector:
-    """A difference of commands in the axes of the program's frame, mm and rad."""
-    if not control.is_rotated:
-        return step
-    return [dot(row, step) for row in control.inverse] + step[3:]
 
 
 def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import re
-from math import isfinite
 
 from lark import UnexpectedInput
 
+from ncfix.program.block_checks import check_exponents, check_numbers, start_of
 from ncfix.program.build import Parsed, TooDeepError, build
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError, bare_expression, explain
 from ncfix.program.grammar import Squeezed, parse, squeeze
 from ncfix.program.rs274.groups import TOOL_CHANGE
-from ncfix.program.tree import Constant, Word
 
 MAY_REPEAT = frozenset("GM")
 """The addresses that may stand several times in a block."""
-
-G_WITH_E = frozenset({470, 700, 760, 1870})
-M_WITH_E = frozenset({660, 670, 680})
-"""They take an E word, so that `H2E1` is two words there: G70, G76, M66, M67, M68 of LinuxCNC ("G codes", "M codes"),
-G47 and G187 of Haas."""
 
 PRODUCT = re.compile(r"#[^(;\[]*(?P<operator>\*)\d+(?=;|$)")
 """A parameter, and behind it outside brackets what a check number looks like."""
@@ -49,28 +43,6 @@ def check_products(squeezed: Squeezed) -> None:
         raise bare_expression(squeezed.places[found.start("operator")])
 
 
-def check_numbers(parsed: Parsed) -> None:
-    """Refuse a number that no double can hold."""
-    for (start, _), value in zip(parsed.spans, parsed.values, strict=True):
-        if not isfinite(value):
-            raise BlockError("NCF115", "the number is too large", start)
-    for word in parsed.template.words:
-        if isinstance(word.value, Constant) and not isfinite(word.value.value):
-            raise BlockError("NCF115", "the number is too large", start_of(word, parsed))
-
-
-def check_exponents(parsed: Parsed, text: str) -> None:
-    """Refuse `X1e-5`: it would be read as X1 and a word E."""
-    template = parsed.template
-    if not (G_WITH_E.isdisjoint(template.g_codes) and M_WITH_E.isdisjoint(template.m_codes)):
-        return
-    for word in template.words:
-        start = start_of(word, parsed)
-        if word.address == "E" and start and text[start - 1] in "0123456789.":
-            hint = "write the number out; if a word E is meant, put a blank before it"
-            raise BlockError("NCF116", "the number has an exponent", start, hint)
-
-
 def check_repeats(parsed: Parsed, standby: bool = True) -> None:
     """Refuse a word that stands twice; with `standby` not the tool that M6 has brought besides the one it changes."""
     seen: set[str] = set()
@@ -79,9 +51,3 @@ def check_repeats(parsed: Parsed, standby: bool = True) -> None:
         if word.address in seen and word.address not in may:
             raise BlockError("NCF117", f"the word {word.address} stands twice", start_of(word, parsed))
         seen.add(word.address)
-
-
-def start_of(word: Word, parsed: Parsed) -> int:
-    """Where a word starts in its block."""
-    slot, offset = word.span.start
-    return offset if slot < 0 else parsed.spans[slot][1] + offset

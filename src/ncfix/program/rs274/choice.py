@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.modal import NO_MOTION
 from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import LENGTH, TURNING_CYCLES
-from ncfix.program.rs274.modal import NO_MOTION
 from ncfix.program.rs274.motion import BAD_MOTION, NO_CODE
 from ncfix.program.rs274.plans import Codes, Plan
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-from ncfix.program.moves import Kind
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import LETTERS, Plane, Vector, X, Y, dot
+from ncfix.program.follow.faults import Fault
+from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import LETTERS, Plane, Vector, X, Y, dot
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.feeds import INVERSE_TIME
+from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.systems import check_system
 from ncfix.program.rs274.targets import by_radius_and_angle, unknown_after, unnamed
 
@@ -45,7 +45,7 @@ def check_cycle(control: Control, block: Block, code: int) -> None:
     if not control.rules.strict:
         return
     modal = control.modal
-    if not modal.feed_given or modal.feed_mode == INVERSE_TIME:
+    if not modal.feed_given or modal.feed_mode == FeedMode.INVERSE_TIME:
         raise Fault("NCF225", "a canned cycle needs a feed (F) per minute or revolution")
     if modal.compensated:
         raise Fault(BAD_CYCLE, "canned cycles cannot be used with cutter compensation")

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.arithmetic import BINARY, UNARY, whole
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
 
 

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow.faults import Fault
+from ncfix.program.moves import FeedMode
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.faults import Fault
 
 NO_FEED = "NCF225"
-INVERSE_TIME, PER_MINUTE, PER_REVOLUTION = 93, 94, 95
 
 
 def feed_mode(control: Control, block: Block, code: int) -> None:
     """G93, G94, G95. In LinuxCNC a feed per minute or revolution has to be given anew after its code."""
     mode = code // 10
-    if mode != control.modal.feed_mode or (control.rules.strict and mode != INVERSE_TIME):
+    if mode != control.modal.feed_mode or (control.rules.strict and mode != FeedMode.INVERSE_TIME):
         control.modal.feed = math.nan
         control.modal.feed_given = False
     control.modal.feed_mode = mode
@@ -25,7 +25,7 @@ def feed_mode(control: Control, block: Block, code: int) -> None:
 
 def feed(control: Control, block: Block, code: int) -> None:
     """F."""
-    unit = 1.0 if control.modal.feed_mode == INVERSE_TIME else control.modal.unit
+    unit = 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
     control.modal.feed = math.nan if "F" in block.runtime else unit * block.values["F"]
     control.modal.feed_given = control.modal.feed != 0.0
 
@@ -37,12 +37,12 @@ def speed(control: Control, block: Block, code: int) -> None:
 
 def check_feed(control: Control, block: Block) -> None:
     """Raise `Fault` where LinuxCNC refuses a motion for want of a feed."""
-    if not control.rules.strict:
+    if not control.needs_feed:
         return
-    if control.modal.feed_mode == INVERSE_TIME:
+    if control.modal.feed_mode == FeedMode.INVERSE_TIME:
         if "F" not in block.values:
             raise Fault(NO_FEED, "in inverse time mode (G93) every motion at feed needs its own F")
     elif not control.modal.feed_given:
         raise Fault(NO_FEED, "a motion at feed, and no feed (F) is set")
-    elif control.modal.feed_mode == PER_REVOLUTION and control.modal.speed == 0.0:
+    elif control.modal.feed_mode == FeedMode.PER_REVOLUTION and control.modal.speed == 0.0:
         raise Fault(NO_FEED, "a feed per revolution (G95), and no spindle speed (S) is set")

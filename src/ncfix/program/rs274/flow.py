@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.expressions import Evaluate
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.labels import BAD_FLOW, Label, Labels, oword
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine

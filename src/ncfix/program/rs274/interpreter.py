@@ -7,16 +7,16 @@ from contextlib import contextmanager
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow.coordinates import LETTERS, N_LETTERS
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.lane import run_lane
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import LETTERS, N_LETTERS
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import RUNTIME_BRANCH, Course, FlowControl
-from ncfix.program.rs274.lane import run_lane
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.unit import Unit
 
 BAD_FLOW = "NCF230"

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
+from ncfix.program.follow import rollover
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import AXIS_LETTERS, Layout, bulk_layout, has_free_text, layout_of
 from ncfix.program.moves import Trace
 from ncfix.program.reach import tape_end
 from ncfix.program.render import BlockRenderer
-from ncfix.program.rs274 import rollover
 from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.following import RS274Follower
@@ -26,7 +26,6 @@ from ncfix.program.tree import Program, Word
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
     control = Control(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
-    rollover.watch(control)
     return Interpreter(control, program, run.resolve, run.budget(program))
 
 

@@ -6,12 +6,12 @@ programming manual.
 
 from __future__ import annotations
 
-from ncfix.program.rs274 import tcp
+from ncfix.program.follow import tcp
+from ncfix.program.follow.coordinates import LETTERS, Vector, X, Y, Z, zeros
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import LETTERS, Vector, X, Y, Z, zeros
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.systems import BAD_G10, SYSTEM_NAMES, first_parameter, set_system, stored, words_of
 
 BAD_LENGTH = "NCF224"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from ncfix.program.moves import Kind
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Vector, rotated
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.feeds import PER_REVOLUTION, check_feed
+from ncfix.program.follow import tcp
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Vector, rotated
+from ncfix.program.follow.faults import Fault
+from ncfix.program.moves import FeedMode, Kind
+from ncfix.program.rs274.control import Block, Control
+from ncfix.program.rs274.feeds import check_feed
 from ncfix.program.rs274.systems import REFERENCES, is_given, store, stored
 from ncfix.program.rs274.targets import destination, machine_destination
 
@@ -138,7 +139,7 @@ def probe(control: Control, block: Block, code: int) -> None:
     if control.rules.strict:
         if not control.modal.feed_given:
             raise Fault("NCF225", "probing, and no feed (F) is set")
-        if control.modal.feed_mode == PER_REVOLUTION:
+        if control.modal.feed_mode == FeedMode.PER_REVOLUTION:
             raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
     if code != ONE_SHOT_PROBE:
         control.modal.motion = code

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 
 N_PARAMETERS = 5603
 """Numbered parameters are 1 up to here."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.lane_tables import Lane
+from ncfix.program.follow.modal import NO_MOTION
 from ncfix.program.rs274 import groups
-from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.rs274.expressions import Evaluate
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import TOOL_CHANGE, Rules
-from ncfix.program.rs274.modal import NO_MOTION
 from ncfix.program.rs274.order import Step, steps_of
 from ncfix.program.tree import (
     Assignment,
@@ -75,20 +76,6 @@ class Codes:
     call: int | None
     takes: bool
     unknown: tuple[int, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Lane:
-    """A block that is nothing but a straight motion with plain numbers.
-
-    axes    pairs of letter index and slot
-    feed    slot of F, -1 without
-    motion  0, 10, or -1 if the code in force stays
-    """
-
-    axes: tuple[tuple[int, int], ...]
-    feed: int
-    motion: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ import math
 from collections.abc import Callable
 from functools import partial
 
+from ncfix.program.follow.coordinates import LETTERS
 from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.coordinates import LETTERS
 from ncfix.program.rs274.flow import FlowControl
 
 VERSION = 2.9

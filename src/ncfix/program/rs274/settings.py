@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import copy
 
+from ncfix.program.follow.coordinates import INCH, PLANES
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.modal import Modal, Saved
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import INCH, PLANES
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.modal import Modal, Saved
 from ncfix.program.rs274.systems import activate
 
 BAD_SETTING = "NCF221"
@@ -96,9 +96,7 @@ def unknown_code(control: Control, code: int) -> None:
     name = f"G{code / 10:g}"
     if control.rules.strict:
         raise Fault("NCF227", f"{name} is not a code of LinuxCNC", "if the machine remaps it, ncfix cannot follow it")
-    if not control.refusal:
-        control.refusal = f"{name} is not known, and may move axes or change coordinates"
-        control.warn("NCF228", control.refusal, "all motions after it are refused")
+    control.refuse_after(name)
 
 
 # -- saved states -----------------------------------------------------------------------------------------------------

@@ -6,10 +6,10 @@ and for G68 and G69 the Fanuc 30i programming manual.
 
 from __future__ import annotations
 
+from ncfix.program.follow.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import IDENTITY, LETTERS, N_LETTERS, about, product, zeros
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.settings import ENDS, unfollowed
 from ncfix.program.rs274.systems import (
     SHIFT,

@@ -6,9 +6,8 @@ Source: LinuxCNC documentation, "Coordinate systems", "G10 L2", "G10 L20". Param
 
 from __future__ import annotations
 
-from ncfix.program.rs274.arithmetic import whole
-from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import (
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import (
     DEGREE,
     IDENTITY,
     INDEX,
@@ -23,8 +22,10 @@ from ncfix.program.rs274.coordinates import (
     rotated,
     transposed,
 )
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.places import mask_of
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
+from ncfix.program.rs274.arithmetic import whole
+from ncfix.program.rs274.control import Block, Control
 
 SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SHIFT = 5211

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 
-from ncfix.program.rs274 import tcp
-from ncfix.program.rs274.control import Block, Control, Unknown
-from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, X, Y, Z, rotated
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow import tcp
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, X, Y, Z, rotated
+from ncfix.program.follow.faults import Fault
+from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.systems import check_system
 
 AFTER_ROTATION = "where the axis {} goes after G68 or G69 differs from control to control until both axes are named"

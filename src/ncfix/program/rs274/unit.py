@@ -4,49 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.rs274.coordinates import N_LETTERS
+from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.rs274.groups import Rules
-from ncfix.program.rs274.plans import Lane, Plan, plan_of
-from ncfix.program.tree import Comment, Flow, Program
-
-
-def view(array: NDArray[Any]) -> Sequence[Any]:
-    """An array as a sequence of plain Python numbers, made one at a time."""
-    return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]
-
-
-@dataclass(frozen=True, slots=True)
-class LaneTables:
-    """The lanes of all shapes as columns; -1 for what a shape lacks, and for all of a shape that has no lane.
-
-    axes    (s, 9) which number of a block is the word of an axis
-    feed    (s,) which one is F
-    motion  (s,) motion code in tenths
-    mask    (s,) axis words, as bits
-    """
-
-    axes: NDArray[np.int64]
-    feed: NDArray[np.int64]
-    motion: NDArray[np.int64]
-    mask: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, lanes: Sequence[Lane | None]) -> LaneTables:
-        """The tables of some lanes."""
-        n = len(lanes)
-        tables = cls(np.full((n, N_LETTERS), -1), np.full(n, -1), np.full(n, -1), np.zeros(n, dtype=np.int64))
-        for shape, lane in enumerate(lanes):
-            if lane is not None:
-                for letter, slot in lane.axes:
-                    tables.axes[shape, letter] = slot
-                tables.feed[shape], tables.motion[shape] = lane.feed, lane.motion
-                tables.mask[shape] = sum(1 << letter for letter, _ in lane.axes)
-        return tables
+from ncfix.program.rs274.plans import Plan, plan_of
+from ncfix.program.tree import Comment, Flow, Program, view
 
 
 @dataclass(slots=True, eq=False)

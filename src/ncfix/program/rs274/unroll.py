@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 from ncfix.diagnostics import SourceError
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.flow import RUNTIME_BRANCH
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word

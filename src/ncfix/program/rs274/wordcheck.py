@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import dataclass
 
+from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.rs274.groups import CYCLES, TURNING_CYCLES
 from ncfix.program.rs274.plans import Codes, Plan
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ncfix.program.rs274.coordinates import (
+from ncfix.program.follow.coordinates import (
     IDENTITY,
     PLANES,
     Plane,

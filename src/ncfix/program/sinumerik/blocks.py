@@ -7,11 +7,11 @@ import re
 from lark import UnexpectedInput
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
+from ncfix.program.block_checks import check_exponents, check_numbers, start_of
 from ncfix.program.build import Parsed, TooDeepError
 from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError
 from ncfix.program.grammar import parse
-from ncfix.program.rs274.blocks import check_exponents, check_numbers, start_of
 from ncfix.program.sinumerik.build import build
 from ncfix.program.tree import END, START, Anchor, Opaque, Span, Template
 

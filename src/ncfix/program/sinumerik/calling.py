@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE
 from ncfix.program.sinumerik.framing import into_spindle, set_length
 from ncfix.program.sinumerik.plans import Calling, plain_text

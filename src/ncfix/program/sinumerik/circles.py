@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
+from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.arc_motion import CLOCKWISE, in_frame
-from ncfix.program.rs274.arcs import ARC_FAULT, Point, centre_from_radius, check_closure, sweep_angle
-from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.affine import handed
 from ncfix.program.sinumerik.destination import NO_POLE, End, Words, destination, doubtful_polar
 from ncfix.program.sinumerik.state import Sinumerik
@@ -40,7 +39,7 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
         if not doubtful and not refusal:
             raise
         centre = (1.0, 0.0)
-    step = in_frame(control, [b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
@@ -73,7 +72,7 @@ def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
 def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> tuple[Point, End]:
     """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
     plane = control.modal.plane
-    step = in_frame(control, [b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
     chord = step[plane.first], step[plane.second]
     letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
     has_centre = any(letter in words.values for letter in letters)
@@ -129,7 +128,7 @@ def ended_by_angle(control: Sinumerik, words: Words, end: End, centre: Point, *,
     step = [0.0, 0.0, 0.0]
     step[plane.first] = centre[0] - centre[0] * cosine + centre[1] * sine
     step[plane.second] = centre[1] - centre[0] * sine - centre[1] * cosine
-    whole = in_frame(control, [b - a for a, b in zip(control.position, end.target, strict=True)])
+    whole = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
     step[plane.across] = whole[plane.across]
     target = end.target[:]
     target[:3] = [here + dot(row, step) for here, row in zip(control.position, control.rotation, strict=False)]

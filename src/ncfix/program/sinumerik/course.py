@@ -6,8 +6,8 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.modal import Modal
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.modal import Modal
 from ncfix.program.sinumerik.modes import Frames, Modes
 from ncfix.program.sinumerik.plans import Branching, Letting
 from ncfix.program.sinumerik.state import Sinumerik

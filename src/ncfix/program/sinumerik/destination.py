@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.control import Unknown
-from ncfix.program.rs274.coordinates import INDEX, LETTERS, Vector, rotated
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.places import mask_of
+from ncfix.program.follow.control import Unknown
+from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, rotated
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.places import mask_of
 from ncfix.program.sinumerik.increments import unsteady
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING

@@ -13,11 +13,11 @@ import numpy as np
 
 from ncfix.program import reach
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.following import PartFollower
 from ncfix.program.language import Run
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.following import PartFollower
 from ncfix.program.sinumerik.calling import NO_SUBPROGRAM
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ncfix.program.rs274.coordinates import INCH, INDEX, PLANES, Vector, zeros
-from ncfix.program.rs274.places import mask_of
+from ncfix.program.follow.coordinates import INCH, INDEX, PLANES, Vector, zeros
+from ncfix.program.follow.places import mask_of
 from ncfix.program.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import had_from_the_start

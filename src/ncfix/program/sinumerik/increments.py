@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ncfix.program.rs274.coordinates import LETTERS
+from ncfix.program.follow.coordinates import LETTERS
 from ncfix.program.sinumerik.affine import WORLD, Affine
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ import numpy as np
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.lane import run_lane
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.lane import run_lane
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.calling import call_word
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
@@ -129,7 +129,7 @@ class Interpreter:
             plan = course.unit.plan(course.block)
             if plan.lane is not None and self.lane_is_open():
                 run = run_lane if plan.vector is None else run_vectors
-                done = run(control, course.unit, course.block, main)  # type: ignore[arg-type]
+                done = run(control, course.unit, course.block, main)
                 if done:
                     self.stand(done)
                     course.block += done

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
+from ncfix.program.follow import rollover
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import bulk_layout
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.pieces import Pieces
 from ncfix.program.reach import whole_text
-from ncfix.program.rs274 import rollover
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_on

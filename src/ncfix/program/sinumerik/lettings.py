@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ncfix.program.follow.coordinates import INDEX, LETTERS
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import INDEX, LETTERS
 from ncfix.program.sinumerik.destination import End, Words, destination
 from ncfix.program.sinumerik.plans import Letting
 from ncfix.program.sinumerik.state import Sinumerik

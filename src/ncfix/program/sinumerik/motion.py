@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import INDEX
 from ncfix.program.sinumerik.circles import arc, through_point
 from ncfix.program.sinumerik.destination import End, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import mind_carried, take_up

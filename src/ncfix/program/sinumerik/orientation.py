@@ -14,9 +14,9 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, product
+from ncfix.program.follow.faults import Fault
 from ncfix.program.pointing import Pointing, Triple, dot
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS, product
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.affine import turned
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.state import Sinumerik

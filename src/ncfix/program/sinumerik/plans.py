@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
-from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.rs274.plans import Lane
+from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.sinumerik.blocks import STATEMENT
 from ncfix.program.sinumerik.build import BRACKET
 from ncfix.program.sinumerik.values import Evaluate, compiled, nothing

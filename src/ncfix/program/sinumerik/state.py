@@ -16,15 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow import rollover, tcp
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.control import AT_START, Control, Unknown
+from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
+from ncfix.program.follow.modal import Modal
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind, Kinematics, Rule, TcpState
 from ncfix.program.pointing import Pointing
-from ncfix.program.rs274 import rollover, tcp
-from ncfix.program.rs274.arc_motion import in_frame
-from ncfix.program.rs274.builder import Arc
-from ncfix.program.rs274.control import AT_START, Control, Unknown
-from ncfix.program.rs274.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
-from ncfix.program.rs274.modal import Modal
-from ncfix.program.rs274.places import mask_of
 from ncfix.program.setup import Setup
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
@@ -77,6 +76,7 @@ class Sinumerik(Control):
         dialect: Dialect,
         kinematics: Kinematics | None = None,
     ) -> None:
+        super().__init__(setup, axes, rotary, dialect, kinematics)
         self.frames = Frames()
         self.modes = Modes()
         self.lost: Unknown = {}
@@ -91,7 +91,7 @@ class Sinumerik(Control):
         self.solitary: frozenset[int] = frozenset()
         self.variables = Variables.given(setup.variables)
         self.named = Named()
-        super().__init__(setup, axes, rotary, dialect, kinematics)
+        self.refresh()
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
         rollover.watch(self)
@@ -102,7 +102,7 @@ class Sinumerik(Control):
     def refresh(self) -> None:
         """Compose the frames; to be called after any of them, the unit, the tool or the diameter mode has changed."""
         whole = self.frames.whole
-        before = self.rotation if hasattr(self, "rotation") else whole.rotation
+        before = self.rotation
         tool = zeros() if self.tcp else self.offsets.tool
         self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
         self.rotation = whole.rotation
@@ -290,9 +290,9 @@ class Sinumerik(Control):
         if gone or not follows:
             self.heading = None
         elif arc is not None:
-            self.heading = in_frame(self, departing(arc, end.target, step))[:3]
+            self.heading = self.in_frame(departing(arc, end.target, step))[:3]
         elif any(step[:3]):
-            self.heading = in_frame(self, step)[:3]
+            self.heading = self.in_frame(step)[:3]
         elif any(step):
             self.heading = None
 

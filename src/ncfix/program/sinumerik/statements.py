@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.coordinates import INDEX
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.settings import unknown_code
+from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
@@ -308,7 +307,7 @@ def codes(control: Sinumerik, turn: Turn) -> None:
         elif code in TAKES_WORDS:
             takes_words(control, turn, code)
         elif code not in PASSED:
-            unknown_code(control, code)
+            control.refuse_after(f"G{code / 10:g}")
 
 
 def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:

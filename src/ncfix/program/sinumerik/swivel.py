@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotation
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotation
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix.program.sinumerik.destination import End, Words
 from ncfix.program.sinumerik.orientation import WAY

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow.arcs import ARC_FAULT
+from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Kind
-from ncfix.program.rs274.arc_motion import in_frame
-from ncfix.program.rs274.arcs import ARC_FAULT
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.circles import POLAR_ARC, circle_of
 from ncfix.program.sinumerik.destination import Words, destination
 from ncfix.program.sinumerik.state import Sinumerik
@@ -30,7 +29,7 @@ def tangential(control: Sinumerik, words: Words) -> None:
     control.settle_all()
     end, heading, plane = destination(control, words), control.heading, control.modal.plane
     why = refusal_of(words)
-    step = in_frame(control, [b - a for a, b in zip(control.position, end.target, strict=True)])
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
     ahead = (0.0, 0.0) if heading is None else (heading[plane.first], heading[plane.second])
     chord = step[plane.first], step[plane.second]
     if why or end.unknown or control.unknown or not math.hypot(*ahead):

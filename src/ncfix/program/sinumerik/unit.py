@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.rs274.faults import Fault
-from ncfix.program.rs274.unit import LaneTables, view
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
-from ncfix.program.tree import Constant, Literal, Program, Word
+from ncfix.program.tree import Constant, Literal, Program, Word, view
 from ncfix.program.tree import Text as Label
 
 HEAD = re.compile(r"[ \t]*%_N_(\w+?)(?:_(?:MPF|SPF|CYC|INI))?[ \t]*(?:;.*)?$", re.IGNORECASE)

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
+from ncfix.program.follow.coordinates import LETTERS
+from ncfix.program.follow.faults import Fault
 from ncfix.program.number_style import decimals_for
-from ncfix.program.rs274.coordinates import LETTERS
-from ncfix.program.rs274.faults import Fault
 from ncfix.program.sinumerik.patterns import PATTERNS
 from ncfix.program.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
 from ncfix.program.sinumerik.render import FORM

@@ -10,8 +10,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from ncfix.program.rs274.arithmetic import UNARY
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow import arithmetic
+from ncfix.program.follow.arithmetic import ARITHMETIC, divide, power
+from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik.build import BRACKET
 from ncfix.program.sinumerik.texts import TEXT_FUNCTIONS, of_texts
 from ncfix.program.tree import (
@@ -32,7 +33,6 @@ Value = float | str | None
 Key = str | tuple[str, tuple[float, ...]]
 """A variable, or an element of an array."""
 
-ARITHMETIC = "NCF210"
 COMPARISONS = frozenset({"==", "<>", ">", "<", ">=", "<="})
 EQUAL = 1e-12
 """Relative difference up to which two numbers are equal (MD10280)."""
@@ -136,20 +136,13 @@ def applied(function: Callable[..., float], *values: Value) -> float | None:
     return result
 
 
-def divided(left: float, right: float) -> float:
-    """`left / right`."""
-    if right == 0.0:
-        raise Fault(ARITHMETIC, "division by zero")
-    return left / right
-
-
 OPERATORS: dict[str, Callable[[float, float], float]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,
-    "/": divided,
-    "div": lambda a, b: float(math.trunc(divided(a, b))),
-    "mod": lambda a, b: a - b * math.trunc(divided(a, b)),
+    "/": divide,
+    "div": lambda a, b: float(math.trunc(divide(a, b))),
+    "mod": lambda a, b: a - b * math.trunc(divide(a, b)),
     "and": lambda a, b: float(bool(a) and bool(b)),
     "or": lambda a, b: float(bool(a) or bool(b)),
     "xor": lambda a, b: float(bool(a) != bool(b)),
@@ -208,15 +201,10 @@ def joined(left: Value, right: Value) -> Value:
 # -- functions --------------------------------------------------------------------------------------------------------
 
 
-def power(base: float, exponent: float = 2.0) -> float:
-    """`POT`."""
-    return float(base**exponent)
-
-
 FUNCTIONS: dict[str, tuple[Callable[..., float], int]] = {
-    **{name: (UNARY[name], 1) for name in ("sin", "cos", "tan", "asin", "acos", "sqrt", "abs", "exp", "ln")},
+    **{name: (function, 1) for name, function in arithmetic.FUNCTIONS.items()},
     "atan2": (lambda y, x: math.degrees(math.atan2(y, x)), 2),
-    "pot": (power, 1),
+    "pot": (lambda a: power(a, 2.0), 1),
     "trunc": (lambda a: float(math.trunc(a)), 1),
     "round": (lambda a: float(math.floor(a + 0.5)), 1),
     "roundup": (lambda a: float(math.ceil(a)), 1),

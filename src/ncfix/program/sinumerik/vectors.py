@@ -11,21 +11,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.program.pointing import Pointing
-from ncfix.program.rs274.coordinates import DEGREE
-from ncfix.program.rs274.feeds import INVERSE_TIME
-from ncfix.program.rs274.lane import (
+from ncfix.program.follow.coordinates import DEGREE
+from ncfix.program.follow.lane import (
     SHORTEST,
     FloatArray,
     IntArray,
     Stage,
     before_placing,
-    count_allowed,
     filled,
     is_open,
     stage_of,
     take,
 )
+from ncfix.program.moves import FeedMode
+from ncfix.program.pointing import Pointing
 from ncfix.program.sinumerik.orientation import BY_AXES, FAR, NO_LENGTH, ON_CURVES, direction_of, is_choice, stray
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unit import Unit
@@ -37,7 +36,7 @@ LONGEST = 1 << 10
 def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
     """Take the stretch that begins with a block; the number of blocks taken, 0 for none."""
     stop = min(unit.vector_end(block), block + LONGEST)
-    if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):  # type: ignore[arg-type]
+    if stop - block < SHORTEST or not is_ready(control) or not is_open(control, unit, block):
         return 0
     pointing = control.pointing
     assert pointing is not None
@@ -47,11 +46,10 @@ def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
     stop = before_placing(control, mask, block)
     if stop - block < SHORTEST:
         return 0
-    stage = stage_of(control, unit, block, stop)  # type: ignore[arg-type]
+    stage = stage_of(control, unit, block, stop)
     stage = replace(stage, mask=mask[: stop - block])
     count = turn(control, pointing, letters, vectors_of(unit, block, stop), stage)
     feed = filled(stage.feed, ~np.isnan(stage.feed), np.nan)
-    count = min(count, count_allowed(control, stage, feed))
     if count < SHORTEST:
         return 0
     control.points = True
@@ -63,7 +61,7 @@ def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
 def is_ready(control: Sinumerik) -> bool:
     """Whether directions of the tool can be followed many at a time."""
     modes, modal = control.modes, control.modal
-    plain = not modal.incremental and modal.feed_mode != INVERSE_TIME and control.tools.offset is not None
+    plain = not modal.incremental and modal.feed_mode != FeedMode.INVERSE_TIME and control.tools.offset is not None
     followed = modes.transformed and not modes.orientation.startswith(ON_CURVES)
     return plain and followed and control.pointing is not None
 

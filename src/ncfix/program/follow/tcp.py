@@ -7,9 +7,9 @@ length along Z.
 
 from __future__ import annotations
 
+from ncfix.program.follow.control import Control, Unknown
+from ncfix.program.follow.coordinates import Vector, X, Y, Z
 from ncfix.program.moves import TcpState
-from ncfix.program.rs274.control import Control, Unknown
-from ncfix.program.rs274.coordinates import Vector, X, Y, Z
 
 TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
 

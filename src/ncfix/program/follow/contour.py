@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.rs274.coordinates import Vector, rotated
-from ncfix.program.rs274.places import mask_of
+from ncfix.program.follow.coordinates import Vector, rotated
+from ncfix.program.follow.places import mask_of
 
 if TYPE_CHECKING:
-    from ncfix.program.rs274.control import Control, Unknown
+    from ncfix.program.follow.control import Control, Unknown
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -1,24 +1,25 @@
 """The fast lane: stretches of straight motions with plain numbers, taken all at once.
 
-It does what the steps of `order.py` would do block by block, with the same operations in the same order, so that the
+It does what the interpreter would do block by block, with the same operations in the same order, so that the
 results are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.moves import Kind
-from ncfix.program.rs274.builder import Stretch
-from ncfix.program.rs274.contour import resting_of_many
-from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.coordinates import N_LETTERS
-from ncfix.program.rs274.feeds import INVERSE_TIME, PER_REVOLUTION
-from ncfix.program.rs274.unit import LaneTables, Unit
+from ncfix.program.follow.builder import Stretch
+from ncfix.program.follow.contour import resting_of_many
+from ncfix.program.follow.control import Control
+from ncfix.program.follow.coordinates import N_LETTERS
+from ncfix.program.follow.lane_tables import Lane, LaneTables
+from ncfix.program.moves import FeedMode, Kind
+from ncfix.program.tree import Program
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -53,6 +54,32 @@ class Stage:
         return Stage(
             self.path[: count + 1], self.feed[:count], self.motion[:count], self.coded[:count], self.mask[:count]
         )
+
+
+class HasLane(Protocol):
+    """The plan of a block."""
+
+    @property
+    def lane(self) -> Lane | None:
+        """Where its numbers are, if it may go through the fast lane."""
+
+
+class Unit(Protocol):
+    """A program text while it is executed."""
+
+    @property
+    def program(self) -> Program:
+        """The program whose text it is."""
+
+    @property
+    def lanes(self) -> LaneTables:
+        """The lanes of all shapes as columns."""
+
+    def plan(self, block: int) -> HasLane:
+        """The plan of a block."""
+
+    def lane_end(self, block: int) -> int:
+        """The first block from `block` on that cannot go through the fast lane."""
 
 
 def run_lane(control: Control, unit: Unit, block: int, main: bool) -> int:
@@ -137,7 +164,7 @@ def followed_compiled(
     control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
 ) -> tuple[FloatArray, FloatArray]:
     """As `followed`."""
-    from ncfix.program.rs274 import lane_kernel
+    from ncfix.program.follow import lane_kernel
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
     incremental = control.modal.incremental
@@ -158,12 +185,12 @@ def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> Float
 def count_allowed(control: Control, stage: Stage, feed: FloatArray) -> int:
     """How many blocks run before one that the control would refuse for want of a feed."""
     modal = control.modal
-    if not control.rules.strict:
+    if not control.needs_feed:
         return len(feed)
     at_feed = (stage.motion == 10) & ((stage.mask != 0) | stage.coded)
-    if modal.feed_mode == INVERSE_TIME:
+    if modal.feed_mode == FeedMode.INVERSE_TIME:
         refused = at_feed & np.isnan(stage.feed)
-    elif modal.feed_mode == PER_REVOLUTION and modal.speed == 0.0:
+    elif modal.feed_mode == FeedMode.PER_REVOLUTION and modal.speed == 0.0:
         refused = at_feed
     else:
         missing = np.isnan(feed) & (not modal.feed_given)
@@ -174,7 +201,7 @@ def count_allowed(control: Control, stage: Stage, feed: FloatArray) -> int:
 def take(control: Control, stage: Stage, feed: FloatArray, block: int, main: bool) -> None:
     """Add the motions of a stretch, and leave the control as they leave it."""
     modal = control.modal
-    unit = 1.0 if modal.feed_mode == INVERSE_TIME else modal.unit
+    unit = 1.0 if modal.feed_mode == FeedMode.INVERSE_TIME else modal.unit
     feeds = np.where(np.isnan(feed), modal.feed, unit * feed)
     if not np.isnan(stage.feed).all():
         modal.feed, modal.feed_given = float(feeds[-1]), bool(feeds[-1] != 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from ncfix.program.rs274.coordinates import IDENTITY, PLANES, Plane, Rotation, Vector, zeros
+from ncfix.program.follow.coordinates import IDENTITY, PLANES, Plane, Rotation, Vector, zeros
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 
-from ncfix.program.rs274.faults import Fault
+from ncfix.program.follow.faults import Fault
 
 Point = tuple[float, float]
+
+CLOCKWISE, COUNTER = 20, 30
+"""The motion codes of arcs, G2 and G3."""
 
 ARC_FAULT = "NCF220"
 ZERO_RADIUS = 0.00127

@@ -22,7 +22,7 @@ from ncfix.diagnostics import Message
 from ncfix.program.tree import Program
 
 if TYPE_CHECKING:
-    from ncfix.program.rs274.control import Control
+    from ncfix.program.follow.control import Control
 
 Mask = NDArray[np.bool_]
 
@@ -47,8 +47,6 @@ WORDS = "say which way it is meant to go: ACP, ACN or DC"
 
 def watch(control: Control) -> None:
     """Have motions watched in which an axis might roll over: one that goes a full turn or more, as far as is known."""
-    if control.rules.strict:
-        return
     travel = [(-math.inf, math.inf)] * len(control.machine) if control.kinematics is None else control.kinematics.travel
     wide = np.array([high - low >= 2 * math.pi for low, high in travel])
     rolls: Mask = np.logical_and(wide, control.builder.rotary)

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Rotation, Vector
+from ncfix.program.follow.rollover import Winding, doubtful, extremes, overturned
 from ncfix.program.moves import Frame, Kind, Moves, Rule
-from ncfix.program.rs274.coordinates import INDEX, N_LETTERS, Rotation, Vector
-from ncfix.program.rs274.rollover import Winding, doubtful, extremes, overturned
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

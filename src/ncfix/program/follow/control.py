@@ -1,0 +1,362 @@
+"""The control while it follows a program: modal state, offsets, what is known, and where the axes stand."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
+
+from ncfix.diagnostics import Message, Place
+from ncfix.program.dialect import Dialect
+from ncfix.program.follow import contour
+from ncfix.program.follow.builder import Arc, Builder, Style
+from ncfix.program.follow.coordinates import (
+    DEGREE,
+    IDENTITY,
+    INDEX,
+    LETTERS,
+    ROTARY_LETTERS,
+    Rotation,
+    Vector,
+    Z,
+    dot,
+    product,
+    rotated,
+    transposed,
+    zeros,
+)
+from ncfix.program.follow.knowledge import Knowledge
+from ncfix.program.follow.modal import Modal, Offsets, Tools
+from ncfix.program.follow.places import Places, mask_of
+from ncfix.program.moves import Kind, Kinematics, Rule
+from ncfix.program.recurrence import Budget
+from ncfix.program.setup import Setup
+
+AT_START = "where the axis {} stands when the program starts is not given"
+"""Why a position is not known at first; asked of the setup when it matters."""
+
+UNKNOWN_AXIS = "NCF206"
+
+ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
+"""Why a motion is left as it is, or refused, that moves an axis without naming it."""
+
+SQUARE = 1 - 1e-12
+"""A component of a turned axis that is no less lies along the axis itself."""
+
+Unknown = dict[int, str]
+"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
+
+
+class Control(ABC):
+    """What every control keeps while it follows a program, whatever its language.
+
+    position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
+    unknown    letter index -> why the position is not known
+    shaky      letter index -> why the offset of the letter is not known
+    needs_feed a motion at feed is an error where no feed is set
+    refusal    why every motion from here on is refused; empty while all is well
+    suspended  the same, for as long as a code is in force
+    increments what a number without a decimal point counts, linear and rotary words
+    ends       where the motions of a block end, if somebody wants to know
+    tilted     a tilted plane is in force, in which X Y Z are those of the tip
+    whole      the motions of the block must not be split, as under cutter compensation
+    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
+    beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
+    places     which axes the program itself has brought to where they stand
+    budget     how much may still be executed
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        axes: tuple[str, ...],
+        rotary: frozenset[str],
+        dialect: Dialect,
+        kinematics: Kinematics | None = None,
+    ) -> None:
+        self.setup = setup
+        self.kinematics = kinematics
+        self.dialect = dialect
+        self.machine = tuple(INDEX[axis] for axis in axes)
+        self.rotary = tuple((letter in rotary) if letter in axes else letter in ROTARY_LETTERS for letter in LETTERS)
+        self.builder = Builder(axes, rotary)
+        self.needs_feed = False
+        self.modal = Modal()
+        self.offsets = Offsets()
+        self.knowledge = Knowledge(setup, self.place)
+        self.budget = Budget(setup.most_blocks, setup.most_blocks)
+        self.tools = Tools()
+        self.messages: dict[str, Message] = {}
+        self.foreign: dict[str, Message] = {}
+        self.refusal = ""
+        self.suspended: dict[str, str] = {}
+        self.increments = (1.0, 1.0)
+        self.tilted = False
+        self.whole = self.at_corner = False
+        self.beside = 0
+        self.ends: list[Vector] | None = None
+        self.external = ""
+        self.tcp = setup.tcp
+        self.shaky: Unknown = {}
+        self.row_block = 0
+        self.locate: Callable[[], Place] = lambda: Place("")
+        self.numbers: Sequence[float] = ()
+        self.first = 0
+        self.offset_checked = False
+        self._frame = -1
+        self.places = Places.at_start(setup, axes, LETTERS)
+        self.rotation: Rotation = IDENTITY
+        self.position = zeros()
+        self.unknown: Unknown = {}
+        self._start(axes)
+
+    def _start(self, axes: tuple[str, ...]) -> None:
+        """The start position, as far as it is given."""
+        for axis in axes:
+            index = INDEX[axis]
+            if axis in self.setup.initial:
+                self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)
+            else:
+                self.unknown[index] = AT_START
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        return self.locate()
+
+    def warn(self, code: str, text: str, hint: str = "") -> None:
+        """A remark, once per text."""
+        if text not in self.messages:
+            self.messages[text] = Message(code, text, self.place(), hint)
+
+    def refuse_after(self, name: str) -> None:
+        """A code is not known, and may change coordinates or move: nothing behind it is certain."""
+        if not self.refusal:
+            self.refusal = f"{name} is not known, and may move axes or change coordinates"
+            self.warn("NCF228", self.refusal, "all motions after it are refused")
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Compose the offsets; to be called after any of them, the unit or the diameter mode has changed."""
+        offsets = self.offsets
+        centre = offsets.centre
+        if offsets.rotation is not IDENTITY:
+            turned = rotated(offsets.rotation, centre)
+            parts = zip(offsets.shift, offsets.local, centre, turned, offsets.feature, strict=True)
+            inner = [shift + own + c - t + f for shift, own, c, t, f in parts]
+        else:
+            shifts = zip(offsets.shift, offsets.local, offsets.feature, strict=True)
+            inner = [shift + own + f for shift, own, f in shifts]
+        outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
+        tool = zeros() if self.tcp else offsets.tool
+        self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
+        self.rotation = product(offsets.turn, offsets.rotation)
+        self.is_rotated = self.rotation != IDENTITY
+        self.inverse = transposed(self.rotation)
+        self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]
+        if self.modal.diameter:
+            self.scale[0] /= 2
+        self._frame = -1
+        self.places.watch(self.anchors(), self.rotation)
+
+    @abstractmethod
+    def anchors(self) -> list[Hashable]:
+        """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
+
+    def spatial_anchor(self, index: int) -> Hashable:
+        """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
+        return self.tcp, self.tools.offset if self.tcp or index == Z else None
+
+    @property
+    def frame(self) -> int:
+        """The index of the frame that is in force."""
+        if self._frame < 0:
+            self._frame = self.builder.frame(
+                self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
+            )
+        return self._frame
+
+    def program_position(self) -> Vector:
+        """Where the control stands in the frame of the program, mm and rad."""
+        inner = [p - o for p, o in zip(self.position, self.offset, strict=True)]
+        return rotated(self.inverse, inner) if self.is_rotated else inner
+
+    def in_frame(self, step: Vector) -> Vector:
+        """A difference of commands in the axes of the program's frame, mm and rad."""
+        if not self.is_rotated:
+            return step
+        return [dot(row, step) for row in self.inverse] + step[3:]
+
+    def unit_of(self, index: int) -> float:
+        """mm or rad per program unit of an axis, X not as a diameter."""
+        return DEGREE if self.rotary[index] else self.modal.unit
+
+    # -- what is known ------------------------------------------------------------------------------------------------
+
+    def settle(self, indices: Sequence[int]) -> None:
+        """The start positions of these axes matter: they are given, or lacking and taken as zero."""
+        for index in indices:
+            if self.unknown.get(index) is AT_START:
+                self.knowledge.start_position(LETTERS[index])
+                del self.unknown[index]
+
+    def lose(self, indices: Sequence[int], reason: str) -> None:
+        """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
+        for index in indices:
+            if index in self.machine:
+                self.unknown[index] = reason
+
+    def tool_length(self) -> tuple[int, float]:
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        if self.tools.offset is not None:
+            return self.tools.offset, self.offsets.tool[2]
+        known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
+        return self.tools.spindle, math.nan if known is None else known
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def move(
+        self,
+        kind: Kind,
+        axes: int,
+        target: Vector,
+        unknown: Unknown,
+        code: int,
+        *,
+        refusal: str = "",
+        passing: str = "",
+        arc: Arc | None = None,
+        settles: int | None = None,
+    ) -> None:
+        """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed.
+
+        settles  the axes whose words say where they stand afterwards; those of absolute words if not given
+        """
+        if not passing:
+            self._ask_for_start(kind, unknown)
+        if settles is None:
+            settles = 0 if passing or self.modal.incremental else axes
+        adrift = self._adrift(settles) | self.still_beside(axes)
+        if not passing and settles & axes != (0 if self.modal.incremental else axes):
+            self.builder.counted(axes & ~settles)
+        if not (passing or refusal or unknown) and (why := self._dragged(axes, adrift, target)):
+            refusal, passing = ("", why) if kind in (Kind.RAPID, Kind.FEED) else (why, "")
+        elif passing and kind != Kind.DWELL:
+            self.places.lose(mask_of(i for i in self.machine if axes >> i & 1 or target[i] != self.position[i]))
+        self.places.settle(settles)
+        self.places.lose(mask_of(unknown))
+        self.places.begun = True
+        rule, reason = self._verdict(kind, unknown, refusal, passing)
+        whole, self.whole = self.whole, self.whole or bool(self.beside & axes)
+        style = self._style(kind, rule, reason, code)
+        self.whole, self.beside = whole, self.beside & ~axes
+        if arc is not None:
+            self.builder.arc(arc)
+        if not passing and kind != Kind.DWELL:
+            self.builder.rests(contour.resting(self, axes, target, unknown, straight=arc is None))
+        start, end = self.position, target
+        if self.unknown:
+            start = blanked(start, self.unknown)
+        if unknown:
+            end = blanked(end, unknown)
+        self.builder.add(self.row_block, axes, style, self.modal.feed, start, end, adrift)
+        if self.ends is not None:
+            self.ends.append(target[:])
+        self.position = target
+        self.unknown = unknown
+
+    def _adrift(self, settled: int) -> int:
+        """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""
+        adrift = self.places.adrift & ~settled
+        if adrift and self.is_rotated:
+            turned = self._turned()
+            adrift |= turned if adrift & turned else 0
+        return adrift
+
+    def still_beside(self, axes: int) -> int:
+        """Axes of the plane that get no word in a motion across it, see `contour`."""
+        plane = contour.plane_of(self) if self.modal.compensated else 0
+        return 0 if axes & plane else plane
+
+    def end_compensation(self) -> None:
+        """Where the axes of the plane stand after the contour the control knows, until they are named."""
+        if self.modal.compensated:
+            self.beside = mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
+            self.places.lose(self.beside)
+        self.modal.compensated = 0
+
+    def _turned(self) -> int:
+        """Axes that are moved by words of others, since the frame is turned."""
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
+
+    def _dragged(self, axes: int, adrift: int, target: Vector) -> str:
+        """Why the motion cannot be corrected: it moves an axis that has no word and must get none; empty if it can."""
+        moved = mask_of(i for i in self.machine if target[i] != self.position[i])
+        if self.is_rotated and axes & self._turned():
+            moved |= self._turned()
+        index = next((i for i in self.machine if (adrift & moved & ~axes & self.places.adrift) >> i & 1), None)
+        return "" if index is None else ADRIFT.format(LETTERS[index])
+
+    def _ask_for_start(self, kind: Kind, unknown: Unknown) -> None:
+        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
+        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
+            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
+            self.settle(everywhere)
+            for index in [index for index, why in unknown.items() if why is AT_START]:
+                del unknown[index]
+
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
+        """What may be done to the motion, and why."""
+        if passing:
+            return Rule.PASS, passing
+        reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
+        if not reason and unknown:
+            reason = first_reason(unknown)
+        if not reason and kind != Kind.RAPID and self.unknown:
+            reason = first_reason(self.unknown)
+        if not reason and self.external:
+            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
+        return (Rule.REFUSE, reason) if reason else (Rule.CORRECT, "")
+
+    def style_of(self, kind: Kind, code: int) -> int:
+        """The style of motions whose start and end are known and that have no reason of their own."""
+        rule, reason = self._verdict(kind, {}, "", "")
+        return self._style(kind, rule, reason, code)
+
+    def note_foreign(self, letter: str) -> None:
+        """The program moves an axis that the machine lacks."""
+        names = " ".join(self.builder.axes)
+        text = f"the program moves the axis {letter}, and the machine has only {names}"
+        self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), "is it the right machine file?")
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
+        modal = self.modal
+        tool, length = self.tool_length()
+        return self.builder.style(
+            Style(
+                kind,
+                rule,
+                self.builder.reason(reason),
+                self.frame,
+                modal.incremental,
+                modal.arc_absolute,
+                self.tcp,
+                modal.compensated != 0 or self.whole,
+                tool,
+                length,
+                modal.feed_mode,
+                code,
+                self.tilted,
+            )
+        )
+
+
+def blanked(position: Vector, unknown: Unknown) -> Vector:
+    """A position with NaN where it is not known."""
+    return [math.nan if index in unknown else value for index, value in enumerate(position)]
+
+
+def first_reason(unknown: Unknown) -> str:
+    """The reason for the first axis whose position is not known."""
+    index = min(unknown)
+    return unknown[index].format(LETTERS[index])
