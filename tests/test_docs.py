@@ -20,6 +20,7 @@ DOCUMENTS = (
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
+    "docs/architecture.md",
     "docs/plugins.md",
     "docs/formats.md",
     "docs/conventions.md",
@@ -137,3 +138,17 @@ def test_the_setup_file_of_the_document_is_one(root: Path) -> None:
     assert set(setup.work_offsets) == {"G54", "G55", "G59.1"}
     assert setup.tools[12].radius == 5.0
     assert set(setup.variables) == {"#100", "#<_probe_offset>"}
+
+
+def test_the_floors_and_modules_of_the_documents_are_there(root: Path) -> None:
+    """The table of floors has every floor in the order of the contract; every module that is named exists."""
+    contributing = (root / "CONTRIBUTING.md").read_text()
+    layers = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][0]["layers"]
+    floors = [name for layer in layers for name in re.findall(r"ncfix\.(\w+)", layer)]
+    packages = [name for name in floors if (root / "src/ncfix" / name).is_dir()]
+    assert re.findall(r"^\| `src/ncfix/(\w+)`", contributing, re.MULTILINE) == packages
+    assert set(packages) == {path.parent.name for path in root.glob("src/ncfix/*/__init__.py")}
+    named = re.findall(r"`([\w/]+\.py)`", (root / "docs/architecture.md").read_text())
+    there = {str(path.relative_to(root)) for path in root.glob("src/ncfix/**/*.py")}
+    assert len(named) > 20
+    assert not [name for name in named if not any(path.endswith("/" + name) for path in there)]
