@@ -79,7 +79,7 @@ class LinuxCnc(Control):
         joints = _joints(tables, letters)
         files = {joint.file: comp_text(joint, int(kind)) for joint in joints}
         files["comp.ini"] = ini_text(joints, letters, int(kind))
-        return Written(files, _notes(request), of_own_axis(request.machine, request.space, request.tool_length))
+        return Written(files, _notes(), of_own_axis(request.machine, request.space, request.tool_length))
 
     def read(self, files: Files) -> Compensation:
         """As LinuxCNC loads them. Raises `ConfigError` NCF491."""
@@ -114,12 +114,8 @@ def _coordinates(request: Request, given: str) -> str:
     return letters
 
 
-def _notes(request: Request) -> tuple[str, ...]:
-    notes = [
+def _notes() -> tuple[str, ...]:
+    return (
         "Straightness, squareness, angles and where the rotary axes lie cannot be said in one-axis tables: that part "
-        "of the error is left. ncfix fix corrects it in the program."
-    ]
-    for axis in request.machine.axes:
-        if axis.endless:
-            notes.append(f"{axis.name} is endless: its table covers one turn, beyond it the end value is held.")
-    return tuple(notes)
+        "of the error is left. ncfix fix corrects it in the program.",
+    )

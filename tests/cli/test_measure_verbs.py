@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from measure.poses import machine, plan
@@ -128,6 +129,57 @@ def test_the_sigma_over_the_travels_says_if_anything_is_held(ncfix, root, tmp_pa
     for effects, held in (("EC0Y", False), ("EC0Y,EX0B", True)):
         done = ncfix("calibrate", data, "-m", path, "-o", tmp_path / "m.toml", "--effects", effects, "--force")
         assert ("um rms; what is held counts as known" in done.err) is held
+
+
+def scattered(tmp_path, size_mm, noise_um):
+    """Readings of EXX that are nothing but scatter."""
+    values = np.random.default_rng(1).normal(0.0, size_mm, 25)
+    head = f"# ncfix-measurement: 1\n# kind: axis\n# noise_um: {noise_um}\naxis,component,position,value\n"
+    path = tmp_path / "scatter.csv"
+    path.write_text(head + "".join(f"X,EXX,{16 * k},{value:.6f}\n" for k, value in enumerate(values)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("size_mm", "noise_um", "said"), [(35.0, 0.5, "times the noise"), (0.8, 5.0, "beyond max_correction, 500 um")]
+)
+def test_a_machine_that_does_not_describe_its_measurements_is_not_written(
+    ncfix, root, tmp_path, size_mm, noise_um, said
+):
+    machine, target = root / "examples" / "machines" / "three_axis.toml", tmp_path / "m.toml"
+    options = ("-m", machine, "--effects", "EXX", "-o", target)
+    refused = ncfix("calibrate", scattered(tmp_path, size_mm, noise_um), *options)
+    assert refused.code == 4
+    assert "scatter.csv:" in refused.err
+    assert "NCF642" in refused.err
+    assert said in refused.err
+    assert not target.exists()
+    assert ncfix("calibrate", tmp_path / "scatter.csv", *options, "--allow-misfit").code == 0
+    assert load(str(target)).effects
+
+
+def test_a_missing_effect_of_tens_of_the_noise_is_written_with_a_warning(ncfix, root, tmp_path):
+    machine = root / "examples" / "machines" / "three_axis.toml"
+    done = ncfix(
+        "calibrate", scattered(tmp_path, 0.02, 0.5), "-m", machine, "--effects", "EXX", "-o", tmp_path / "m.toml"
+    )
+    assert done.code == 0
+    assert "NCF634" in done.err
+
+
+def test_readings_that_lead_nowhere_are_remarked_with_the_failure(ncfix, measured, tmp_path):
+    """Micrometres instead of millimetres: the iteration fails, and what looks odd in the file is said all the same."""
+    machine, _, data = measured
+    rows = data.read_text().splitlines()
+    start = next(index for index, row in enumerate(rows) if row.startswith("set,"))
+    rows[start + 1 :] = [
+        ",".join([*cells[:-3], *(f"{1000 * float(value)}" for value in cells[-3:])])
+        for cells in (row.split(",") for row in rows[start + 1 :])
+    ]
+    (tmp_path / "um.csv").write_text("\n".join(rows) + "\n")
+    done = ncfix("calibrate", tmp_path / "um.csv", "-m", machine, "-o", tmp_path / "m.toml")
+    assert done.code in (2, 4)
+    assert "NCF616" in done.err
 
 
 def test_knots_and_time_constants_are_options(ncfix, measured, tmp_path):

@@ -160,6 +160,26 @@ def test_odd_but_possible_is_remarked():
     assert not remarks(degrees, FIVE)
 
 
+def test_radians_at_no_round_degree_are_told_by_how_far_they_go():
+    random = np.random.default_rng(4)
+
+    def rows(low: float, high: float) -> str:
+        return HEAD + "C,dx\n" + "".join(f"{each:.4f},0.001\n" for each in random.uniform(low, high, 12))
+
+    assert remarks(rows(-3.1, 3.1), FIVE) == {"NCF614"}
+    assert not remarks(rows(-0.9, 0.9), FIVE)
+    assert not remarks(rows(-170.0, 170.0), FIVE)
+
+
+def test_direct_readings_in_radians_or_micrometres_are_remarked():
+    head = "# ncfix-measurement: 1\n# kind: axis\naxis,component,position,value\n"
+    turns = "".join(f"C,ECC,{np.deg2rad(30 * k):.6f},{4 * k}e-6\n" for k in range(12))
+    assert remarks(head + turns, FIVE) == {"NCF614"}
+    assert remarks(head + turns.replace("e-6", ""), FIVE) == {"NCF614", "NCF616"}
+    assert remarks(head + "X,EXX,0,3.1\nX,EXX,50,4.2\nX,EYX,0,0.001\n", FIVE) == {"NCF616"}
+    assert remarks(head + "X,EXX,0,0.0031\nX,EXX,5000,0.0042\n", FIVE) == {"NCF615"}
+
+
 def test_repeats_are_no_surprise():
     text = HEAD + "repeat,X,dx\n1,10,0.001\n2,10,0.001\n"
     assert not remarks(text)

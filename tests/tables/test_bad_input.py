@@ -186,6 +186,24 @@ def test_a_sign_that_is_asked_for_comes_with_the_way_to_find_it_out() -> None:
         assert "on the machine: " in caught.value.messages[0].hint, control
 
 
+ENDLESS = {"fanuc-rotary": {"sign": "error"}, **{name: SETTINGS.get(name, {}) for name in ("isg", "linuxcnc")}}
+
+
+@pytest.mark.parametrize("control", [*ENDLESS, "heidenhain", "heidenhain-kinematics"])
+def test_tables_of_an_endless_axis_say_from_where_it_is_counted(control: str) -> None:
+    """On a control that counts to 360 degree the value at 180 would be held for half of the turn."""
+    turning = loads(TABLE).replace(effects=(Effect("ECC", (0.0, 4e-5), Fourier((1,))),))
+    notes = " ".join(exported(control, turning, **ENDLESS.get(control, {})).notes)
+    assert "C turns without end and these tables do not repeat" in notes
+    assert "from -180 to 180 degree" in notes
+
+
+@pytest.mark.parametrize("control", ["siemens", "gcode"])
+def test_what_repeats_after_a_turn_says_nothing(control: str) -> None:
+    turning = loads(TABLE).replace(effects=(Effect("ECC", (0.0, 4e-5), Fourier((1,))),))
+    assert "without end" not in " ".join(exported(control, turning).notes)
+
+
 def test_a_perfect_machine_gets_tables_that_do_nothing() -> None:
     for control in ("fanuc", "heidenhain", "heidenhain-kinematics", "isg", "linuxcnc", "gcode"):
         made = exported(control, single_error("EXX").replace(effects=()))

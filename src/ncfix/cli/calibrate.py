@@ -9,7 +9,7 @@ import click
 from ncfix.cli import console
 from ncfix.cli.options import FiniteRange, force_option, json_option, load_machine, machine_option
 from ncfix.cli.targets import STREAM, Outputs, each_once, read, shown, targets
-from ncfix.diagnostics import ExitCode
+from ncfix.diagnostics import ExitCode, RefusedError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,6 +46,7 @@ LOSSES = ("auto", "none", "huber", "tukey")
     help="New error motions of linear axes are parabolas that join at N knots, not cubics; see --prune.",
 )
 @click.option("--time-constants", is_flag=True, help="Estimate the time constants of effects that lag, too.")
+@click.option("--allow-misfit", is_flag=True, help="Write the machine even if it does not describe the measurements.")
 @force_option
 @json_option
 def calibrate(
@@ -57,15 +58,18 @@ def calibrate(
     prune: float | None,
     knots: int,
     time_constants: bool,
+    allow_misfit: bool,
     force: bool,
     as_json: bool,
 ) -> int:
     """Estimate the errors of a machine from measurements and write the machine with them.
 
-    Without --effects those of the machine file are estimated; of a machine without effects, all that can be.
+    Without --effects those of the machine file are estimated; of a machine without effects, all that can be. Exit
+    code 4: the result does not describe the measurements, and nothing was written.
     """
     from ncfix.machine import dumps
     from ncfix.measure.calibrate import calibrate as calibrated
+    from ncfix.measure.misfit import misfit
     from ncfix.measure.prediction import guesses, over_the_travels
     from ncfix.measure.reader import reads
 
@@ -78,6 +82,8 @@ def calibrate(
     over = over_the_travels(found)
     remarks = (*found.remarks, *guesses(found, over))
     console.tell(*remarks)
+    if not allow_misfit and (message := misfit(found)) is not None:
+        raise RefusedError((message,))
     target.write(dumps(found.machine).encode())
     if as_json:
         said = [message.as_dict() for message in remarks]

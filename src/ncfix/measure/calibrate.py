@@ -26,6 +26,8 @@ from ncfix.measure.solve import Solution, solve
 STEPS = 25
 CONVERGED = 1e-5
 """Change of the predictions, in units of the noise, that is none."""
+FAR = 1e6
+"""The same: from here on it is no iteration any more."""
 UNLIKELY = 0.01
 ROUNDING = 1e-9
 """mm of reading per mm or rad of error: a column that is nowhere larger is made of rounding errors."""
@@ -190,7 +192,10 @@ def calibrate(
         late = lags.found(measurements, machine, selection)
         selection, remarks = late.selection, late.remarks
     problem = Problem.of(measurements, machine, selection)
-    estimate = settle(problem, loss)
+    try:
+        estimate = settle(problem, loss)
+    except UsageError as error:
+        raise UsageError((*error.messages, *(each for data in measurements for each in data.remarks))) from error
     if prune is not None:
         problem, estimate = pruning.pruned(problem, estimate, prune, loss)
     found = results.result(problem, estimate, loss)
@@ -247,7 +252,9 @@ def _iterate(problem: Problem, weight: Array, loss: str) -> Estimate:
             return Estimate(coefficients, unknowns, solution, problem.residual(coefficients, unknowns), weight)
     if loss in (weights.HUBER, weights.TUKEY) and np.abs(change).max() < 0.1:
         return Estimate(coefficients, unknowns, solution, problem.residual(coefficients, unknowns), weight)
-    text = f"after {STEPS} steps the predictions still change by {np.abs(change).max():.3g} times the noise"
+    size = float(np.abs(change).max())
+    still = f"still change by {size:.3g} times the noise" if size < FAR else "run away"
+    text = f"after {STEPS} steps the predictions {still}"
     raise UsageError.of("NCF637", text, hint="are the measurements of this machine, in mm and degree?")
 
 

@@ -11,11 +11,13 @@ from ncfix.diagnostics import ConfigError, Message
 from ncfix.machine import Machine
 from ncfix.machine.effect import COMPONENTS, NAME
 from ncfix.measure.kinds import ENDS
-from ncfix.measure.measurement import Array, Measurement, groups
+from ncfix.measure.measurement import Array, Index, Measurement, groups
 
 LARGE_MM, LARGE_RAD = 2.0, 0.02
 """Errors of which half the rows exceed this are in another unit."""
 ROUND_DEG = 1e-6
+FAR = 0.4
+"""Of the travel: positions in radians that go so far are no corner of it in degrees."""
 BEYOND = 1e-6
 """How far outside its range a position may be, for numbers that were rounded: mm, rad."""
 
@@ -140,44 +142,70 @@ def _repeated(measurement: Measurement, pairs: Sequence[tuple[int, int]], what: 
 
 def _radians(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     for axis in machine.axes:
-        if axis.rotary and axis.name in measurement.columns:
-            values = measurement.columns[axis.name]
-            travel = (axis.range[1] - axis.range[0]) / axis.unit
-            if travel > 45 and _looks_like_radians(values):
-                spread = f"{values.min():g} ... {values.max():g}"
-                text = f"the positions of {axis.name}, {spread}, look like radians: degrees are asked for"
-                yield Message("NCF614", text, measurement.place(int(np.abs(values).argmax())))
+        rows = _rows_of(measurement, axis.name)
+        values = _positions(measurement, axis.name)[rows]
+        low, high = (limit / axis.unit for limit in axis.range)
+        if axis.rotary and high - low > 45 and _looks_like_radians(values, low, high):
+            spread = f"{values.min():g} ... {values.max():g}"
+            text = f"the positions of {axis.name}, {spread}, look like radians: degrees are asked for"
+            yield Message("NCF614", text, measurement.place(int(rows[np.abs(values).argmax()])))
 
 
-def _looks_like_radians(values: Array) -> bool:
+def _positions(measurement: Measurement, axis: str) -> Array:
+    """Of an axis, or of whichever is measured directly in a row."""
+    return measurement.column("position" if measurement.kind == "axis" else axis)
+
+
+def _rows_of(measurement: Measurement, axis: str) -> Index:
+    """Where a position of this axis is given."""
+    if measurement.kind == "axis":
+        return np.flatnonzero(np.array(measurement.labels["axis"]) == axis)
+    return np.arange(len(measurement) if axis in measurement.columns else 0)
+
+
+def _looks_like_radians(values: Array, low: float, high: float) -> bool:
+    """Whether these positions, most of them uneven, are round degrees once they are turned into degrees, or go as far
+    as the axis does: in degrees they would be a small corner of a travel of low ... high."""
     moved = np.unique(values[np.abs(values) > ROUND_DEG])
     if len(moved) < 3 or np.abs(moved).max() > 2 * np.pi + ROUND_DEG or np.abs(moved).max() < 0.1:
         return False
     uneven = np.abs(moved - np.round(moved, 1)) > ROUND_DEG
-    even_in_degrees = np.abs(np.rad2deg(moved) - np.round(np.rad2deg(moved))) < 0.05
-    return bool(uneven.mean() > 0.5 and even_in_degrees.mean() > 0.5)
+    degrees = np.rad2deg(moved)
+    even_in_degrees = np.abs(degrees - np.round(degrees)) < 0.05
+    far = np.ptp(degrees) > FAR * min(high - low, 360.0) and degrees.min() > low - 1 and degrees.max() < high + 1
+    return bool(uneven.mean() > 0.5 and (even_in_degrees.mean() > 0.5 or far))
 
 
 def _ranges(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     for axis in machine.axes:
-        if axis.name not in measurement.columns:
-            continue
-        values = measurement.columns[axis.name] * axis.unit
+        rows = _rows_of(measurement, axis.name)
+        values = _positions(measurement, axis.name)[rows] * axis.unit
         outside = np.flatnonzero((values < axis.range[0] - BEYOND) | (values > axis.range[1] + BEYOND))
         if outside.size:
             low, high = (limit / axis.unit for limit in axis.range)
-            found = measurement.columns[axis.name][outside[0]]
+            found = values[outside[0]] / axis.unit
             text = f"{axis.name} = {found:g} is outside its range {low:g} ... {high:g}, {outside.size} rows are"
-            yield Message("NCF615", text, measurement.place(int(outside[0])), "are columns swapped?")
+            yield Message("NCF615", text, measurement.place(int(rows[outside[0]])), "are columns swapped?")
 
 
 def _micrometres(measurement: Measurement) -> Iterator[Message]:
-    if measurement.kind not in ("tcp", "tcp6"):
-        return
-    for names, limit, unit in (("dx", "dy", "dz"), LARGE_MM, "mm"), (("rx", "ry", "rz"), LARGE_RAD, "rad"):
-        for name in (each for each in names if each in measurement.columns):
-            size = float(np.median(np.abs(measurement.columns[name])))
-            if size > limit:
-                text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
-                hint = "divide by 1000?" if unit == "mm" else "are they in degrees, or in mrad?"
-                yield Message("NCF616", text, measurement.place(0), hint)
+    for name, rows, values in _errors(measurement):
+        turns = name[0] == "r" or name[1] in "ABC"
+        limit, unit = (LARGE_RAD, "rad") if turns else (LARGE_MM, "mm")
+        size = float(np.median(np.abs(values[rows])))
+        if size > limit:
+            text = f"{name} is {size:g} {unit} in the median: errors are given in {unit}"
+            hint = "are they in degrees, in seconds of arc, or in mrad?" if turns else "divide by 1000?"
+            yield Message("NCF616", text, measurement.place(int(rows[0])), hint)
+
+
+def _errors(measurement: Measurement) -> Iterator[tuple[str, Index, Array]]:
+    """What was measured as an error: its name, in which rows, and the whole column."""
+    if measurement.kind in ("tcp", "tcp6"):
+        for name in measurement.measured:
+            yield name, np.arange(len(measurement)), measurement.columns[name]
+    if measurement.kind == "axis" and "value" in measurement.columns:
+        pairs = zip(measurement.labels["axis"], measurement.labels["component"], strict=True)
+        names = np.array([component_of(axis, component) or "" for axis, component in pairs])
+        for name in dict.fromkeys(names.tolist()):
+            yield name, np.flatnonzero(names == name), measurement.columns["value"]

@@ -88,7 +88,8 @@ def _size(found: Residuals, index: int) -> str:
 def _noise(problem: Problem, chi_square: float, freedom: int) -> Iterator[Message]:
     if problem.noise_known and chdtrc(freedom, chi_square * freedom) < UNLIKELY:
         factor = np.sqrt(chi_square)
-        text = f"the residuals are {factor:.2f} times the noise: an effect is missing, or the noise is larger"
+        times = f"{factor:.2f}" if factor < 100 else f"{factor:.0f}"
+        text = f"the residuals are {times} times the noise: an effect is missing, or the noise is larger"
         yield Message("NCF634", text, hint="`ncfix diagnose` looks for what is missing")
 
 

@@ -16,7 +16,7 @@ from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.grid import Array
 from ncfix.tables.manifest import Manifest
 from ncfix.tables.neutral import Tables
-from ncfix.tables.poses import ranges_of
+from ncfix.tables.poses import random_poses, ranges_of
 from ncfix.tables.residual import POSES, Residual, residual
 from ncfix.tables.sheet import as_html, as_markdown
 
@@ -25,6 +25,11 @@ CLOSE = 1e-9
 """mm, rad: ends nearer to each other than that are the same."""
 WORTH = 0.95
 """Share of the error (rms) from which on what is left is as good as all of it."""
+TURN = 2 * np.pi
+TURNED = 64
+"""Poses at which an endless axis is turned once more."""
+LEVER = 100.0
+"""mm: at which an angle counts as a length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +71,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     messages = control.lint(written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
-    written = replace(written, notes=(*written.notes, *_remarks(control, request, left, written)))
+    written = replace(written, notes=(*written.notes, *_remarks(control, request, tables, left, written)))
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
     said = {"ncfix": __version__, **control.described(), "residual_um": left.figures(), "notes": written.notes}
@@ -109,7 +114,7 @@ def emulate(
     return Exported(native, files, tables, left, (), messages)
 
 
-def _remarks(control: Control, request: Request, left: Residual, written: Written) -> Iterator[str]:
+def _remarks(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> Iterator[str]:
     """What holds for tables of any control: whether they do anything, how little they could leave, for which tool."""
     if written.least and written.least.value > request.target / 10:
         yield written.least.sentence
@@ -118,6 +123,10 @@ def _remarks(control: Control, request: Request, left: Residual, written: Writte
         yield "These tables take off next to nothing: the format does not reach the errors of this machine."
     for covered in _covered(request):
         yield f"They cover {covered}: beyond that {control.properties.extrapolation}, and more is left."
+    for name, covered in _wrong_turn(request, tables):
+        text = f"{name} turns without end and these tables do not repeat: they hold while the control counts it from "
+        text += f"{covered}; elsewhere {control.properties.extrapolation}"
+        yield f"{text}. --range {name}=LOW,HIGH makes them for other counts."
     if not control.any_tool and not request.tool_length and request.machine.depends_on_tool_length:
         yield "They are for a tool of no length: --tool-length was not given, and the error depends on it."
 
@@ -129,6 +138,22 @@ def _covered(request: Request) -> Iterator[str]:
         if np.isfinite(travel).all() and (low > travel[0] + CLOSE or high < travel[1] - CLOSE):
             sizes = [f"{value / axis.unit:g}" for value in (low, high, *travel)]
             yield f"{axis.name} from {sizes[0]} to {sizes[1]}, of a travel from {sizes[2]} to {sizes[3]}"
+
+
+def _wrong_turn(request: Request, tables: Tables) -> Iterator[tuple[str, str]]:
+    """Endless axes of which the tables hold something else a turn further on, and where they count from."""
+    names = request.machine.axis_names
+    q = random_poses(request.space, TURNED)
+    run = tables.for_tool(request.tool_length)
+    weight = np.where(request.machine.rotary, LEVER, 1.0)
+    for index, axis in enumerate(request.machine.axes):
+        if axis.endless:
+            turned = q.copy()
+            turned[:, index] += TURN
+            change = weight * (run.at(names, turned) - run.at(names, q))
+            if np.abs(change).max() > request.target / 10:
+                low, high = (float(value) / axis.unit for value in request.space[index])
+                yield axis.name, f"{low:g} to {high:g} degree"
 
 
 def _internal(machine: Machine, ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
