@@ -141,7 +141,7 @@ def scattered(tmp_path, size_mm, noise_um):
 
 
 @pytest.mark.parametrize(
-    ("size_mm", "noise_um", "said"), [(35.0, 0.5, "times the noise"), (0.8, 5.0, "beyond max_correction, 500 um")]
+    ("size_mm", "noise_um", "said"), [(35.0, 0.5, "times the noise"), (0.8, 5.0, "beyond max_correction, 200 um")]
 )
 def test_a_machine_that_does_not_describe_its_measurements_is_not_written(
     ncfix, root, tmp_path, size_mm, noise_um, said
@@ -156,6 +156,13 @@ def test_a_machine_that_does_not_describe_its_measurements_is_not_written(
     assert not target.exists()
     assert ncfix("calibrate", tmp_path / "scatter.csv", *options, "--allow-misfit").code == 0
     assert load(str(target)).effects
+
+
+def test_what_is_small_is_written_however_small_the_stated_noise(ncfix, root, tmp_path):
+    machine, data = root / "examples" / "machines" / "three_axis.toml", scattered(tmp_path, 0.02, 0.001)
+    done = ncfix("calibrate", data, "-m", machine, "--effects", "EXX", "-o", tmp_path / "m.toml")
+    assert done.code == 0
+    assert "NCF634" in done.err
 
 
 def test_a_missing_effect_of_tens_of_the_noise_is_written_with_a_warning(ncfix, root, tmp_path):

@@ -147,9 +147,9 @@ CODES = {
     ),
     "NCF642": Code(
         "a calibration that does not describe the measurements",
-        "What the calibrated model leaves is a thousand times the noise, or more than the machine file allows to be "
-        "corrected (`max_correction`). No missing effect is that large: a unit, a sign or a column is wrong, the file "
-        "is of another machine, or the noise in its head is. No machine file is written.",
+        "What the calibrated model leaves is more than 100 um and a thousand times the noise, or more than the machine "
+        "file allows to be corrected (`max_correction`). No missing effect is that large: a unit, a sign or a column "
+        "is wrong, the file is of another machine, or the noise in its head is. No machine file is written.",
         "Look at the row that is named, and at what else is remarked. `ncfix diagnose` tests for such mistakes; "
         "`--allow-misfit` writes the machine file all the same.",
     ),

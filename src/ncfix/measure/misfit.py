@@ -10,6 +10,8 @@ from ncfix.measure.residuals import place, residuals
 
 BEYOND = 1000.0
 """Times the noise: missing effects leave some tens of it; this is a wrong unit, a wrong file or a wrong noise."""
+MUCH_UM = 100.0
+"""What is less may be an effect that is missing, however small the noise is that the file states."""
 UM = 1e3
 HINT = (
     "look at that row, at units (mm, rad, degree), signs and columns, and whether it is this machine; noise_um is in um"
@@ -17,15 +19,16 @@ HINT = (
 
 
 def misfit(found: Calibration) -> Message | None:
-    """NCF642 if the residuals are more than `BEYOND` times the noise, or more than the machine may be corrected by."""
+    """NCF642 if the residuals are more than the machine may be corrected by, or many and `BEYOND` times the noise."""
     factor = float(np.sqrt(found.chi_square)) if found.problem.noise_known else 0.0
     most_um = UM * float(found.machine.max_correction[0])
-    if factor <= BEYOND and found.after_um <= most_um:
+    beyond = factor > BEYOND and found.after_um > MUCH_UM
+    if not beyond and found.after_um <= most_um:
         return None
     times = f", {factor:.0f} times the noise" if factor > 1 else ""
     rms = f" ({found.after_um:.4g} um rms of {found.before_um:.4g} um before)"
     text = f"the calibrated model does not describe these measurements: what it leaves{rms} is "
-    text += f"{factor:.0f} times the noise" if factor > BEYOND else f"beyond max_correction, {most_um:g} um{times}"
+    text += f"{factor:.0f} times the noise" if beyond else f"beyond max_correction, {most_um:g} um{times}"
     rest = residuals(found.problem, found.estimate)
     worst = int(np.argmax(np.abs(found.estimate.residual / found.problem.sigma) * (found.estimate.weight > 0)))
     return Message("NCF642", f"{text}; most in {rest.component[worst]}", place(found.problem, rest, worst), HINT)
