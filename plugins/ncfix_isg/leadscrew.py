@@ -2,7 +2,9 @@
 
 What VOLCOMP holds does not know the way an axis moves. The leadscrew compensation of the control does, if it is
 bilateral: TF5200 documentation, whose own example says that values are actual position less setpoint, that is errors,
-in tenths of a micrometre, with straight lines between them. It changes the setpoint, and so does VOLCOMP.
+in tenths of a micrometre, with straight lines between them and the end values beyond. It changes the setpoint, and so
+does VOLCOMP. Positions are listed one by one, or `interval` apart from `kw_startpos` on; a list that is not bilateral
+has the values `pos` for both ways.
 """
 
 from __future__ import annotations
@@ -26,11 +28,13 @@ MOST = 1500
 MARK = b"kw.ssfk"
 """What tells these lists from that of VOLCOMP."""
 NAME = "leadscrew_{}.lis"
-HEAD = {"interval": "0", "unit": "1", "bilateral": "1"}
+HEAD = {"unit": ("", ("1",)), "bilateral": ("0", ("0", "1")), "modulo": ("0", ("0",))}
+"""Entry -> its default, and what can be read. No text says which unit is meant if none is given."""
 LARGE = 10_000
 """1 mm: no machine has so much."""
 POINT = re.compile(r"kw\.ssfk\.table\[(\d{1,6})\]\.(setpoint|pos|neg)")
 NOTE = re.compile(r"/\*.*?\*/|#.*")
+LETTER = re.compile(r"[A-Za-z](?:[ _-].*)?")
 WHOLE = re.compile(r"[-+]?\d{1,12}")
 
 
@@ -70,15 +74,18 @@ def bare(row: str) -> str:
 def _terms(remarks: Remarks, numbers: Mapping[str, str]) -> Iterator[Term]:
     entries = _entries(remarks)
     axis = _axis(remarks, entries, numbers)
-    for name, value in HEAD.items():
-        line, found = entries.get(f"kw.ssfk.{name}", (0, ""))
-        if found != value:
-            remarks.refuse(line, f"kw.ssfk.{name} is {found or 'missing'}", f"ncfix writes and reads {value}")
-    points = _points(remarks, entries)
+    for name, (default, allowed) in HEAD.items():
+        line, found = entries.get(f"kw.ssfk.{name}", (0, default))
+        if found not in allowed:
+            remarks.refuse(line, f"kw.ssfk.{name} is {found or 'missing'}", f"ncfix reads {' or '.join(allowed)}")
+    both = entries.get("kw.ssfk.bilateral", (0, "0"))[1] == "1"
+    points = _points(remarks, entries, ("pos", "neg") if both else ("pos",))
     if remarks.wrong:
         return
+    if not both and any(point.get("neg", point["pos"]) != point["pos"] for point in points):
+        remarks.doubt(0, "values neg that are never used, since kw.ssfk.bilateral is not 1")
     nodes = np.array([point["setpoint"] for point in points], dtype=np.float64) * UNIT
-    for key, way in (("pos", 1), ("neg", -1)):
+    for key, way in (("pos", 1), ("neg" if both else "pos", -1)):
         values = np.array([-point[key] for point in points], dtype=np.float64) * UNIT
         yield Term((Grid((axis,), (nodes,), (axis,), values[:, None]),), (axis, way))
 
@@ -97,16 +104,36 @@ def _entries(remarks: Remarks) -> dict[str, tuple[int, str]]:
 
 
 def _axis(remarks: Remarks, entries: Mapping[str, tuple[int, str]], numbers: Mapping[str, str]) -> str:
-    line, axis = entries.get("kopf.log_achs_name", (0, ""))
+    """The letter of the axis: the name may say more than that, `Y-ACHSE`, and the number decides."""
+    line, name = entries.get("kopf.log_achs_name", (0, ""))
+    axis = name[:1].upper() if LETTER.fullmatch(name) else ""
     if axis not in numbers or axis not in "XYZ":
-        remarks.refuse(line, f"kopf.log_achs_name is {axis or 'missing'}", "a linear axis of the configuration list")
-    line, number = entries.get("kopf.achs_nr", (0, ""))
+        remarks.refuse(line, f"kopf.log_achs_name is {name or 'missing'}", "a linear axis of the configuration list")
+    line, number = entries.get("kopf.achs_nr", entries.get("kopf.log_achs_nr", (0, "")))
     if axis in numbers and number != numbers[axis]:
         remarks.refuse(line, f"kopf.achs_nr is {number or 'missing'}, and the configuration says {numbers[axis]}")
     return axis
 
 
-def _points(remarks: Remarks, entries: Mapping[str, tuple[int, str]]) -> list[dict[str, int]]:
+def _even(remarks: Remarks, entries: Mapping[str, tuple[int, str]], points: dict[int, dict[str, int]]) -> None:
+    """Give points that are an interval apart their positions."""
+    line, interval = entries.get("kw.ssfk.interval", (0, "0"))
+    start_line, start = entries.get("kw.ssfk.kw_startpos", (0, "0"))
+    if not interval.isdecimal():
+        remarks.refuse(line, f"kw.ssfk.interval is {interval}", "a whole number of tenths of a micrometre, or 0")
+    elif not WHOLE.fullmatch(start):
+        remarks.refuse(start_line, f"kw.ssfk.kw_startpos is {start}", "a whole number of tenths of a micrometre")
+    elif int(interval):
+        for index, point in points.items():
+            place = int(start) + index * int(interval)
+            if point.setdefault("setpoint", place) != place:
+                text = f"point {index} is at {point['setpoint']}, and by start and interval at {place}"
+                remarks.refuse(line, text, "interval 0, or no setpoints")
+                return
+
+
+def _points(remarks: Remarks, entries: Mapping[str, tuple[int, str]], ways: tuple[str, ...]) -> list[dict[str, int]]:
+    """The points in their order; ways: the values that each must have."""
     points: dict[int, dict[str, int]] = {}
     for name, (line, value) in entries.items():
         match = POINT.fullmatch(name)
@@ -125,9 +152,10 @@ def _points(remarks: Remarks, entries: Mapping[str, tuple[int, str]]) -> list[di
         )
     if not 2 <= len(points) <= MOST:
         remarks.refuse(0, f"{len(points)} points; 2 to {MOST} are possible")
+    _even(remarks, entries, points)
     ordered = [points[index] for index in sorted(points)]
-    if any(len(point) != 3 for point in ordered):
-        remarks.refuse(0, "a point without setpoint, pos and neg")
+    if any(not {"setpoint", *ways} <= point.keys() for point in ordered):
+        remarks.refuse(0, f"a point without setpoint, {' and '.join(ways)}")
         return []
     if any(after["setpoint"] <= before["setpoint"] for before, after in pairwise(ordered)):
         remarks.refuse(0, "the setpoints must ascend")

@@ -177,3 +177,70 @@ def test_wrong_settings() -> None:
         with pytest.raises(UsageError) as caught:
             CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, CONTROL.settings(wrong)))
         assert caught.value.code == "NCF485"
+
+
+# -- leadscrew compensation, as control engineers write it -------------------------------------------------------------
+
+
+def leadscrew(*lines: str) -> dict[str, bytes]:
+    """Lines of an axis list of Y beside the two grids."""
+    head = ("kopf.achs_nr 2", "kopf.log_achs_name Y-ACHSE", "kw.ssfk.unit 1")
+    text = "\n".join((*head, *(f"kw.ssfk.{line}" for line in lines)))
+    return {**files(b"X EXX\n0 0\n10 0\n"), "achskw2.lis": f"{text}\n".encode()}
+
+
+def moved(tables: dict[str, bytes], way: int) -> list[float]:
+    """Corrections of Y at 9 to 13 mm, while it moves this way, mm."""
+    q = np.array([[0.0, y] for y in (9.0, 10.0, 11.0, 12.0, 13.0)])
+    found = CONTROL.read(tables).at(("X", "Y"), q, np.full(q.shape, float(way)))[:, 1]
+    return [round(float(value), 9) for value in found]
+
+
+EVEN = ("interval 10000", "kw_startpos 100000", "kw_nr_max 3", "bilateral 1")
+BOTH = tuple(
+    f"table[{i}].{key} {value}"
+    for key, row in (("pos", (0, -102, 20)), ("neg", (10, 80, 0)))
+    for i, value in enumerate(row)
+)
+
+
+def test_equal_steps_count_from_the_start() -> None:
+    """Values are errors in tenths of a micrometre; beyond the ends those of the ends hold."""
+    assert moved(leadscrew(*EVEN, *BOTH), 1) == [0.0, 0.0, 0.0102, -0.002, -0.002]
+    assert moved(leadscrew(*EVEN, *BOTH), -1) == [-0.001, -0.001, -0.008, 0.0, 0.0]
+
+
+def test_a_list_for_both_ways_has_the_values_of_one() -> None:
+    one = [line for line in BOTH if ".pos" in line]
+    for tables in (leadscrew(*EVEN[:3], *one), leadscrew(*EVEN[:3], "bilateral 0", *one)):
+        assert moved(tables, 1) == moved(tables, -1) == [0.0, 0.0, 0.0102, -0.002, -0.002]
+        assert not CONTROL.lint(tables)
+    (message,) = CONTROL.lint(leadscrew(*EVEN[:3], "bilateral 0", *BOTH))
+    assert "never used" in message.text
+
+
+def test_setpoints_beside_equal_steps_must_agree() -> None:
+    places = tuple(f"table[{i}].setpoint {100000 + 10000 * i}" for i in range(3))
+    assert moved(leadscrew(*EVEN, *BOTH, *places), 1) == moved(leadscrew(*EVEN, *BOTH), 1)
+    with pytest.raises(ConfigError, match="by start and interval at 110000"):
+        CONTROL.read(leadscrew(*EVEN, *BOTH, "table[1].setpoint 110001"))
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("interval 0.5", "interval is 0.5"),
+        ("kw_startpos 1,5", "kw_startpos is 1,5"),
+        ("modulo 1", "modulo is 1"),
+        ("unit 0", "unit is 0"),
+        ("interval 0", "a point without setpoint"),
+    ],
+)
+def test_leadscrew_lists_that_cannot_be_read(line: str, said: str) -> None:
+    name = line.split()[0]
+    lines = [each for each in (*EVEN, *BOTH) if not each.startswith(f"{name} ")]
+    tables = leadscrew(*lines, line)
+    tables["achskw2.lis"] = tables["achskw2.lis"].replace(b"kw.ssfk.unit 1\n", b"", name == "unit")
+    with pytest.raises(ConfigError) as caught:
+        CONTROL.read(tables)
+    assert said in str(caught.value)

@@ -130,7 +130,7 @@ def test_the_linter_names_what_is_wrong_with_backlash(control: str, name: str) -
 ISG_BROKEN = {
     "another axis": (b"log_achs_name              X", b"log_achs_name              Q", "log_achs_name is Q"),
     "another number": (b"achs_nr                    1", b"achs_nr                    3", "the configuration says 1"),
-    "one way only": (b"bilateral               1", b"bilateral               0", "bilateral is 0"),
+    "one way only": (b"bilateral               1", b"bilateral               0", "never used, since"),
     "a point more": (b"kw_nr_max               2", b"kw_nr_max               3", "there are 2 points"),
     "a comma": (b"table[0].pos            20", b"table[0].pos            20,5", "a whole number of tenths"),
     "too large": (b"table[0].pos            20", b"table[0].pos            20000", "which no machine has"),
