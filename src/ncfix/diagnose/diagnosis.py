@@ -38,9 +38,9 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     candidates, unheard_of = without(catalogue(seen.reach), refused)
     gathered = gather(seen, candidates)
     everything = everything_of(seen, gathered.groups)
-    relative, outlying = outliers.weighed(seen, everything)
-    ground = background(seen, everything, relative)
-    court = Court(ground, (*gathered.groups, *rivals(seen, gathered.groups)), len(gathered.groups))
+    groups = (*gathered.groups, *rivals(seen, gathered.groups))
+    relative, outlying = outliers.weighed(seen, everything, groups)
+    court = Court(background(seen, everything, relative), groups, len(gathered.groups))
     case, scale = Case(seen, candidates, unheard_of, gathered, outlying, court), Scale(court)
     found = concluded(case, scale, _selected(scale))
     return mistakes.told(found, wrong) if wrong else found

@@ -38,6 +38,10 @@ MOST = 50
 """Functions of pose or time that are kept, the smoothest."""
 KEPT = 0.01
 """Share of squares that may be dropped."""
+SLOWLY = 1.0
+"""Of half the travel of an axis, and of the time: over which the shape of an effect may differ from the catalogue's."""
+SMOOTHEST = 16
+"""Functions of them that are kept."""
 
 
 def fields(view: View) -> Iterator[Group | None]:
@@ -120,6 +124,14 @@ def functions(kernel: Array, most: int = MOST) -> Array:
     kept = squares > 1e-6 * squares[0]
     found: Array = vectors[:, kept] * np.sqrt(squares[kept])
     return found
+
+
+def slow(view: View) -> Array:
+    """Smooth functions of each axis and of the time, of variance one together, (m, k)."""
+    time = view.column("time_s")
+    signals = [*scaled(view).T, *([2 * (time - time.mean()) / np.ptp(time)] if np.ptp(time) > 0 else [])]
+    kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / SLOWLY**2) for u in signals) / len(signals)
+    return functions(np.asarray(kernel), SMOOTHEST)[np.maximum(view.row, 0)]
 
 
 def _at_tip(view: View, owner: Candidate, way: Array, kernel: Array) -> Group | None:

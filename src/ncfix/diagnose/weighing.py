@@ -25,7 +25,7 @@ import numpy as np
 
 from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import SIZES, Court, Heard, Member
-from ncfix.diagnose.fields import functions, scaled
+from ncfix.diagnose.fields import slow
 from ncfix.measure.measurement import Array
 
 Members = Mapping[str, Member]
@@ -39,10 +39,6 @@ UNNAMED = float(np.log(20.0))
 """Log odds beforehand against what is in no catalogue."""
 MISSHAPEN = 0.2
 """How much the shape of an effect may differ from that of the catalogue, as a share of what it shows."""
-SLOWLY = 1.0
-"""Over which length of the axes, of half their travel."""
-SMOOTHEST = 16
-"""Functions of them that are kept."""
 USUAL = SHARES[2]
 """The share of the background at which it is asked what the members show."""
 
@@ -136,9 +132,5 @@ class Scale:
 
     @cached_property
     def _slow(self) -> Array:
-        """Smooth functions of each axis and of the time, of variance one together, (m, k)."""
-        view = self.court.background.view
-        time = view.column("time_s")
-        signals = [*scaled(view).T, *([2 * (time - time.mean()) / np.ptp(time)] if np.ptp(time) > 0 else [])]
-        kernel = sum(np.exp(-0.5 * (u[:, None] - u) ** 2 / SLOWLY**2) for u in signals) / len(signals)
-        return functions(np.asarray(kernel), SMOOTHEST)[np.maximum(view.row, 0)]
+        """How a shape may differ, (m, k)."""
+        return slow(self.court.background.view)
