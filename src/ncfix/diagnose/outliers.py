@@ -72,10 +72,10 @@ def left_out(view: View, there: Array) -> Array:
 def _precision(view: View, covariance: Array) -> Array:
     """The inverse of a covariance in units of each value's noise, with the base free, (m, m)."""
     base = orthonormal(view.base / view.relative[:, None])
-    precision: Array = np.linalg.inv(covariance)
+    precision = np.linalg.inv(covariance)
     solved = precision @ base
-    precision -= solved @ np.linalg.solve(base.T @ solved, solved.T)
-    return precision
+    left: Array = precision - solved @ np.linalg.solve(base.T @ solved, solved.T)
+    return left
 
 
 def _standing_out(view: View, z: Array) -> NDArray[np.bool_]:
