@@ -1,12 +1,16 @@
-"""Poses chosen by exchange, so that a rival that is refitted to them still errs as much as possible."""
+"""Poses chosen by exchange, so that whichever name is true, rivals that are refitted to them still err."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import ndtr
 
+from ncfix.diagnose.selection import ALIKE
 from ncfix.measure.measurement import Array
 
 COUNT = 12
@@ -15,8 +19,10 @@ PASSES = 4
 STARTS = 60
 CLIMBED = 3
 """Of so many random dozens, so many are improved."""
-LITTLE = 1.02
+LITTLE = 1e-3
 """A pass that gains less is the last one."""
+LEAN = 0.01
+"""What an e-fold of what is told apart is worth where the chance is nearly one or nearly nothing anyway."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,48 +41,87 @@ class Contest:
 
     def told(self, rows: Sequence[int]) -> float:
         """What of the signal the refitted rival cannot imitate with these poses too, squared noise units."""
-        matrix, vector, square = self.summed(rows)
-        return square - float(vector @ np.linalg.solve(matrix, vector))
-
-    def summed(self, rows: Sequence[int]) -> tuple[Array, Array, float]:
-        """Inner products of old rows and these."""
         own = self.columns[list(rows)].reshape(-1, self.columns.shape[2])
         seen = self.signal[list(rows)].ravel()
-        return self.matrix + own.T @ own, self.vector + own.T @ seen, self.square + float(seen @ seen)
+        vector, square = self.vector + own.T @ seen, self.square + float(seen @ seen)
+        return square - float(vector @ np.linalg.solve(self.matrix + own.T @ own, vector))
 
     def told_with(self, rows: Sequence[int]) -> Array:
         """The same with these poses and one more, for every pose on offer, (n,): a block of rows added to a fit."""
-        matrix, vector, square = self.summed(rows)
-        count, height, width = self.columns.shape
-        solved = np.linalg.solve(matrix, np.column_stack([vector, self.columns.reshape(-1, width).T]))
-        missed = self.signal - self.columns @ solved[:, 0]
-        spread = np.eye(height) + self.columns @ solved[:, 1:].reshape(width, count, height).transpose(1, 0, 2)
-        gain = np.einsum("nr,nr->n", missed, np.linalg.solve(spread, missed[:, :, None])[:, :, 0])
-        found: Array = square - float(vector @ solved[:, 0]) + gain
+        products, missed = self._seen
+        count, height = self.signal.shape
+        taken = (height * np.asarray(rows, dtype=np.int64)[:, None] + np.arange(height)).ravel()
+        across, fitted = products[:, taken], missed[taken]
+        solved = np.linalg.solve(products[np.ix_(taken, taken)] + np.eye(len(taken)), np.c_[fitted, across.T])
+        left = (missed - across @ solved[:, 0]).reshape(count, height)
+        blocks = products.reshape(count, height, count, height)[np.arange(count), :, np.arange(count)]
+        lost = across.reshape(count, height, -1) @ solved[:, 1:].reshape(-1, count, height).swapaxes(0, 1)
+        gain = np.einsum("nr,nr->n", left, np.linalg.solve(np.eye(height) + blocks - lost, left[:, :, None])[:, :, 0])
+        found: Array = self.told([]) + float(fitted @ solved[:, 0]) + gain
         return found
 
+    @cached_property
+    def _seen(self) -> tuple[Array, Array]:
+        """Covariance of the values of all poses on offer as the old rows leave it, (n r, n r), and what of the signal
+        the rival that is fitted to the old rows misses there, (n r,).
+        """
+        factor = cholesky(self.matrix, lower=True)
+        flat = self.columns.reshape(-1, self.columns.shape[2])
+        white = solve_triangular(factor, flat.T, lower=True).T
+        return white @ white.T, self.signal.ravel() - white @ solve_triangular(factor, self.vector, lower=True)
 
-def exchanged(contests: Sequence[Contest], count: int) -> tuple[list[int], float]:
+
+Round = Sequence[Contest]
+"""A name that may be the true one, against each of the others."""
+
+
+def chance(told: Array | Sequence[float] | float) -> Array:
+    """How often a name that is right would be 20 to 1 likelier than one that is so well told apart from it.
+
+    Log odds of what is told apart by t squared noise units scatter about t / 2 with a variance of t.
+    """
+    sure = np.maximum(np.asarray(told, dtype=np.float64), 1e-9)
+    found: Array = ndtr((sure / 2 - ALIKE) / np.sqrt(sure))
+    return found
+
+
+def merit(told: Sequence[Array]) -> Array:
+    """What poses are worth that tell the worst rival of each name apart so well: the chance that one name is left."""
+    worth = [chance(each) + LEAN * np.log1p(np.maximum(each, 0.0)) for each in told]
+    found: Array = np.mean(worth, axis=0)
+    return found
+
+
+def worst(rounds: Sequence[Round], rows: Sequence[int]) -> list[float]:
+    """How well the worst rival of each name is told apart with these poses."""
+    return [min(each.told(rows) for each in own) for own in rounds]
+
+
+def exchanged(rounds: Sequence[Round], count: int) -> list[int]:
     """Start with many random dozens, keep the best, and exchange one pose after another as long as that helps."""
     random = np.random.default_rng(0)
     starts = [random.permutation(count)[:COUNT].tolist() for _ in range(STARTS)]
-    starts.sort(key=lambda rows: -min(each.told(rows) for each in contests))
-    best = [climbed(contests, rows) for rows in starts[:CLIMBED]]
-    return max(best, key=lambda found: found[1])
+    starts.sort(key=lambda rows: -_worth(rounds, rows))
+    best = [climbed(rounds, rows) for rows in starts[:CLIMBED]]
+    return max(best, key=lambda rows: _worth(rounds, rows))
 
 
-def climbed(contests: Sequence[Contest], chosen: list[int]) -> tuple[list[int], float]:
-    """Every pose in turn replaced by the one on offer that helps most in the worst contest."""
-    value = min(each.told(chosen) for each in contests)
+def _worth(rounds: Sequence[Round], rows: Sequence[int]) -> float:
+    return float(merit([np.asarray(each) for each in worst(rounds, rows)]))
+
+
+def climbed(rounds: Sequence[Round], chosen: list[int]) -> list[int]:
+    """Every pose in turn replaced by the one on offer that helps most."""
+    value = _worth(rounds, chosen)
     for _ in range(PASSES):
         before = value
         for place in range(len(chosen)):
             rest = [*chosen[:place], *chosen[place + 1 :]]
-            told = np.min([each.told_with(rest) for each in contests], axis=0)
+            told = merit([np.min([each.told_with(rest) for each in own], axis=0) for own in rounds])
             told[rest] = -np.inf
             best = int(told.argmax())
             if told[best] > value:
                 chosen, value = [*chosen[:place], best, *chosen[place + 1 :]], float(told[best])
-        if value < LITTLE * before:
+        if value < before + LITTLE:
             break
-    return chosen, value
+    return chosen

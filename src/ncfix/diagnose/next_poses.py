@@ -1,23 +1,24 @@
 """What to measure next, so that names which these data leave alike come apart (T-optimal, Atkinson and Fedorov 1975).
 
-The rival is refitted to old and new rows together, and the poses are those where it still errs most: exchanged one at a
-time, all in place from the start, since the first pose with a new stylus tells nothing by itself. Where the least of
-all rivals still imitates the effect, no measurement of this kind tells them apart, and that is said.
+Each name in turn is taken for the true one, and the others are refitted to old and new rows together. The poses are
+those after which one name most likely stands alone, whichever is true: exchanged one at a time, all in place from the
+start, since the first pose with a new stylus tells nothing by itself. Where a rival imitates a name at all of the poses
+on offer, no measurement of this kind tells it from that name, and that is said.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 
 import numpy as np
-from scipy.special import ndtr
 
 from ncfix.diagnose.addition import Mask
-from ncfix.diagnose.contest import Contest, exchanged
+from ncfix.diagnose.contest import Contest, chance, exchanged, worst
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
-from ncfix.diagnose.selection import ALIKE, Selected, aliases
+from ncfix.diagnose.selection import Selected, aliases
 from ncfix.diagnose.view import View
 from ncfix.diagnose.weighing import Members, Scale
 from ncfix.machine import Machine
@@ -43,7 +44,12 @@ TOLD = 6.0
 """Squared noise units from which on a rival may be told apart: then the odds are 20 to 1 in one of two measurements."""
 SURELY = 21.0
 """The same for nineteen of twenty measurements."""
-BETTER = 1.2
+SURE = 0.95
+"""The chance that belongs to that."""
+FEWER = 0.8
+"""Poses that ask for more must leave so much fewer cases open, as a share."""
+HELPS = 0.05
+"""And any must raise the chance that one name stands alone by so much."""
 WEAK = 1e-6
 """Prior on what is free, so that unseen combinations do no harm."""
 ROUNDED = 1e-3
@@ -66,10 +72,12 @@ class Proposal:
 
     name     the name that is to be told from its rivals
     plan     rows of kind tcp without values; None if no pose helps
-    before   how well the worst rival can be told from the effect, squared noise units; after with the new poses
+    before   how well the worst rival can be told from the true name, squared noise units; after with the new poses
+    chance   how often one name stands alone afterwards, 20 to 1 likelier than the others, each as likely to be true
     reason   why the data so far do not tell them apart
     rivals   the names that are told apart; where there is no plan, those that cannot be
     alike    names that cannot be told from it by any of the poses, besides
+    stuck    names beside which another would stay, were they true, however often this is measured
     beyond   axes that have to go beyond the travels measured so far
     tools    mm: lengths of tools that were not used so far
     strays   whether the tool tip goes where it has not been so far, seen from the workpiece
@@ -79,26 +87,22 @@ class Proposal:
     plan: Measurement | None
     before: float
     after: float
+    chance: float
     reason: str
     rivals: tuple[str, ...]
     alike: tuple[str, ...] = ()
+    stuck: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
     tools: tuple[float, ...] = ()
     strays: bool = False
 
     @property
-    def chance(self) -> float:
-        """How often the name that is right would afterwards be 20 to 1 likelier than the worst rival.
-
-        Log odds of what is told apart by t squared noise units scatter about t / 2 with a variance of t.
+    def times(self) -> int | None:
+        """How often each pose has to be measured so that this is nearly sure: what tells apart adds up; None if no
+        number would do.
         """
-        return float(ndtr((self.after / 2 - ALIKE) / np.sqrt(self.after))) if self.after > 0 else 0.0
-
-    @property
-    def times(self) -> int:
-        """How often each pose has to be measured so that this is nearly sure: what tells apart adds up."""
         gained = self.after - self.before
-        return max(1, int(np.ceil((SURELY - self.before) / gained))) if gained > 0 else 1
+        return max(1, int(np.ceil((SURELY - self.before) / gained))) if gained > 0 and not self.stuck else None
 
 
 def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
@@ -114,7 +118,7 @@ def proposed(scale: Scale, selected: Selected, sigma: float) -> Proposal | None:
         return None
     others = {key: member for key, member in selected.members.items() if key != name}
     sides = [_side(scale, others, each) for each in (name, *near)]
-    return propose(court, sides[0], sides[1:], sigma)
+    return propose(court, sides, sigma)
 
 
 def _side(scale: Scale, others: Members, name: str) -> Side:
@@ -126,23 +130,26 @@ def _side(scale: Scale, others: Members, name: str) -> Side:
     return Side(forms[0][0], court.numbers(everyone, court.share(everyone))[-1], forms)
 
 
-def propose(court: Court, chosen: Side, rivals: Sequence[Side], sigma: float) -> Proposal:
-    """The poses that tell `chosen` from the rivals, whichever of them is true.
+def propose(court: Court, sides: Sequence[Side], sigma: float) -> Proposal:
+    """The poses that tell these names apart, whichever of them is true; the first is the one that was chosen.
 
-    What is easy is enough if it tells them surely: the travels measured, and two tools. Else another tool more, and
-    the travels of the machine; and that is said. But nobody knows how an effect goes on along its own axis where that
-    was not measured: what would come of it tells no names apart.
+    What is easy is enough if it tells them surely: the travels measured, and two tools. Else another tool more, the
+    tips of shorter tools wherever these travels lead, and the travels of the machine; and that is said. But nobody
+    knows how an effect goes on along its own axis where that was not measured: what would come of it tells no names
+    apart.
     """
     view = court.background.view
     spans, tools = view.reach.spans, tuple(sorted(set(np.round(view.column("tool_length"), 4).tolist())))
-    more, travels = _one_more(tools), _travels(view.machine, spans, _signals([chosen, *rivals]))
-    ways = dict.fromkeys([(False, tools if len(tools) > 1 else more), (False, more), (travels != spans, more)])
+    more, travels = _one_more(tools), _travels(view.machine, spans, _signals(sides))
+    easy = (False, False, tools if len(tools) > 1 else more)
+    ways = dict.fromkeys([easy, (False, False, more), (False, True, more), (travels != spans, True, more)])
     best: Proposal | None = None
-    for far, lengths in ways:
-        found = _within(court, chosen, rivals, sigma, travels if far else spans, lengths)
-        if best is None or (found.plan is not None and found.after > BETTER * best.after):
+    for far, roaming, lengths in ways:
+        offered = _offered(view, travels if far else spans, lengths, roaming)
+        found = _of(court, sides, sigma, offered)
+        if best is None or 1 - found.chance < FEWER * (1 - best.chance):
             best = found
-        if best.after >= SURELY:
+        if best.chance >= SURE:
             break
     assert best is not None
     return best
@@ -157,37 +164,29 @@ def _one_more(tools: tuple[float, ...]) -> tuple[float, ...]:
     return (*tools, other) if apart >= OTHER else tools
 
 
-def _within(
-    court: Court,
-    chosen: Side,
-    rivals: Sequence[Side],
-    sigma: float,
-    ranges: Mapping[str, Span],
-    lengths: Sequence[float],
-) -> Proposal:
-    """The best poses of those that lie within these ranges, with tools of these lengths."""
-    offered = _offered(court.background.view, ranges, lengths)
-    new = observe(offered, court.background.view.machine)
-    rounds = [
-        (rival.group.owner.name, _contest(court, new, true, other, sigma))
-        for rival in rivals
-        for true, other in ((chosen, rival), (rival, chosen))
-    ]
-    every, names = list(range(len(offered))), tuple(dict.fromkeys(name for name, _ in rounds))
-    able = [(name, each) for name, each in rounds if each.told(every) > TOLD]
-    useful = [each for _, each in able]
-    index, after = exchanged(useful, len(offered)) if useful else (every, min(each.told(every) for _, each in rounds))
-    before = min(each.told([]) for each in useful or [each for _, each in rounds])
-    name, reason = chosen.group.owner.name, _reason(court, chosen.group, [rival.group for rival in rivals])
-    if not useful or after <= BETTER * before:
-        return Proposal(name, None, before, after, reason, names)
-    plan, view = offered.rows(index), court.background.view
-    told = tuple(dict.fromkeys(name for name, _ in able))
-    alike = tuple(each for each in names if each not in told)
+def _of(court: Court, sides: Sequence[Side], sigma: float, offered: Measurement) -> Proposal:
+    """The best of the poses on offer."""
+    view, names = court.background.view, tuple(side.group.owner.name for side in sides)
+    new, every = observe(offered, view.machine), range(len(offered))
+    rounds = [[_contest(court, new, true, other, sigma) for other in sides if other is not true] for true in sides]
+    able = [[each.told(every) > TOLD for each in own] for own in rounds]
+    useful = [kept for own, can in zip(rounds, able, strict=True) if (kept := list(compress(own, can)))]
+    index = exchanged(useful, len(offered)) if useful else list(every)
+    chances = [float(np.mean(chance(worst(rounds, rows)))) for rows in ([], index)]
+    reason = _reason(court, sides[0].group, [side.group for side in sides[1:]])
+    before, after = (min(worst(useful or rounds, rows)) for rows in ([], index))
+    if not useful or chances[1] < chances[0] + HELPS:
+        return Proposal(names[0], None, before, after, chances[0], reason, names[1:])
+    plan = offered.rows(index)
+    told = tuple(name for k, name in enumerate(names[1:]) if able[0][k] or able[k + 1][0])
+    stuck = tuple(name for name, can in zip(names, able, strict=True) if not all(can))
     beyond, tools = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
     strays = not _where_it_was(view, plan).all()
-    marked = _marked(plan, beyond, tools, strays)
-    return Proposal(name, marked, before, after, reason, told, alike, beyond, tools, strays)
+    alike = tuple(name for name in names[1:] if name not in told)
+    return Proposal(
+        names[0], _marked(plan, beyond, tools, strays), before, after, chances[1], reason,
+        told, alike, stuck, beyond, tools, strays,
+    )  # fmt: skip
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:
@@ -239,13 +238,18 @@ def _marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = (
     return plan.with_header("note", "; ".join(said)) if said else plan
 
 
-def _offered(view: View, ranges: Mapping[str, Span], lengths: Sequence[float]) -> Measurement:
-    """Poses within these ranges, with these tools, whose tip stays where it has been if there are such."""
+def _offered(view: View, ranges: Mapping[str, Span], lengths: Sequence[float], roaming: bool = False) -> Measurement:
+    """Poses within these ranges, with these tools, whose tip stays where it has been if there are such.
+
+    Of tools that are shorter than one that was used it may also be elsewhere where they are `roaming`.
+    """
     loads = view.column("load_kg")
     inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
     room = Room(ranges=ranges, tool_lengths=lengths, inputs=inputs)
     drawn = candidates(view.machine, "tcp", DRAWN * OFFERED, room)
     inside = _where_it_was(view, drawn)
+    if roaming:
+        inside |= drawn.column("tool_length") < view.column("tool_length").max() - ROUNDED
     kept = drawn.rows(inside) if inside.sum() >= FEW else drawn
     plan = kept.rows(range(min(OFFERED, len(kept))))
     known = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}

@@ -74,8 +74,7 @@ def _precision(view: View, covariance: Array) -> Array:
     base = orthonormal(view.base / view.relative[:, None])
     precision = np.linalg.inv(covariance)
     solved = precision @ base
-    left: Array = precision - solved @ np.linalg.solve(base.T @ solved, solved.T)
-    return left
+    return np.asarray(precision - solved @ np.linalg.solve(base.T @ solved, solved.T), dtype=np.float64)
 
 
 def _standing_out(view: View, z: Array) -> NDArray[np.bool_]:

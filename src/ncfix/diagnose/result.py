@@ -82,6 +82,7 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
         "rivals": p.rivals,
         "reason": p.reason,
         "alike": p.alike,
+        "stuck": p.stuck,
         "told_apart": {"now": p.before, "after": p.after, "chance": p.chance, "times_each": p.times},
         "beyond_travels_measured": list(p.beyond),
         "tip_beyond": p.strays,

@@ -129,6 +129,8 @@ def hope(proposal: Proposal) -> str:
     """How far the poses would lead."""
     assert proposal.plan is not None
     said = f"{len(proposal.plan)} more poses leave one name in {_of_hundred(proposal.chance)}"
+    if proposal.stuck:
+        return f"{said}: were it {' or '.join(proposal.stuck)}, another name would stay beside it"
     if proposal.times == 1 or proposal.chance >= NEARLY:
         return said
     return f"{said}, and in nearly all if each is measured {proposal.times} times"
