@@ -153,6 +153,45 @@ def spelled(
         character = text[place]
 
 
+@LIBRARY.helper
+def in_shape(
+    text: Bytes,
+    span: tuple[int, int],
+    shape: Bytes,
+    tables: Tables,
+    most: tuple[int, int],
+    marks: tuple[int, int, int],
+    powers: Floats,
+    numbers: tuple[Ints, Floats],
+    count: int,
+) -> int:
+    """Put down the numbers of a block that has a certain shape; how many there are then, `NONE` if it has not.
+
+    Nor where that takes a look at more than one character after the other: at a comment, or at a run of digits that
+    belongs to the shape in part.
+    """
+    (kinds, _, _, _), (spans, values), (place, stop) = tables, numbers, span
+    before_number = LITERAL
+    for mark in shape:
+        if place >= stop:
+            return NONE
+        kind = kinds[text[place]]
+        if mark == marks[0] or mark == marks[1]:
+            at = place + (kind == SIGN)
+            if before_number == NUMERIC or at >= stop or kinds[text[at]] != NUMERIC:
+                return NONE
+            form, start, past, pointed, value = number_from(text, at, stop, tables, most, powers)
+            if form != FREE or start != place or mark != (marks[0] if pointed else marks[1]):
+                return NONE
+            spans[count, 0], spans[count, 1], values[count] = start, past, value
+            count, place, before_number = count + 1, past, NUMERIC
+        elif text[place] == mark and kind < COMMENT:
+            place, before_number = place + 1, kind
+        else:
+            return NONE
+    return count if place == stop else NONE
+
+
 @LIBRARY.kernel(
     "u1[:]",
     "i8[:,:]",
@@ -194,6 +233,13 @@ def scan(
     n, count, known, end, starts[0] = len(blocks), 0, 0, 0, 0
     for block in range(n):
         first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
+        if block:
+            likely = group[block - 1]
+            shape = shapes[starts[likely] : starts[likely + 1]]
+            done = in_shape(text, (place, stop), shape, tables, most, marks, powers, numbers, count)
+            if done >= 0:
+                group[block], count = likely, done
+                continue
         end, code, code_at_sign, end_at_sign = begin, OFFSET, OFFSET, begin
         while place < stop:
             character, past = text[place], place + 1
