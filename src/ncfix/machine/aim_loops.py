@@ -91,19 +91,22 @@ def set_out(
         carry(perfect, hand, count, goal.point)
     for i in range(3):
         follow(perfect, axes[i], hand, count, goal.back[3 * i : 3 * i + 3])
-    left = 0
+    whole, total, left = hand.tip[0], hand.tip[1], 0
     for k in range(count):
         a = goal.back[0, k], goal.back[1, k], goal.back[2, k]
         b = goal.back[3, k], goal.back[4, k], goal.back[5, k]
         c = goal.back[6, k], goal.back[7, k], goal.back[8, k]
-        whole, p, q, r = volume(a, b, c)
-        share = 1 / whole
-        for i in range(3):
-            goal.back[i, k], goal.back[3 + i, k], goal.back[6 + i, k] = p[i] * share, q[i] * share, r[i] * share
-        total = goal.point[0, k] + goal.point[1, k] + goal.point[2, k]
-        for i in range(len(hand.q)):
-            total += hand.q[i, k]
-        possible = np.isfinite(total) and not abs(whole) < flat
+        whole[k], p, q, r = volume(a, b, c)
+        share = 1 / whole[k]
+        goal.back[0, k], goal.back[1, k], goal.back[2, k] = p[0] * share, p[1] * share, p[2] * share
+        goal.back[3, k], goal.back[4, k], goal.back[5, k] = q[0] * share, q[1] * share, q[2] * share
+        goal.back[6, k], goal.back[7, k], goal.back[8, k] = r[0] * share, r[1] * share, r[2] * share
+        total[k] = goal.point[0, k] + goal.point[1, k] + goal.point[2, k]
+    for i in range(len(hand.q)):
+        for k in range(count):
+            total[k] = total[k] + hand.q[i, k]
+    for k in range(count):
+        possible = abs(total[k]) < np.inf and not abs(whole[k]) < flat
         goal.before[k] = 0.0 if possible else -1.0
         left += possible
     return left
@@ -113,23 +116,27 @@ def step_closer(
     axes: Ints, close: float, begins: bool, hand: Hand, count: int, goal: Goal, begin: int, out: Array
 ) -> int:
     """Move the axes against the gaps of the tips; how many have arrived with that."""
-    arrived = 0
-    for k in range(count):
-        at = begin + k
-        if goal.before[k] < 0 or out[7, at] > 0:
-            continue
-        gap = hand.tip[0, k] - goal.point[0, k], hand.tip[1, k] - goal.point[1, k], hand.tip[2, k] - goal.point[2, k]
+    gap, arrived = hand.tip, 0
+    for i in range(3):
+        for k in range(count):
+            gap[i, k] = gap[i, k] - goal.point[i, k]
         if begins:
-            out[3, at], out[4, at], out[5, at] = gap
-        for i in range(3):
-            j = 3 * i
-            hand.q[axes[i], k] -= dot((goal.back[j, k], goal.back[j + 1, k], goal.back[j + 2, k]), gap)
-        size = np.sqrt(dot(gap, gap))
-        out[6, at] = max(out[6, at], hand.tip[3, k])
-        if has_arrived(size, goal.before[k], close):
-            out[7, at] = 1.0
-            arrived += 1
-        goal.before[k] = size
+            for k in range(count):
+                out[3 + i, begin + k] = gap[i, k] if goal.before[k] >= 0 else 0.0
+    for i in range(3):
+        q, row = hand.q[axes[i]], goal.back[3 * i : 3 * i + 3]
+        for k in range(count):
+            step = dot((row[0, k], row[1, k], row[2, k]), (gap[0, k], gap[1, k], gap[2, k]))
+            q[k] = q[k] - step if goal.before[k] >= 0 and out[7, begin + k] == 0 else q[k]
+    for k in range(count):
+        at, before = begin + k, goal.before[k]
+        size = np.sqrt(dot((gap[0, k], gap[1, k], gap[2, k]), (gap[0, k], gap[1, k], gap[2, k])))
+        active = before >= 0 and out[7, at] == 0
+        out[6, at] = max(out[6, at], gap[3, k]) if active else out[6, at]
+        there = active and has_arrived(size, before, close)
+        out[7, at] = 1.0 if there else out[7, at]
+        goal.before[k] = size if active else before
+        arrived += there
     return arrived
 
 

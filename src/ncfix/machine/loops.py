@@ -37,6 +37,8 @@ Ints = NDArray[np.int64]
 Packed = tuple[Ints, Array]
 
 HANDFUL = 64
+LINE = 8
+"""Numbers in a line of the cache, and in the widest vector: room that begins with one is gone through faster."""
 SPARE = 14
 """Rows for those who do more with a handful of poses."""
 
@@ -114,7 +116,10 @@ def room(route: Packed, columns: Columns) -> Array:
     """Room for a handful of poses, and `SPARE` rows more, as `laid_out` divides it."""
     m, f = int(route[0][0]), int(route[0][2])
     rows = len(columns.q) + 2 * len(columns.sine) + len(columns.others) + f + PARTS * m
-    return np.zeros((rows + 5 + SPARE, HANDFUL))
+    count = (rows + 5 + SPARE) * HANDFUL
+    memory = np.zeros(count + LINE)
+    begin = -(memory.ctypes.data // memory.itemsize) % LINE
+    return memory[begin : begin + count].reshape(-1, HANDFUL)
 
 
 def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Array]:
@@ -170,6 +175,9 @@ def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
             for part in range(3):
                 for k in range(count):
                     tip[part, k] = tip[part, k] + sign * hand.values[at + part, k]
+        elif axis < 0 and not steps.screws[i]:
+            at = PARTS * steps.small[i]
+            nudge(hand.values[at : at + PARTS], (center[j], center[j + 1], center[j + 2]), kind, count, tip)
         else:
             at, a, b, c = PARTS * steps.small[i], center[j], center[j + 1], center[j + 2]
             for k in range(count):
@@ -192,6 +200,23 @@ def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
                 tip[0, k], tip[1, k], tip[2, k] = found
 
 
+def nudge(small: Array, center: tuple[float, float, float], kind: int, count: int, tip: Array) -> None:
+    """Move tips forth or back by small motions (`PARTS`, .) about one point; simple enough for vector instructions."""
+    a, b, c = center
+    if kind == FORTH:
+        for k in range(count):
+            t, r = (small[0, k], small[1, k], small[2, k]), (small[3, k], small[4, k], small[5, k])
+            s = dot(r, r)
+            tip[3, k] = max(tip[3, k], s)
+            tip[0, k], tip[1, k], tip[2, k] = moved_forth(tip[0, k], tip[1, k], tip[2, k], s, t, r, a, b, c)
+    else:
+        for k in range(count):
+            t, r = (small[0, k], small[1, k], small[2, k]), (small[3, k], small[4, k], small[5, k])
+            s = dot(r, r)
+            tip[3, k] = max(tip[3, k], s)
+            tip[0, k], tip[1, k], tip[2, k] = moved_back(tip[0, k], tip[1, k], tip[2, k], s, t, r, a, b, c)
+
+
 def take_up(columns: Columns, begin: int, count: int, hand: Hand) -> None:
     """Put a handful of poses next to each other."""
     copy(columns.q, begin, count, hand.q)
@@ -210,7 +235,7 @@ def copy(rows: Array, begin: int, count: int, into: Array) -> None:
 
 
 def work_out(functions: Functions, hand: Hand, count: int) -> None:
-    """The functions at a handful of poses: as `steps.work_out_functions`."""
+    """The functions at a handful of poses: as `steps.work_out_functions`; the tips lend their room to it."""
     used = 0
     for g in range(len(functions.family)):
         if functions.family[g] == GIVEN:
@@ -226,30 +251,35 @@ def work_out(functions: Functions, hand: Hand, count: int) -> None:
 
 def powers(functions: Functions, g: int, hand: Hand, count: int) -> None:
     """Powers of a position."""
-    axis, at = functions.axis[g], 5 * g
+    (u, value), axis, at = (hand.tip[0], hand.tip[1]), functions.axis[g], 5 * g
     unit, low, high = functions.signal[at], functions.signal[at + 1], functions.signal[at + 2]
     center, scale = functions.signal[at + 3], functions.signal[at + 4]
     for k in range(count):
-        u = held_signal(hand.q[axis, k], unit, low, high, center, scale)
-        value, power = u, 1
-        for f in range(functions.first[g], functions.first[g + 1]):
-            while power < functions.order[f]:
-                power += 1
-                value = value * u
-            hand.found[f, k] = value if functions.order[f] > 0 else 1.0
+        u[k] = held_signal(hand.q[axis, k], unit, low, high, center, scale)
+        value[k] = u[k]
+    power = 1
+    for f in range(functions.first[g], functions.first[g + 1]):
+        while power < functions.order[f]:
+            power += 1
+            for k in range(count):
+                value[k] = value[k] * u[k]
+        for k in range(count):
+            hand.found[f, k] = value[k] if functions.order[f] > 0 else 1.0
 
 
 def waves(functions: Functions, g: int, hand: Hand, count: int) -> None:
     """Harmonics of an angle."""
-    axis = functions.axis[g]
+    axis, order, cosine, c, s = functions.axis[g], 1, hand.tip[0], hand.tip[1], hand.tip[2]
     for k in range(count):
-        cosine, sine, order = 1 - hand.versine[axis, k], hand.sine[axis, k], 1
-        c, s = cosine, sine
-        for f in range(functions.first[g], functions.first[g + 1], 2):
-            while order < functions.order[f]:
-                order += 1
-                c, s = next_wave(c, s, cosine, sine)
-            hand.found[f, k], hand.found[f + 1, k] = c, s
+        cosine[k] = 1 - hand.versine[axis, k]
+        c[k], s[k] = cosine[k], hand.sine[axis, k]
+    for f in range(functions.first[g], functions.first[g + 1], 2):
+        while order < functions.order[f]:
+            order += 1
+            for k in range(count):
+                c[k], s[k] = next_wave(c[k], s[k], cosine[k], hand.sine[axis, k])
+        for k in range(count):
+            hand.found[f, k], hand.found[f + 1, k] = c[k], s[k]
 
 
 def add_up(functions: Functions, hand: Hand, count: int) -> None:
@@ -270,6 +300,7 @@ HELPERS = (
     unpacked,
     laid_out,
     carry,
+    nudge,
     take_up,
     copy,
     work_out,
