@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,17 +41,27 @@ def compiled(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     fast.disengage()
 
 
-ODDS = ("G0 Z60.\nG1", "(PASS 3)", "/G4 P0.1", "G91\nG1 X.5\nX-.5\nG90", "G1 X20. Y20.\nG2 X22. Y22. I2. J0.\nG1")
+AMONG = (
+    "G0 Z60.\nG1",
+    "(PASS 3)",
+    "/G4 P0.1",
+    "G1 X20. Y20.\nG2 X22. Y22. I2. J0.\nG1",
+    "G1 X20. Y20.\nG3 I2. J.5\nG3 I2. J.5\nG4 P1\nG1",
+    "G1 X20. Y20.\nG2 X60. Y60. I40. J0. Z12.\nG4 P.2\nG1 X[20.+#100]",
+    "G1 C[20.]\nG1",
+)
+"""What may interrupt plain motions without leading a part the long way."""
+ODDS = (*AMONG, "G91\nG1 X.5\nX-.5\nG90")
 
 
-def winding(seed: int, lines: int, odd: float = 0.0) -> bytes:
+def winding(seed: int, lines: int, odd: float = 0.0, odds: Sequence[str] = ODDS) -> bytes:
     """A path that winds about, X in every block, the other words in all or only where they change."""
     rng = random.Random(seed)
     full, at = seed % 2 == 0, [20.0, 20.0, 5.0, 10.0, 30.0]
     out = ["%", "G21 G90 G94 G54 G17 F800.", "G0 X20. Y20. Z5. B10. C30.", "G1"]
     for k in range(lines):
         if rng.random() < odd:
-            out.append(rng.choice(ODDS))
+            out += rng.choice(odds).splitlines()
         at = [value + rng.uniform(-1, 1) * rng.choice((0.1, 0.3, 2.0)) for value in at]
         chosen = [i for i in range(5) if full or i == 0 or rng.random() < 0.5]
         words = " ".join(f"{'XYZBC'[i]}{at[i]:.{rng.choice((3, 4))}f}" for i in chosen)
@@ -86,10 +98,34 @@ def test_as_by_the_long_way(
 ) -> None:
     source = winding(seed, 260, odd)
     plainly = counted(monkeypatch)
-    text, report = streamed(source, machine, 2500, options)
+    found = streamed(source, machine, 2500, options)
     assert sum(plainly) >= (3 if odd == 0 else 1)
+    assert_as_by_the_long_way(found, source, machine, 2500, options, monkeypatch)
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("seed", range(6))
+def test_arcs_and_dwells_among_plain_motions(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    options = replace(OPTIONS, split_rapids=seed % 2 == 0)
+    source = winding(seed, 600, 0.02, AMONG)
+    plainly = counted(monkeypatch)
+    found = streamed(source, machine, 6000, options)
+    assert sum(plainly) >= 2
+    assert_as_by_the_long_way(found, source, machine, 6000, options, monkeypatch)
+
+
+def assert_as_by_the_long_way(
+    found: tuple[bytes, dict[str, Any]],
+    source: bytes,
+    machine: Machine,
+    size: int,
+    options: FixOptions,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The same bytes and words, figures but for their last digit."""
+    text, report = found
     monkeypatch.setattr(corrector.Planner, "of", lambda *given: None)
-    expected, reference = streamed(source, machine, 2500, options)
+    expected, reference = streamed(source, machine, size, options)
     assert text == expected
     for name, value in reference.items():
         if name in FIGURES:

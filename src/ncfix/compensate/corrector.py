@@ -14,8 +14,8 @@ from ncfix.compensate.fix import stamp_of
 from ncfix.compensate.following import placed
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
-from ncfix.compensate.plain_text import PlainText, written
-from ncfix.compensate.proof import SelfCheckError, differ, differences
+from ncfix.compensate.plain_text import largest_shift, written
+from ncfix.compensate.proof import SelfCheckError, differences
 from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
@@ -24,6 +24,7 @@ from ncfix.compensate.verify import path_error
 from ncfix.diagnostics import Message, NcfixError
 from ncfix.machine import State
 from ncfix.program import stamp
+from ncfix.program.emit import Emission
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError, PartReader
@@ -100,18 +101,17 @@ class Corrector:
                 return self._plainly(course, plain, share)
         return self._settled(unit, agreed or self._agreed(unit), before, share)
 
-    def _plainly(self, course: Course, plain: PlainText, share: Share) -> Done:
-        """Finish a part of nothing but plain motions."""
+    def _plainly(self, course: Course, plain: Emission, share: Share) -> Done:
+        """Finish a part of plain motions."""
         part, moves = course.part, course.part.moves
         if not part.last:
             shift = course.real.start[-1] - moves.start[-1]
             share.leave(Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy()))
         text = spliced(part.program.source, plain.splices)
-        again = self._read_again(text, part, plain.splices)
-        if len(again) != len(plain.end) or differ(again.end, plain.end).any():
-            raise NotInPartsError(FRAMES)
+        settled = course.settled(plain)
+        _check(differences(settled, self._read_again(text, part, plain.splices)))
         tally = Tally()
-        tally.add_plain(len(moves), plain.added, plain.largest_shift(course), len(plain.splices) > 0)
+        tally.add_plain(settled, largest_shift(course, plain))
         if self.task.options.verify:
             tally.figures(figures(course, plain, self.task.options.split_rapids), part.program, moves)
         return Done(text, tally)
@@ -168,9 +168,7 @@ class Corrector:
         """The control must understand what the plan meant."""
         head, splices = unit.head, settled.emission.splices
         edits = None if head is None else splices.moved(-len(head.program.source))
-        wrong = differences(settled, self._read_again(text, unit.part, edits), own[settled.plan.pieces.move])
-        if wrong is None or wrong.any():
-            raise NotInPartsError(FRAMES)
+        _check(differences(settled, self._read_again(text, unit.part, edits), own[settled.plan.pieces.move]))
 
     def _read_again(self, text: bytes, part: Part, edits: Splices | None) -> Moves:
         """What a control makes of the text that was written; `edits` make it of that of the part, if known."""
@@ -200,6 +198,12 @@ class Corrector:
             known=settled.plan.known,
         )
         tally.figures(errors, part.program, moves)
+
+
+def _check(wrong: Mask | None) -> None:
+    """Raise `NotInPartsError` where a control would understand pieces otherwise than they were meant."""
+    if wrong is None or wrong.any():
+        raise NotInPartsError(FRAMES)
 
 
 def _still_off(moves: Moves, before: Before) -> bool:

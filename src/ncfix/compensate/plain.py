@@ -1,9 +1,10 @@
-"""Parts of nothing but plain straight motions, which is what long programs are made of: planned in few passes.
+"""Parts of plain straight motions, which is what long programs are made of: planned in few passes.
 
-The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no arcs, cycles
-or dwells in it, no tool-centre-point control, no axes without words, nothing that is left as it is, and every motion
-begins where the one before ended. Whatever turns out to need more than that, or comes near to a limit, is for the long
-way. Both ways write the same bytes; a test holds them together.
+The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no cycles in it,
+no tool-centre-point control, no axes without words, nothing that is refused, and every motion begins where the one
+before ended. The few arcs and dwells in it are planned as the long way does (see `others`). Whatever turns out to need
+more than that, or comes near to a limit, is for the long way. Both ways write the same bytes; a test holds them
+together.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
+from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import REST, matters
@@ -22,17 +24,19 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import CORNER, SURE, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.others import Others, planned
 from ncfix.compensate.path import Demands, in_pieces
 from ncfix.compensate.ragged import distinct, offsets, owners, places
 from ncfix.compensate.rows import farthest, lengths, picked, some
 from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
-from ncfix.compensate.settle import rounding
+from ncfix.compensate.settle import Settled, rounding
 from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.compensate.units import Part, Unit
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.bow import MORE
+from ncfix.program.emit import Emission
 from ncfix.program.moves import FeedMode, Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 
@@ -45,15 +49,17 @@ class Course:
     """The plan of a part of plain motions.
 
     part    its text and motions
+    plain   (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
     intent  the motions on the machine
     real    where they really start and end, before rounding
-    pieces  what is to be written; none is an arc, none is kept
+    pieces  what is to be written
     first   (n + 1,) the first piece of each motion, and how many there are
     wanted  (n, n_axes) commands at which the tip is where it should be, to 1 nm
     before  (n,) mm: how far off it is there without a correction
     """
 
     part: Part
+    plain: Mask
     intent: Intent
     real: Segments
     pieces: Pieces
@@ -66,6 +72,22 @@ class Course:
         """Whether every motion is one piece."""
         return len(self.pieces) == len(self.first) - 1
 
+    @property
+    def behind_dwells(self) -> Mask:
+        """(n,) motions that may not begin quite where they should: as `judge.uneasy_starts`."""
+        return np.append(False, self.part.moves.kind[:-1] == Kind.DWELL)
+
+    def settled(self, emission: Emission) -> Settled:
+        """The plan and its text as the long way has them."""
+        moves = self.part.moves
+        untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
+        plan = Plan(self.pieces, self.real.start, *untold, ())
+        return Settled(moves, plan, emission, moves.kind == Kind.DWELL, {}, unmoored=False)
+
+    def last(self, of_pieces: Array) -> Array:
+        """Of what all pieces (m, k) have that of the last piece of each motion, (n, k)."""
+        return of_pieces if self.single else picked(of_pieces, self.first[1:] - 1)
+
 
 @dataclass(frozen=True, slots=True)
 class Planner:
@@ -75,6 +97,7 @@ class Planner:
     """
 
     machine: Machine
+    options: FixOptions
     strategy: Strategy
     demands: Demands
 
@@ -87,12 +110,13 @@ class Planner:
         if not able or matters(machine) or machine.inputs or machine.bow is None or machine.linear_ways is None:
             return None
         demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)
-        return cls(machine, strategy, demands)
+        return cls(machine, options, strategy, demands)
 
     def plan(self, unit: Unit) -> Course | None:
         """The plan of a part behind the last motion of the one before; None if it needs the long way."""
         part, moves = unit.part, unit.part.moves
-        if unit.head is None or not follow_plainly(unit.head.moves, moves):
+        plain = None if unit.head is None else plain_ones(unit.head.moves, moves)
+        if unit.head is None or plain is None:
             return None
         q = np.concatenate([unit.head.moves.end, moves.end])
         found = self.strategy.solve(self.machine, q, State(float(moves.tool_length[0])))
@@ -102,28 +126,34 @@ class Planner:
         ends = self._displaced(moves, shift)
         if ends is None:
             return None
-        intent = Intent(self.machine, moves, State())
+        intent, others, alone = Intent(self.machine, moves, State()), None, plain
+        if not plain.all():
+            others = planned(self.machine, part.program.dialect, self.options, moves, plain)
+            if others is None:
+                return None
+            alone = plain.copy()
+            alone[others.rows] = False
         real = replace(intent.segments, start=ends[0], end=ends[1])
-        over, parts = self._split(intent, real, shift)
-        pieces, first = pieces_of(real, over, parts)
-        inner = np.flatnonzero(pieces.fraction < 1)
+        over, parts = self._split(intent, real, shift, alone)
+        pieces, first = pieces_of(real, over, parts, others)
+        inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
             pieces = on_digits(self.machine, moves, pieces, inner)
             if not self._fine_inside(intent, pieces, inner, shift):
                 return None
-        return Course(part, intent, real, pieces, first, found.q[1:], found.before[1:])
+        return Course(part, plain, intent, real, pieces, first, found.q[1:], found.before[1:])
 
     def followed(self, moves: Moves) -> Mask:
         """(n,) motions that are looked at along their way."""
         moving = some(np.abs(moves.end - moves.start) >= REST)
         return moving if self.demands.split_rapids else moving & (moves.kind == Kind.FEED)
 
-    def _split(self, intent: Intent, real: Segments, shift: Array) -> tuple[Index, Split | None]:
-        """The motions that must be split, and their pieces."""
+    def _split(self, intent: Intent, real: Segments, shift: Array, among: Mask) -> tuple[Index, Split | None]:
+        """The motions that must be split, and their pieces; `among` (n,) motions."""
         moves, limit = intent.moves, self.demands.budget.path
         bound = self._bounds(real, shift, intent.lengths(np.arange(1)))
         bound[passed(intent, real.start, real.end)[0]] = np.inf
-        rows = np.flatnonzero(~(bound <= SURE * limit) & self.followed(moves))
+        rows = np.flatnonzero(~(bound <= SURE * limit) & self.followed(moves) & among)
         if not rows.size:
             return rows, None
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
@@ -192,43 +222,63 @@ class Planner:
         return bool(lengths(change[:, ~self.machine.rotary]).max(initial=0.0) <= NEARLY * JUMP)
 
 
-def follow_plainly(head: Moves, moves: Moves) -> bool:
-    """Whether motions are plain, go on from the last one before them, and from each other."""
-    if not (_is_plain(head) and _is_plain(moves)) or head.tool_length[0] != moves.tool_length[0]:
-        return False
+def plain_ones(head: Moves, moves: Moves) -> Mask | None:
+    """(n,) which motions are plain: straight ones of one frame and one tool, all words of which say where to go.
+
+    None unless all go on from each other, and from the last one before them, and the others are arcs and dwells.
+    """
+    tool, frame = moves.tool_length[0], moves.frame[0]
+    alike = (moves.frame == frame).all() and (moves.tool_length == tool).all() and head.tool_length[0] == tool
     joined = (head.end[0] == moves.start[0]).all() and (moves.start[1:] == moves.end[:-1]).all()
     rising = (moves.block[1:] > moves.block[:-1]).all()
-    turning = (moves.kind == Kind.FEED) & ~some((moves.start != moves.end)[:, ~moves.rotary])
-    return bool(joined and rising and not turning.any())
+    able = _may_be_planned(head) and _may_be_planned(moves) and _are_straight(head).all()
+    return _are_straight(moves) if alike and joined and rising and able else None
 
 
-def _is_plain(moves: Moves) -> bool:
-    """Straight motions of one frame and one tool that may be corrected, all words of which say where to go."""
-    rapid, cut = (moves.kind == Kind.RAPID) & (moves.modal == 0), (moves.kind == Kind.FEED) & (moves.modal == 10)
-    special = moves.incremental | moves.tcp | moves.compensated | (moves.rule != Rule.CORRECT) | ~(rapid | cut)
+def _may_be_planned(moves: Moves) -> bool:
+    """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
+    rule = (moves.rule != Rule.CORRECT) & (moves.kind != Kind.DWELL)
+    special = moves.incremental | moves.tcp | moves.compensated | rule | (moves.kind == Kind.CYCLE)
     columns = moves.approach, moves.counted, moves.held
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False
     timed = (moves.feed_mode == FeedMode.INVERSE_TIME).any()
-    alike = (moves.frame == moves.frame[0]).all() and (moves.tool_length == moves.tool_length[0]).all()
-    return bool(not timed and alike and (moves.placed is None or moves.placed.all()))
+    return bool(not timed and (moves.placed is None or moves.placed.all()))
 
 
-def pieces_of(real: Segments, over: Index, parts: Split | None) -> tuple[Pieces, Index]:
-    """The pieces of motions done as `real` has them, but for motions `over`, which are done in `parts`.
+def _are_straight(moves: Moves) -> Mask:
+    """(n,) straight motions; at feed only those along which linear axes move."""
+    rapid, cut = (moves.kind == Kind.RAPID) & (moves.modal == 0), (moves.kind == Kind.FEED) & (moves.modal == 10)
+    straight: Mask = rapid | (cut & some((moves.start != moves.end)[:, ~moves.rotary]))
+    return straight
+
+
+def pieces_of(real: Segments, over: Index, parts: Split | None, others: Others | None) -> tuple[Pieces, Index]:
+    """The pieces of motions done as `real` has them, but for motions `over`, done in `parts`, and for `others`.
 
     Also the first piece of each motion, and how many there are, (n + 1,).
     """
-    n = len(real)
-    counts = np.ones(n, dtype=np.intp)
+    counts = np.ones(len(real), dtype=np.intp)
     if parts is not None:
         counts[over] = parts.counts
-    first = offsets(counts)
-    m = int(first[-1])
-    move = np.arange(n) if m == n else owners(counts)
-    fraction, end = np.ones(m), real.end if m == n else picked(real.end, move)
+    if others is not None:
+        counts[others.rows] = others.counts
+    first, move = offsets(counts), owners(counts)
+    m = len(move)
+    fraction, end = np.ones(m), picked(real.end, move)
     if parts is not None:
-        at = np.repeat(first[:-1][over], parts.counts) + places(parts.counts)
+        at = _pieces_at(first, over, parts.counts)
         fraction[at], end[at] = parts.fraction, parts.end
-    none = np.broadcast_to(False, m)
-    return Pieces(move, fraction, end, none, np.broadcast_to(np.nan, (m, 3)), none), first
+    none, nowhere = np.broadcast_to(False, m), np.broadcast_to(np.nan, (m, 3))
+    if others is None:
+        return Pieces(move, fraction, end, none, nowhere, none), first
+    at, own = _pieces_at(first, others.rows, others.counts), others.pieces
+    arc, centre, kept = none.copy(), nowhere.copy(), none.copy()
+    fraction[at], end[at], arc[at], centre[at], kept[at] = own.fraction, own.end, own.arc, own.centre, own.kept
+    return Pieces(move, fraction, end, arc, centre, kept), first
+
+
+def _pieces_at(first: Index, rows: Index, counts: Index) -> Index:
+    """The pieces of motions `rows` (k,), of which there are so many."""
+    at: Index = np.repeat(first[:-1][rows], counts) + places(counts)
+    return at

@@ -15,27 +15,26 @@ from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
-from ncfix.compensate.plain_text import PlainText
 from ncfix.compensate.ragged import owners, places
 from ncfix.compensate.rows import greatest, lengths
 from ncfix.compensate.sampling import features, passed
 from ncfix.compensate.verify import STRAIGHT, FigureTally, PathError, Samples, samples
 from ncfix.compensate.written import Written
+from ncfix.program.emit import Emission
 from ncfix.program.moves import Kind
 from ncfix.program.pieces import Pieces
 
 
-def figures(course: Course, text: PlainText, rapids: bool) -> PathError:
+def figures(course: Course, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
-    moves = course.part.moves
-    start = np.concatenate([text.start[None], text.end[course.first[1:-1] - 1]])
-    end = text.end if course.single else text.end[course.first[1:] - 1]
-    shown = np.ones(len(moves), dtype=bool) if rapids else moves.kind == Kind.FEED
+    moves, start, end = course.part.moves, text.start, course.last(text.end)
+    shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
     tally, along = FigureTally(len(moves)), _in_pieces_or_kinked(course, start, end)
+    along |= ~course.plain | course.behind_dwells
     (_compiled if fast.engaged() else _by_columns)(course, text, (start, end), (shown, along), tally)
     rows = np.flatnonzero(along & shown)
     if rows.size:
-        for part in _along(course, text, start, rows):
+        for part in _along(course, text, rows):
             tally.add(part)
     return tally.result()
 
@@ -48,7 +47,7 @@ def _in_pieces_or_kinked(course: Course, start: Array, end: Array) -> Mask:
 
 
 def _by_columns(
-    course: Course, text: PlainText, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
+    course: Course, text: Emission, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
 ) -> None:
     """Count the errors at the ends of motions that need no more; the others are marked."""
     shown, along = masks
@@ -59,7 +58,7 @@ def _by_columns(
 
 
 def _compiled(
-    course: Course, text: PlainText, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
+    course: Course, text: Emission, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
 ) -> None:
     """As `_by_columns`."""
     from ncfix.compensate import plain_kernels
@@ -69,7 +68,7 @@ def _compiled(
     places[0] = 0
     plain_kernels.at_ends(
         (moves.start, moves.end),
-        (text.start, text.end, course.first),
+        (text.start[0], text.end, course.first),
         (course.wanted, course.before),
         (features(machine), np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
         (STRAIGHT, TURNED),
@@ -99,13 +98,12 @@ def _at_ends(course: Course, start: Array, end: Array, rows: Index) -> Samples:
     return Samples(rows, np.ones(len(rows)), course.before[chosen], lengths(off), way, 0.0, 0.0)
 
 
-def _along(course: Course, text: PlainText, start: Array, rows: Index) -> Iterator[Samples]:
+def _along(course: Course, text: Emission, rows: Index) -> Iterator[Samples]:
     """The errors along motions `rows` (k,)."""
     counts = np.diff(course.first)[rows]
     own = np.repeat(course.first[:-1][rows], counts) + places(counts)
     whole, no = course.pieces, np.broadcast_to(False, len(own))
-    nowhere = np.broadcast_to(np.nan, (len(own), 3))
-    pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], no, nowhere, no)
-    written = Written(course.intent, pieces, start)
-    known, easy = Known(course.before, course.wanted), np.zeros(len(start), dtype=bool)
-    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=easy)
+    pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
+    written = Written(course.intent, pieces, text.start)
+    known = Known(course.before, course.wanted)
+    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=course.behind_dwells)

@@ -89,7 +89,8 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     rows = np.arange(len(pieces)) if own is None else np.flatnonzero(own)
     if len(again) != len(rows):
         return None
-    differs: Mask = differ(again.end, picked(emission.end, rows)) | _strayed(settled, again, rows)
+    meant = emission.end if own is None else picked(emission.end, rows)
+    differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0

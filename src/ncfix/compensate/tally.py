@@ -99,17 +99,16 @@ class Tally:
         for finding in settled.plan.findings:
             self._note(finding, program, moves, own)
 
-    def add_plain(self, motions: int, lines: int, largest: float, changed: bool) -> None:
-        """Take in a part of nothing but motions that were corrected, each in a block of its own.
+    def add_plain(self, settled: Settled, largest: float) -> None:
+        """Take in a part of dwells and motions that were corrected, each in a block of its own.
 
-        lines    that were put in
         largest  shift of a linear command, mm
         """
-        self.moves += motions
-        self.compensated += motions
-        self.inserted += lines
+        self.moves += len(settled.moves)
+        self.compensated += int(np.count_nonzero(~settled.kept))
+        self.inserted += settled.emission.added_blocks
         self.largest = max(self.largest, largest)
-        self.changed |= changed
+        self.changed |= len(settled.emission.splices) > 0
 
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""

@@ -74,10 +74,7 @@ class Bulk:
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         if language.one_by_one is not None and fit.any():
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        breaks = np.ones(len(moves) + 1, dtype=np.bool_)
-        breaks[:-1] = ~fit
-        ends = np.append(np.flatnonzero(breaks[:-1]), len(moves))
-        stop = ends[np.searchsorted(ends, np.arange(len(moves) + 1))]
+        stop = _stops(fit)
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop)
@@ -94,50 +91,42 @@ class Bulk:
         self.parts.append(replace(splices, data=splices.data.translate(SWAPPED)) if comma else splices)
 
     @classmethod
-    def of_all(
-        cls, language: Language, program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, frame: Frame
+    def among(
+        cls,
+        language: Language,
+        program: Program,
+        moves: Moves,
+        pieces: Pieces,
+        first_piece: IntArray,
+        plain: Mask,
     ) -> Bulk | None:
-        """All motions as one stretch, where they follow each other plainly in this frame; None if they do not qualify.
+        """The stretches of `plain` motions (n,), all of one frame; None if the frame does not allow any.
 
         first_piece  (n + 1,) the first piece of each motion, and how many there are
         """
-        layouts, n = Layouts.of(language, program, moves), len(moves)
+        layouts = Layouts.of(language, program, moves)
+        if not _is_plain(moves.frames[int(moves.frame[0])]):
+            return None
         shapes = program.template[moves.block]
+        fit = plain & layouts.known[shapes]
         several = np.flatnonzero(np.diff(first_piece) > 1)
-        if not (_is_plain(frame) and layouts.known[shapes].all() and layouts.further[shapes[several]].all()):
-            return None
-        if language.one_by_one is not None and language.one_by_one(program, moves, pieces, first_piece).any():
-            return None
-        return cls(program, moves, pieces, first_piece, layouts, np.full(n + 1, n))
+        fit[several] &= layouts.further[shapes[several]]
+        if language.one_by_one is not None:
+            fit &= ~language.one_by_one(program, moves, pieces, first_piece)
+        return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
 
-    def take_all(self, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
-        """Write the stretch of all motions, as `take`; None if that is not clear to its end."""
-        parts: list[FloatArray] = []
-        row = 0
-        while row < len(self.moves):
-            ends = self.take(row, position, frame, decimals, shortest=1)
-            if ends is None:
-                return None
-            parts.append(ends)
-            position, done = ends[-1], self.first_piece[row] + len(ends)
-            row = int(np.searchsorted(self.first_piece, done))
-        return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-    def take(
-        self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray, shortest: int = SHORTEST
-    ) -> FloatArray | None:
+    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
         """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
 
         position  (n_axes,) the command at which the control stands
         decimals  (n_axes,) digits that the least increment needs
-        shortest  motions that it is worth to take together by columns
 
         Returns the commands (k, n_axes) at the ends of the pieces written, which are those of whole motions.
         """
         if fast.engaged():
             return self._compiled(row, position, frame, decimals)
         stop = min(int(self.stop[row]), row + LONGEST)
-        if stop - row < shortest:
+        if stop - row < SHORTEST:
             return None
         stretch = Stretch.of(self, row, stop, position, frame, decimals).clear_head()
         if not len(stretch.block):
@@ -191,6 +180,12 @@ class Bulk:
         rows = blocks[several > 0].astype(np.int64)
         leads = self.layouts.lead_ends(self.program, rows) - self.program.blocks[rows, 0]
         return lines * line + int((several[several > 0] * leads).sum())
+
+
+def _stops(fit: Mask) -> IntArray:
+    """(n + 1,) for each motion, and behind the last one, the first from there on that is not `fit` (n,)."""
+    ends = np.append(np.flatnonzero(~fit), len(fit))
+    return np.repeat(ends, np.diff(ends, prepend=-1))
 
 
 def _halves(decimals: IntArray) -> FloatArray:

@@ -88,6 +88,7 @@ def emit(
     reading: Reading | None = None,
     done: FloatArray | None = None,
     kinematics: Kinematics | None = None,
+    bulk: Bulk | None = None,
 ) -> Emission:
     """Write `pieces` into the program.
 
@@ -95,9 +96,11 @@ def emit(
     reading          what a control made of an earlier attempt, if it was not what was meant
     done             (n_axes,) the command at the end of the first motion, if that is written already
     kinematics       what the machine's own say where tool-centre-point control goes on or off; else an attempt shows it
+    bulk             the stretches of motions that all go on from each other, if known; then `done` is where they begin
     """
     reading = reading or Reading(moves.frame, moves.frames)
-    return _Emitter(program, moves, pieces, least_increment, reading, kinematics).run(done)
+    emitter = _Emitter(program, moves, pieces, least_increment, reading, kinematics, bulk)
+    return emitter.run(done, 0 if done is None or bulk is not None else 1)
 
 
 class _Emitter:
@@ -111,6 +114,7 @@ class _Emitter:
         least_increment: FloatArray,
         reading: Reading,
         kinematics: Kinematics | None,
+        bulk: Bulk | None,
     ) -> None:
         self.program = program
         self.kinematics = kinematics
@@ -122,7 +126,7 @@ class _Emitter:
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [frame.decimals(least_increment) for frame in self.frames]
         self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
-        self.jumps = _jumps(moves)
+        self.jumps = _jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
         self.wordless, self.increments = moves.wordless, moves.increments
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
@@ -139,11 +143,10 @@ class _Emitter:
         self.end = pieces.end.copy()
         self.centre = pieces.centre.copy()
         self.start = moves.start.copy()
-        self.bulk = Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
+        self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
 
-    def run(self, done: FloatArray | None = None) -> Emission:
-        """Walk all motions; from the second on if the command at the end of the first is given."""
-        row = 0 if done is None else 1
+    def run(self, done: FloatArray | None, row: int) -> Emission:
+        """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
         if done is not None:
             self.position = done.copy()
         while row < len(self.moves):

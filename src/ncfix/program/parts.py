@@ -201,7 +201,11 @@ def last_of(program: Program, moves: Moves) -> tuple[Program, Moves]:
     found = stretch(program, block, block + 1)
     columns = ("template", "blocks", "first_number", "number_spans", "numbers")
     alone = replace(found, **{name: getattr(found, name).copy() for name in columns})
-    rows = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
-    row: dict[str, Any] = {name: None if column is None else column[-1:].copy() for name, column in rows}
-    row["block"] -= np.int32(block)
-    return alone, Moves(**row, **{name: getattr(moves, name) for name in TABLES})
+    motion = taken(moves, np.array([len(moves) - 1]))
+    return alone, replace(motion, block=motion.block - np.int32(block))
+
+
+def taken(moves: Moves, rows: NDArray[np.intp]) -> Moves:
+    """Motions `rows` (k,) alone."""
+    columns = ((each.name, getattr(moves, each.name)) for each in fields(Moves) if each.name not in TABLES)
+    return replace(moves, **{name: column.take(rows, axis=0) for name, column in columns if column is not None})
