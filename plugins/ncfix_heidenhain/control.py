@@ -69,7 +69,7 @@ class Heidenhain(Control):
             "HEID-3",
             "BACKLASH is what counts for the axis itself instead of its own column while it travels towards minus.",
             "MANUALplus 620 technical manual: values measured in negative travel",
-            "the column is left out; --set backlash=on writes it",
+            "the column is left out, or (itnc530) repeats the axis's own; --set backlash=on writes it",
             "Load 0.000 in the axis column and 0.010 in BACKLASH, and read a dial gauge from both sides.",
         ),
         Assumption(
@@ -179,6 +179,9 @@ def _terms(axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Re
         scale = sense * unit_of(output)
         grid = Grid((axis,), (nodes,), (output,), scale * values[:, None])
         if output == axis and com.backlash is not None:
+            if values.any() and not com.backlash.any():
+                text = f"BACKLASH is zero in all rows: {axis} would not be corrected while it travels towards minus"
+                remarks.doubt(0, text, "the values of its own column, if there is no play (HEID-3)")
             back = Grid((axis,), (nodes,), (output,), scale * com.backlash[:, None])
             yield from (Term((grid,), (axis, 1)), Term((back,), (axis, -1)))
         else:

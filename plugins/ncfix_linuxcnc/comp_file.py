@@ -21,6 +21,8 @@ LONGEST = 255
 """Characters of a line that its reader takes."""
 STEEP = 0.01
 """Change of a correction per length from which it looks like a slip: real screws stay below a thousandth."""
+LARGE = 1.0
+"""mm, degree: no machine is that wrong."""
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 GAP = r"(?:\s+|(?=[-+]))"
 """What sscanf takes between two numbers."""
@@ -155,15 +157,29 @@ def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: floa
     if (steps <= 0).any():
         return None
     nodes, trims = rows[:, 0], rows[:, :1] - rows[:, 1:] if measured else rows[:, 1:]
-    _look_for_jumps(remarks, steps, trims)
+    if not _too_large(remarks, trims * scale, measured):
+        _look_for_jumps(remarks, steps, trims)
     stored: NDArray[np.float64] = trims.astype(np.float32).astype(np.float64) * scale
     return Joint(number, axis, nodes * scale, stored[:, 0], stored[:, 1])
+
+
+def _too_large(remarks: Remarks, trims: Array, measured: bool) -> bool:
+    """Whether the first correction that no machine needs is refused: most likely the file is of the other type."""
+    rows = np.flatnonzero(np.abs(trims).max(axis=1) > LARGE)
+    if rows.size:
+        size = trims[rows[0]][np.abs(trims[rows[0]]).argmax()]
+        other = "1, corrections" if measured else "0, actual positions"
+        text = f"a correction of {size:g}, which no machine needs: LinuxCNC would move there"
+        remarks.refuse(int(rows[0]) + 1, text, f"is it a file of COMP_FILE_TYPE {other}?")
+    return bool(rows.size)
 
 
 def _triples(remarks: Remarks) -> Iterator[tuple[float, float, float]]:
     """The points up to the first line that LinuxCNC's reader stops at."""
     for number, row in enumerate(remarks.rows, 1):
         match = TRIPLE.fullmatch(row)
+        if match is None and not any(each.strip() for each in remarks.rows[number - 1 :]):
+            return
         if match is None:
             what = "a blank line" if not row.strip() else "a decimal comma" if "," in row else "not three numbers"
             remarks.refuse(number, f"{what}: LinuxCNC stops reading here", "three numbers on every line, no comments")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -169,6 +170,8 @@ def test_broken_configurations(case: str) -> None:
 def test_what_is_doubtful() -> None:
     steep = CONTROL.lint(files(COM.replace(b"+0.0040", b"+0.4000")))
     assert [message.code for message in steep] == ["NCF492"]
+    unused = CONTROL.lint(files(re.sub(rb"(?m)^(\d+ +\S+ +)\S+", rb"\1+0.0000", COM)))
+    assert any("BACKLASH is zero in all rows" in message.text for message in unused), unused
     spare = CONTROL.lint({**files(), "AXIS_Y.COM": COM})
     assert any("not entered" in message.text for message in spare)
 

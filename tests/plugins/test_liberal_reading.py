@@ -143,8 +143,11 @@ def test_isg_tables_of_one_file_may_stand_one_after_the_other() -> None:
 
 def test_linuxcnc_takes_actual_positions_if_no_type_is_given() -> None:
     """Its source: comp_file_type = 0 unless the ini file says something else."""
-    _, files = fresh("linuxcnc")
-    said = {**files, "comp.ini": files["comp.ini"].replace(b"COMP_FILE_TYPE = 1", b"COMP_FILE_TYPE = 0")}
-    unsaid = {**files, "comp.ini": re.sub(rb"COMP_FILE_TYPE.*\n", b"", files["comp.ini"])}
+    said = {
+        "comp.ini": b"[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\n[JOINT_0]\nCOMP_FILE = x\nCOMP_FILE_TYPE = 0\n",
+        "x": b"-200 -200.001 -200.003\n300 300.002 299.999\n",
+    }
+    unsaid = {**said, "comp.ini": re.sub(rb"COMP_FILE_TYPE.*\n", b"", said["comp.ini"])}
+    assert at_poses("linuxcnc", said).any()
     assert (at_poses("linuxcnc", said) == at_poses("linuxcnc", unsaid)).all()
     assert any("takes 0" in message.text for message in get_control("linuxcnc").lint(unsaid))

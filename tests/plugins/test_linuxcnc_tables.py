@@ -77,6 +77,11 @@ BROKEN = {
     "lines that end in CR": (GOOD.replace(b"\n", b"\r"), "CR alone"),
     "a word": (GOOD.replace(b"0.001", b"nan"), "not three numbers"),
 }
+BROKEN |= {
+    "actual positions as corrections": (b"-10 -10.001 -9.999\n10 9.999 10.000\n", "no machine needs"),
+    "a blank line before more": (GOOD + b"\n\n30.0 0 0\n", "a blank line"),
+    "a comment at the end": (GOOD + b"# 30.0 0 0\n", "not three numbers"),
+}
 BROKEN_INI = {
     "no type": (INI.replace(b"COMP_FILE_TYPE = 1\n", b""), "has no COMP_FILE_TYPE"),
     "type 2": (INI.replace(b"TYPE = 1", b"TYPE = 2"), "COMP_FILE_TYPE = 2"),
@@ -100,6 +105,18 @@ def test_broken_tables(case: str) -> None:
 def test_broken_ini_files(case: str) -> None:
     content, expected = BROKEN_INI[case]
     assert any(expected in message.text for message in CONTROL.lint({"comp.ini": content, "x.comp": GOOD}))
+
+
+def test_corrections_as_actual_positions_are_refused_with_the_other_type() -> None:
+    ini = INI.replace(b"TYPE = 1", b"TYPE = 0")
+    (message,) = CONTROL.lint({"comp.ini": ini, "x.comp": GOOD})
+    assert (message.code, "COMP_FILE_TYPE 1, corrections?" in message.hint) == ("NCF491", True)
+
+
+def test_blank_lines_at_the_end_change_nothing() -> None:
+    files = {"comp.ini": INI, "x.comp": GOOD + b"\n  \n\n"}
+    assert not CONTROL.lint(files)
+    assert at(files, 99, 1) == pytest.approx(-0.001, abs=1e-9)  # float32 of 0.001
 
 
 def test_backlash_beside_a_table_is_doubtful() -> None:
