@@ -91,6 +91,13 @@ class Pointing:
         """Whether the tool would stand along the line of the outer axis."""
         return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
+    def stray(self, start: tuple[float, float], stop: tuple[float, float]) -> float:
+        """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
+        middle = self.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
+        half = self.at(*start) + self.at(*stop)
+        size = float(np.linalg.norm(half))
+        return math.pi if size < SAME else float(np.linalg.norm(middle - half / size))
+
     def _outer_angle(self, inner: float, wanted: Triple, near: float) -> float:
         outer = self.lines[0]
         start = _across(outer, _turned(self.lines[1], inner, self.lines[2]))

@@ -10,10 +10,9 @@ from ncfix.program.fanuc.rules import RULES
 from ncfix.program.fanuc.scaling import Scaling
 from ncfix.program.fanuc.variables import Variables
 from ncfix.program.follow.coordinates import INDEX
-from ncfix.program.moves import Kinematics
-from ncfix.program.pointing import Pointing
+from ncfix.program.language import Run
 from ncfix.program.rs274.control import Block, Control
-from ncfix.program.setup import POINTLESS, Setup
+from ncfix.program.setup import POINTLESS
 from ncfix.program.tree import Template
 
 NO_POINT = "NCF240"
@@ -32,19 +31,10 @@ class MacroControl(Control):
     defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
     dynamic        the work offset turns with the tables (G254 of Haas)
     vectors        the direction of the tool is given by I J K (G43.5)
-    points         somewhere in the program it has been
-    pointing       how the machine points its tool; empty until it is asked, None in it if it cannot be known
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        dialect: Dialect,
-        kinematics: Kinematics | None = None,
-    ) -> None:
-        super().__init__(setup, axes, rotary, dialect, kinematics, RULES[dialect.semantics])
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect, RULES[dialect.semantics])
         self.parameters: Variables = Variables()
         self.polar: tuple[float, float] | None = None
         self.scaling: Scaling | None = None
@@ -56,8 +46,6 @@ class MacroControl(Control):
         self.definition: dict[int, Block] = {}
         self.dynamic = False
         self.vectors = False
-        self.points = False
-        self.pointing: list[Pointing | None] = []
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

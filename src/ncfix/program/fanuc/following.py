@@ -8,7 +8,6 @@ is followed; that the text itself has none of that number is certain only at its
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.control import MacroControl
@@ -19,7 +18,6 @@ from ncfix.program.fanuc.outline import head_of
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.following import PartFollower
 from ncfix.program.language import Run
-from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.rs274.flow import NO_SUBPROGRAM
 from ncfix.program.rs274.following import PartInterpreter
@@ -122,7 +120,7 @@ class MacroFollower(PartFollower):
     interpreter: PartMacroInterpreter | None
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
-        super().__init__(MacroControl(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        super().__init__(MacroControl(run, dialect), run)
 
     @property
     def to_the_last(self) -> bool:
@@ -132,8 +130,3 @@ class MacroFollower(PartFollower):
     def begin(self, program: Program) -> PartMacroInterpreter:
         """What goes through the program, of which this is the first part."""
         return PartMacroInterpreter(self.control, program, self.resolve, self.budget(program))
-
-    def follow(self, program: Program, last: bool) -> Moves:
-        """The motions of the next part."""
-        moves = super().follow(program, last)
-        return replace(moves, pointing=self.control.pointing[0]) if self.control.points else moves

@@ -15,9 +15,8 @@ from ncfix.program.fanuc.corners import axes_of_corner, has_corners
 from ncfix.program.fanuc.following import MacroFollower, runs_straight_on
 from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.fanuc.render import render
-from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
-from ncfix.program.follow import rollover
+from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Run
 from ncfix.program.layout import CENTRE_LETTERS, Layout
 from ncfix.program.moves import Trace
@@ -37,7 +36,7 @@ def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
 
 def following(program: Program, run: Run) -> MacroInterpreter:
     """The control's walk through a program, before its first step."""
-    control = MacroControl(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    control = MacroControl(run, program.dialect)
     return MacroInterpreter(control, program, run.resolve, run.budget(program))
 
 
@@ -45,9 +44,7 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
     walk.run()
-    moves = replace(walk.control.builder.moves(), pointing=walk.control.pointing[0] if walk.control.points else None)
-    rollover.say(walk.control, program)
-    return finished(walk.control, program, moves)
+    return finished(walk.control, program, walk.control.moves())
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:

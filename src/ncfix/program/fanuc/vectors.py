@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.fanuc.squaring import pointing_of
 from ncfix.program.follow.coordinates import DEGREE, LETTERS, dot
 from ncfix.program.follow.faults import Fault
 from ncfix.program.pointing import Pointing, within
@@ -58,7 +57,7 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         return ""
     if block.runtime & set(COMPONENTS):
         return AT_RUNTIME
-    pointing = pointing_of(control)
+    pointing = control.pointing
     if pointing is None or control.kinematics is None:
         return NO_KINEMATICS
     control.settle(axes)
@@ -75,7 +74,7 @@ def directed(control: MacroControl, block: Block, motion: int) -> str:
         block.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
         block.axes |= 1 << index
     control.points = True
-    control.whole |= motion != 0 and stray(pointing, here, ways[0]) > FAR
+    control.whole |= motion != 0 and pointing.stray(here, ways[0]) > FAR
     return ""
 
 
@@ -100,15 +99,3 @@ def note_choice(
         names = [LETTERS[control.machine[column]] for column in pointing.columns]
         angles = " ".join(f"{name}{angle / DEGREE:.3f}" for name, angle in zip(names, ways[0], strict=True))
         control.warn(TURNED_TO, f"G43.5 is taken to turn to {angles}, the nearest of several ways", CHOICE)
-
-
-def stray(pointing: Pointing, start: tuple[float, float], stop: tuple[float, float]) -> float:
-    """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
-    middle = pointing.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
-    half = pointing.at(*start) + pointing.at(*stop)
-    size = float(np.linalg.norm(half))
-    return math.pi if size < BARE else float(np.linalg.norm(middle - half / size))
-
-
-BARE = 1e-9
-"""Two directions whose sum is shorter are opposite."""

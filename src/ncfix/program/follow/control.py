@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from functools import cached_property
 
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
-from ncfix.program.follow import contour
+from ncfix.program.follow import contour, tcp
 from ncfix.program.follow.builder import Arc, Builder, Style
 from ncfix.program.follow.coordinates import (
     DEGREE,
@@ -28,9 +30,10 @@ from ncfix.program.follow.coordinates import (
 from ncfix.program.follow.knowledge import Knowledge
 from ncfix.program.follow.modal import Modal, Offsets, Tools
 from ncfix.program.follow.places import Places, mask_of
-from ncfix.program.moves import Kind, Kinematics, Rule
+from ncfix.program.language import Run
+from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.pointing import Pointing
 from ncfix.program.recurrence import Budget
-from ncfix.program.setup import Setup
 
 AT_START = "where the axis {} stands when the program starts is not given"
 """Why a position is not known at first; asked of the setup when it matters."""
@@ -57,6 +60,7 @@ class Control(ABC):
     refusal    why every motion from here on is refused; empty while all is well
     suspended  the same, for as long as a code is in force
     increments what a number without a decimal point counts, linear and rotary words
+    points     a block gave the direction of the tool as a vector
     ends       where the motions of a block end, if somebody wants to know
     tilted     a tilted plane is in force, in which X Y Z are those of the tip
     whole      the motions of the block must not be split, as under cutter compensation
@@ -66,25 +70,20 @@ class Control(ABC):
     budget     how much may still be executed
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        dialect: Dialect,
-        kinematics: Kinematics | None = None,
-    ) -> None:
-        self.setup = setup
-        self.kinematics = kinematics
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        self.setup = run.setup
+        self.kinematics = run.kinematics
         self.dialect = dialect
-        self.machine = tuple(INDEX[axis] for axis in axes)
-        self.rotary = tuple((letter in rotary) if letter in axes else letter in ROTARY_LETTERS for letter in LETTERS)
-        self.builder = Builder(axes, rotary)
+        self.machine = tuple(INDEX[axis] for axis in run.axes)
+        self.rotary = tuple(
+            (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
+        )
+        self.builder = Builder(run.axes, run.rotary)
         self.needs_feed = False
         self.modal = Modal()
         self.offsets = Offsets()
-        self.knowledge = Knowledge(setup, self.place)
-        self.budget = Budget(setup.most_blocks, setup.most_blocks)
+        self.knowledge = Knowledge(run.setup, self.place)
+        self.budget = Budget(run.setup.most_blocks, run.setup.most_blocks)
         self.tools = Tools()
         self.messages: dict[str, Message] = {}
         self.foreign: dict[str, Message] = {}
@@ -92,11 +91,12 @@ class Control(ABC):
         self.suspended: dict[str, str] = {}
         self.increments = (1.0, 1.0)
         self.tilted = False
+        self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
         self.ends: list[Vector] | None = None
         self.external = ""
-        self.tcp = setup.tcp
+        self.tcp = run.setup.tcp
         self.shaky: Unknown = {}
         self.row_block = 0
         self.locate: Callable[[], Place] = lambda: Place("")
@@ -104,11 +104,11 @@ class Control(ABC):
         self.first = 0
         self.offset_checked = False
         self._frame = -1
-        self.places = Places.at_start(setup, axes, LETTERS)
+        self.places = Places.at_start(run.setup, run.axes, LETTERS)
         self.rotation: Rotation = IDENTITY
         self.position = zeros()
         self.unknown: Unknown = {}
-        self._start(axes)
+        self._start(run.axes)
 
     def _start(self, axes: tuple[str, ...]) -> None:
         """The start position, as far as it is given."""
@@ -118,6 +118,16 @@ class Control(ABC):
                 self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)
             else:
                 self.unknown[index] = AT_START
+
+    @cached_property
+    def pointing(self) -> Pointing | None:
+        """How the machine's two rotary axes point the tool; None if that cannot be known."""
+        return tcp.pointing_of(self)
+
+    def moves(self) -> Moves:
+        """The motions so far."""
+        moves = self.builder.moves()
+        return replace(moves, pointing=self.pointing) if self.points else moves
 
     def place(self) -> Place:
         """Where in the program we are."""

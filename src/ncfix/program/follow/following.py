@@ -62,7 +62,7 @@ class PartFollower(ABC):
             self.interpreter.next_part(program)
         self.control.builder.clear()
         self.interpreter.run_part(last, self.budget(program))
-        moves = self.control.builder.moves()
+        moves = self.control.moves()
         rollover.say(self.control, program)
         return moves
 

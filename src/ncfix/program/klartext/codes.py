@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 from ncfix.program.klartext.control import RETRACTED, Control
-from ncfix.program.klartext.posture import pointing_of
 from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words
 
@@ -58,7 +57,7 @@ def end_of_short_ways(control: Control, on: bool) -> None:
 
     M126 means nothing to an axis that cannot go round, as the one that tilts the tool: it may stand below zero.
     """
-    pointing = pointing_of(control) if on and control.shortest else None
+    pointing = control.pointing if on and control.shortest else None
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
     for index in control.machine if on and control.shortest else ():
         below = control.position[index] < 0 and index != tilts

@@ -18,8 +18,8 @@ from ncfix.program.klartext.calculate import Parameters, Scope
 from ncfix.program.klartext.free import Leg
 from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
-from ncfix.program.moves import Kind, Kinematics, Rule
-from ncfix.program.pointing import Pointing
+from ncfix.program.language import Run
+from ncfix.program.moves import Kind, Rule
 from ncfix.program.setup import Setup, Tool
 
 START = "PRESET"
@@ -94,34 +94,25 @@ class CycleInForce:
 
 
 class Control(base.Control):
-    """A TNC. Positions, motions and frames are kept as for the RS274 family."""
+    """A TNC: its transformations, Q parameters, path functions and cycles."""
 
-    def __init__(
-        self,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        dialect: Dialect,
-        kinematics: Kinematics | None = None,
-    ) -> None:
-        super().__init__(setup, axes, rotary, dialect, kinematics)
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect)
         self.transformations = Transformations()
         self.functions: frozenset[str] = frozenset()
-        self.scope = Scope(parameters=Parameters(dict(q_parameters(setup))))
+        self.scope = Scope(parameters=Parameters(dict(q_parameters(run.setup))))
         self.path = Path()
         self.cycle = CycleInForce()
         self.unit = 1.0
-        self.m128 = setup.tcp
+        self.m128 = run.setup.tcp
         self.shortest = False
-        self.pointing: Pointing | None = None
-        self.points = False
         self.stood: tuple[Vector, object] | None = None
         self.auto_feed = math.nan
         self.preset = ""
         self.preset_checked = False
         self.tool_called = False
         self.defined_tools: dict[int, Tool] = {}
-        self.load_preset(START if START in setup.work_offsets else "G54")
+        self.load_preset(START if START in run.setup.work_offsets else "G54")
 
     # -- coordinates --------------------------------------------------------------------------------------------------
 
@@ -219,7 +210,7 @@ class Control(base.Control):
         arc: Arc | None = None,
         settles: int | None = None,
     ) -> None:
-        """As for the RS274 family.
+        """As of every control.
 
         What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
         (PATHCTRL VECTOR), which in pieces would be turns of axes.
@@ -240,7 +231,7 @@ class Control(base.Control):
         self.whole = whole
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
-        """As for the RS274 family; a cycle begins with a rapid, so it does not matter where from."""
+        """As of every control; a cycle begins with a rapid, so it does not matter where from."""
         return super()._verdict(Kind.RAPID if kind == Kind.CYCLE else kind, unknown, refusal, passing)
 
     def is_led(self, unknown: Unknown) -> bool:

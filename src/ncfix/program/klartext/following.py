@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 
 import numpy as np
 
@@ -93,7 +92,7 @@ class KlartextFollower(PartFollower):
     shapes: int = 0
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
-        super().__init__(Control(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        super().__init__(Control(run, dialect), run)
         self.polar: list[int] = []
 
     @property
@@ -111,8 +110,7 @@ class KlartextFollower(PartFollower):
         self._check_poles(program)
         moves = super().follow(program, last)
         self._check_turns(program, moves)
-        pointing = self.control.pointing if self.control.points else None
-        return replace(moves, pointing=pointing)
+        return moves
 
     def _check_manner(self, source: bytes) -> None:
         """Raise `NotInPartsError` where numbers have points and commas."""

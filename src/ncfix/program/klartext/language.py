@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
+from ncfix.program.follow.finish import finished
 from ncfix.program.klartext.blocks import parse_block
 from ncfix.program.klartext.bulk import in_bulk, one_by_one
 from ncfix.program.klartext.control import Control
@@ -25,7 +24,7 @@ from ncfix.program.tree import Program
 
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
-    control = Control(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    control = Control(run, program.dialect)
     return Interpreter(control, program, run.resolve, run.budget(program))
 
 
@@ -33,9 +32,7 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a Klartext program; raises what `trace` does."""
     walk = following(program, run)
     walk.run()
-    control = walk.control
-    moves = replace(control.builder.moves(), pointing=control.pointing if control.points else None)
-    return finished(control, program, moves)
+    return finished(walk.control, program, walk.control.moves())
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z, as_rotation, zeros
+from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z, as_rotation
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
-from ncfix.program.pointing import Pointing, within
+from ncfix.program.pointing import within
 
 FloatArray = NDArray[np.float64]
 
@@ -87,26 +87,9 @@ def normal_of(tilt: Rotation) -> Triple:
     return tilt[0][2], tilt[1][2], tilt[2][2]
 
 
-def pointing_of(control: Control) -> Pointing | None:
-    """How the two rotary axes point the tool; None without kinematics, or with other than two of them."""
-    columns = [column for column, index in enumerate(control.machine) if control.rotary[index]]
-    if control.kinematics is None or len(columns) != 2 or not {X, Y, Z} <= set(control.machine):
-        return None
-    if control.pointing is None:
-
-        def directions(first: float, second: float) -> FloatArray:
-            position = zeros()
-            for column, angle in zip(columns, (first, second), strict=True):
-                position[control.machine[column]] = angle
-            return np.array(minus(tip(control, position, 0.0), tip(control, position, PROBE))) / PROBE
-
-        control.pointing = Pointing.of((columns[0], columns[1]), directions)
-    return control.pointing
-
-
 def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
     """The ways to point the tool within the travels, letter index -> rad, the nearest first; empty if none is known."""
-    pointing = pointing_of(control)
+    pointing = control.pointing
     if pointing is None:
         return []
     first, second = (control.machine[column] for column in pointing.columns)

@@ -10,10 +10,9 @@ from ncfix.program.follow import control as shared
 from ncfix.program.follow import rollover
 from ncfix.program.follow.coordinates import LETTERS, zeros
 from ncfix.program.follow.modal import Saved
-from ncfix.program.moves import Kinematics
+from ncfix.program.language import Run
 from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
 from ncfix.program.rs274.parameters import Parameters
-from ncfix.program.setup import Setup
 
 
 @dataclass(slots=True)
@@ -52,16 +51,8 @@ class Control(shared.Control):
     saved      the modal states that M70 saved, one place for each call level
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        dialect: Dialect,
-        kinematics: Kinematics | None = None,
-        rules: Rules | None = None,
-    ) -> None:
-        super().__init__(setup, axes, rotary, dialect, kinematics)
+    def __init__(self, run: Run, dialect: Dialect, rules: Rules | None = None) -> None:
+        super().__init__(run, dialect)
         self.rules: Rules = rules or (LINUXCNC if dialect.semantics == "linuxcnc" else ISO)
         self.needs_feed = self.modal.retract_to_r = self.rules.strict
         self.parameters = Parameters()

@@ -57,7 +57,7 @@ class RS274Follower(PartFollower):
     control: Control
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
-        super().__init__(Control(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        super().__init__(Control(run, dialect), run)
 
     def begin(self, program: Program) -> Walk:
         """What goes through the program, of which this is the first part."""

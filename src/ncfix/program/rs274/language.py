@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
-from ncfix.program.follow import rollover
+from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import AXIS_LETTERS, Layout, bulk_layout, has_free_text, layout_of
 from ncfix.program.moves import Trace
@@ -25,7 +24,7 @@ from ncfix.program.tree import Program, Word
 
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
-    control = Control(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    control = Control(run, program.dialect)
     return Interpreter(control, program, run.resolve, run.budget(program))
 
 
@@ -33,9 +32,7 @@ def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
     walk.run()
-    moves = walk.control.builder.moves()
-    rollover.say(walk.control, program)
-    return finished(walk.control, program, moves)
+    return finished(walk.control, program, walk.control.moves())
 
 
 def writable(program: Program, block: int) -> Layout | None:

@@ -7,8 +7,6 @@ change the tool by itself; and where a block has only one of AP and RP, all bloc
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ncfix.program import reach
@@ -16,7 +14,6 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.following import PartFollower
 from ncfix.program.language import Run
-from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.sinumerik.calling import NO_SUBPROGRAM
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
@@ -90,7 +87,7 @@ class SinumerikFollower(PartFollower):
     control: Sinumerik
 
     def __init__(self, dialect: Dialect, run: Run) -> None:
-        super().__init__(Sinumerik(run.setup, run.axes, run.rotary, dialect, run.kinematics), run)
+        super().__init__(Sinumerik(run, dialect), run)
 
     @property
     def to_the_last(self) -> bool:
@@ -103,8 +100,3 @@ class SinumerikFollower(PartFollower):
         if len(walk.units) > 1:
             raise NotInPartsError("the text holds several programs")
         return walk
-
-    def follow(self, program: Program, last: bool) -> Moves:
-        """The motions of the next part."""
-        moves = super().follow(program, last)
-        return replace(moves, pointing=self.control.pointing) if self.control.points else moves

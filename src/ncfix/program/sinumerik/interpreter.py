@@ -97,7 +97,7 @@ class Interpreter:
             self.again = sweep(self.course)
         except Fault as fault:
             raise self.error(fault) from None
-        return all_or_none(demoted(self.control.builder.moves(), self.again), self.units[0].program)
+        return all_or_none(demoted(self.control.moves(), self.again), self.units[0].program)
 
     def error(self, fault: Fault) -> SourceError:
         """What is wrong, with the place where it is."""

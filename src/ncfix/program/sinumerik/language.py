@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.finish import finished
 from ncfix.program.flatten import FlatLine
-from ncfix.program.follow import rollover
+from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import bulk_layout
 from ncfix.program.moves import Moves, Trace
@@ -34,16 +33,14 @@ SPATIAL = frozenset("XYZ")
 
 def following(program: Program, run: Run) -> Interpreter:
     """The control's walk through a program, before its first step."""
-    control = Sinumerik(run.setup, run.axes, run.rotary, program.dialect, run.kinematics)
+    control = Sinumerik(run, program.dialect)
     return Interpreter(control, program, run.resolve, run.budget(program))
 
 
 def follow(program: Program, run: Run) -> Trace:
     """The motions of a program of this family; raises what `trace` does."""
     walk = following(program, run)
-    moves, control = walk.run(), walk.control
-    rollover.say(control, program)
-    return finished(control, program, replace(moves, pointing=control.pointing) if control.points else moves)
+    return finished(walk.control, program, walk.run())
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:

@@ -114,7 +114,7 @@ def by_direction(control: Sinumerik, words: Words) -> str:
     control.points = True
     control.builder.says_the_way(sum(1 << index for index in columns))
     even = control.modes.orientation == BY_AXES or control.modal.motion == 0
-    words.whole |= not even and stray(pointing, here, ways[0]) > FAR
+    words.whole |= not even and pointing.stray(here, ways[0]) > FAR
     return ""
 
 
@@ -170,11 +170,3 @@ def note_choice(
         f"the tool is taken to turn to {angles}, the nearest of several ways",
         "state the rotary axes in the program if the control turns them otherwise",
     )
-
-
-def stray(pointing: Pointing, start: tuple[float, float], stop: tuple[float, float]) -> float:
-    """How far half-way the plane between two directions is from the direction at the mean angles, rad."""
-    middle = pointing.at((start[0] + stop[0]) / 2, (start[1] + stop[1]) / 2)
-    half = pointing.at(*start) + pointing.at(*stop)
-    size = float(np.linalg.norm(half))
-    return math.pi if size < 1e-9 else float(np.linalg.norm(middle - half / size))

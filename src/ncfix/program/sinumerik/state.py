@@ -1,19 +1,17 @@
 """The control while it follows a program: frames, modes, tool, variables, and where the axes stand.
 
-What is common to all controls (positions, motions, what is known and what is asked of the setup) is that of the RS274
-family; here is what SINUMERIK has of its own: a chain of frames, and a book of what is not known that is kept in the
-coordinates of the program, since in a turned frame one unknown coordinate would hide three axes.
+Positions, motions, what is known and what is asked of the setup are those of all controls. SINUMERIK has of its own a
+chain of frames, and a book of what is not known that is kept in the coordinates of the program, since in a turned frame
+one unknown coordinate would hide three axes.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import rollover, tcp
@@ -22,9 +20,8 @@ from ncfix.program.follow.control import AT_START, Control, Unknown
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.program.follow.modal import Modal
 from ncfix.program.follow.places import mask_of
-from ncfix.program.moves import Kind, Kinematics, Rule, TcpState
-from ncfix.program.pointing import Pointing
-from ncfix.program.setup import Setup
+from ncfix.program.language import Run
+from ncfix.program.moves import Kind, Rule
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
@@ -37,8 +34,6 @@ if TYPE_CHECKING:
 GEOMETRY = (X, Y, Z)
 TURNED = "where the axis {} stands in the turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
-PROBE = 128.0
-"""mm, the length of the tool that shows the direction; a power of two, so that dividing by it rounds nothing."""
 
 
 def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
@@ -61,22 +56,14 @@ class Sinumerik(Control):
     cornered  the last motion ended at a corner that the control rounds or breaks
     pattern  the places to which the last pattern of holes has led
     solitary  blocks after which no line may be put, since REPEAT would leave it out
-    points  a block gave the direction of the tool as a vector
     fresh_tool  a tool has been called since the last motion
     changed_by_cycle  a name that is not known has followed a call of a tool at once: it may be what changes it
     counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
     heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        axes: tuple[str, ...],
-        rotary: frozenset[str],
-        dialect: Dialect,
-        kinematics: Kinematics | None = None,
-    ) -> None:
-        super().__init__(setup, axes, rotary, dialect, kinematics)
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect)
         self.frames = Frames()
         self.modes = Modes()
         self.lost: Unknown = {}
@@ -84,18 +71,17 @@ class Sinumerik(Control):
         self.edge = 0
         self.at_start = True
         self.fresh_tool = self.changed_by_cycle = False
-        self.points = False
         self.pattern: tuple[tuple[float, float], ...] = ()
         self.heading: Sequence[float] | None = None
         self.whole = self.cornered = False
         self.solitary: frozenset[int] = frozenset()
-        self.variables = Variables.given(setup.variables)
+        self.variables = Variables.given(run.setup.variables)
         self.named = Named()
         self.refresh()
         self.lost = dict(self.unknown)
         self.counted: list[Footing] = list(self.footing)
         rollover.watch(self)
-        self.builder.winding = rollover.Winding(np.zeros(len(axes), dtype=np.bool_))
+        self.builder.winding = rollover.Winding(np.zeros(len(run.axes), dtype=np.bool_))
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
@@ -314,23 +300,6 @@ class Sinumerik(Control):
             return index
         style = self.builder.styles[index]
         return self.builder.style(style._replace(held=held, compensated=style.compensated or self.whole))
-
-    @cached_property
-    def pointing(self) -> Pointing | None:
-        """How the machine's two rotary axes point the tool; None if it has others, or nobody knows its kinematics."""
-        turning = [column for column, index in enumerate(self.machine) if self.rotary[index]]
-        kinematics = self.kinematics
-        if kinematics is None or len(turning) != 2:
-            return None
-
-        def ask(first: float, second: float) -> NDArray[np.float64]:
-            command = [0.0] * len(self.machine)
-            command[turning[0]], command[turning[1]] = first, second
-            tips = [kinematics(command, TcpState(False, long), TcpState(True, long)) for long in (PROBE, 0.0)]
-            places = [self.machine.index(index) for index in GEOMETRY]
-            return np.array([(tips[1][place] - tips[0][place]) / PROBE for place in places])
-
-        return Pointing.of((turning[0], turning[1]), ask)
 
     def _passes_zero(self, words: Words, target: Vector) -> bool:
         """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""

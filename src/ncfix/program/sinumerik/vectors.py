@@ -25,7 +25,7 @@ from ncfix.program.follow.lane import (
 )
 from ncfix.program.moves import FeedMode
 from ncfix.program.pointing import Pointing
-from ncfix.program.sinumerik.orientation import BY_AXES, FAR, NO_LENGTH, ON_CURVES, direction_of, is_choice, stray
+from ncfix.program.sinumerik.orientation import BY_AXES, FAR, NO_LENGTH, ON_CURVES, direction_of, is_choice
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unit import Unit
 
@@ -87,7 +87,7 @@ def turn(control: Sinumerik, pointing: Pointing, letters: list[int], vectors: Fl
         ways = pointing.angles(direction_of(control, (vector[0], vector[1], vector[2])), here)
         if not ways or is_choice(pointing, here, ways):
             break
-        if not is_even and stray(pointing, here, ways[0]) > FAR:
+        if not is_even and pointing.stray(here, ways[0]) > FAR:
             break
         one, other = (
             control.scale[index] * ((angle - control.offset[index]) / DEGREE) + control.offset[index]

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
-from ncfix.diagnostics import Message, UsageError
+from ncfix.diagnostics import UsageError
 from ncfix.program import stamp
-from ncfix.program.follow.knowledge import Knowledge
+from ncfix.program.follow import rollover
+from ncfix.program.follow.control import Control
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.tree import Program
 
 
-class Control(Protocol):
-    """A control that has followed a program.
-
-    foreign    axes that the program moves and the machine lacks
-    knowledge  what was not given, and what was assumed
-    messages   what else there is to say
-    """
-
-    foreign: dict[str, Message]
-    knowledge: Knowledge
-    messages: dict[str, Message]
-
-
 def finished(control: Control, program: Program, moves: Moves) -> Trace:
     """The trace of a program; raises UsageError with all that was not given."""
+    rollover.say(control, program)
     lacking = (*control.foreign.values(), *control.knowledge.missing.values())
     if lacking:
         raise UsageError.collected(lacking)
