@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.follow.coordinates import Vector, rotated
+from ncfix.program.follow.coordinates import rotated
 from ncfix.program.follow.places import mask_of
 
 if TYPE_CHECKING:
-    from ncfix.program.follow.control import Control, Unknown
+    from ncfix.program.follow.control import Control
+    from ncfix.program.follow.motion import Motion
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -35,18 +36,18 @@ def plane_of(control: Control) -> int:
     return mask_of((control.modal.plane.first, control.modal.plane.second)) & mask_of(control.machine)
 
 
-def resting(control: Control, axes: int, target: Vector, unknown: Unknown, *, straight: bool) -> int:
-    """Axes that must stay where they stand in a motion to a command with words for `axes`.
+def resting(control: Control, motion: Motion) -> int:
+    """Axes that must stay where they stand in a motion.
 
     Those of the plane, if it names some of them without any way in it; at a corner all others that make no way.
     """
     plane = plane_of(control)
-    beside = straight and bool(control.modal.compensated and axes & plane)
+    beside = motion.arc is None and bool(control.modal.compensated and motion.axes & plane)
     if not (beside or control.at_corner):
         return 0
-    way = [there - here for there, here in zip(target, control.position, strict=True)]
+    way = [there - here for there, here in zip(motion.target, control.position, strict=True)]
     way = rotated(control.inverse, way) if control.is_rotated else way
-    lacking = {*unknown, *control.unknown}
+    lacking = {*motion.unknown, *control.unknown}
     still = mask_of(index for index in control.machine if abs(way[index]) <= NO_WAY and index not in lacking)
     across = still & ~plane if control.at_corner else 0
     return across | (plane if beside and plane & ~still == 0 else 0)

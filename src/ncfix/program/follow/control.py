@@ -29,14 +29,12 @@ from ncfix.program.follow.coordinates import (
 )
 from ncfix.program.follow.knowledge import Knowledge
 from ncfix.program.follow.modal import Modal, Offsets, Tools
+from ncfix.program.follow.motion import AT_START, Motion, Unknown, blanked, first_reason
 from ncfix.program.follow.places import Places, mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pointing import Pointing
 from ncfix.program.recurrence import Budget
-
-AT_START = "where the axis {} stands when the program starts is not given"
-"""Why a position is not known at first; asked of the setup when it matters."""
 
 UNKNOWN_AXIS = "NCF206"
 
@@ -45,9 +43,6 @@ ADRIFT = "the program has not said where the axis {} stands, and this motion wou
 
 SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
-
-Unknown = dict[int, str]
-"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
 
 
 class Control(ABC):
@@ -238,42 +233,58 @@ class Control(ABC):
         arc: Arc | None = None,
         settles: int | None = None,
     ) -> None:
-        """A motion to `target` (not known along `unknown`), with the reason for which it is refused or passed.
+        """Make a motion; the arguments are those of `Motion`."""
+        self.make(Motion(kind, axes, target, unknown, code, refusal, passing, arc, settles))
 
-        settles  the axes whose words say where they stand afterwards; those of absolute words if not given
-        """
-        if not passing:
-            self._ask_for_start(kind, unknown)
-        if settles is None:
-            settles = 0 if passing or self.modal.incremental else axes
-        adrift = self._adrift(settles) | self.still_beside(axes)
-        if not passing and settles & axes != (0 if self.modal.incremental else axes):
-            self.builder.counted(axes & ~settles)
-        if not (passing or refusal or unknown) and (why := self._dragged(axes, adrift, target)):
-            refusal, passing = ("", why) if kind in (Kind.RAPID, Kind.FEED) else (why, "")
-        elif passing and kind != Kind.DWELL:
-            self.places.lose(mask_of(i for i in self.machine if axes >> i & 1 or target[i] != self.position[i]))
-        self.places.settle(settles)
-        self.places.lose(mask_of(unknown))
-        self.places.begun = True
-        rule, reason = self._verdict(kind, unknown, refusal, passing)
-        whole, self.whole = self.whole, self.whole or bool(self.beside & axes)
-        style = self._style(kind, rule, reason, code)
-        self.whole, self.beside = whole, self.beside & ~axes
-        if arc is not None:
-            self.builder.arc(arc)
-        if not passing and kind != Kind.DWELL:
-            self.builder.rests(contour.resting(self, axes, target, unknown, straight=arc is None))
-        start, end = self.position, target
-        if self.unknown:
-            start = blanked(start, self.unknown)
-        if unknown:
-            end = blanked(end, unknown)
-        self.builder.add(self.row_block, axes, style, self.modal.feed, start, end, adrift)
+    def make(self, motion: Motion) -> None:
+        """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
+        if not motion.passing:
+            self._ask_for_start(motion)
+        settles = self._settles(motion)
+        adrift = self._adrift(settles) | self.still_beside(motion.axes)
+        self._note_increments(motion, settles)
+        fate = self._dragged(motion, adrift)
+        self._keep_places(motion, settles)
+        style = self._style_of(fate)
+        self.beside &= ~fate.axes
+        if fate.arc is not None:
+            self.builder.arc(fate.arc)
+        if not fate.passing and fate.kind != Kind.DWELL:
+            self.builder.rests(contour.resting(self, fate))
+        start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
+        self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, adrift)
         if self.ends is not None:
-            self.ends.append(target[:])
-        self.position = target
-        self.unknown = unknown
+            self.ends.append(fate.target[:])
+        self.position, self.unknown = fate.target, fate.unknown
+
+    def _ask_for_start(self, motion: Motion) -> None:
+        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
+        kind, unknown = motion.kind, motion.unknown
+        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
+            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
+            self.settle(everywhere)
+            for index in [index for index, why in unknown.items() if why is AT_START]:
+                del unknown[index]
+
+    def _settles(self, motion: Motion) -> int:
+        """The axes whose words say where they stand behind the motion."""
+        if motion.settles is not None:
+            return motion.settles
+        return 0 if motion.passing or self.modal.incremental else motion.axes
+
+    def _note_increments(self, motion: Motion, settles: int) -> None:
+        """Some words of the motion count from where it starts, or do not, against the distance mode in force."""
+        if not motion.passing and settles & motion.axes != (0 if self.modal.incremental else motion.axes):
+            self.builder.counted(motion.axes & ~settles)
+
+    def _keep_places(self, motion: Motion, settles: int) -> None:
+        """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
+        if motion.passing and motion.kind != Kind.DWELL:
+            target, here = motion.target, self.position
+            self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
+        self.places.settle(settles)
+        self.places.lose(mask_of(motion.unknown))
+        self.places.begun = True
 
     def _adrift(self, settled: int) -> int:
         """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""
@@ -299,21 +310,20 @@ class Control(ABC):
         """Axes that are moved by words of others, since the frame is turned."""
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
 
-    def _dragged(self, axes: int, adrift: int, target: Vector) -> str:
-        """Why the motion cannot be corrected: it moves an axis that has no word and must get none; empty if it can."""
-        moved = mask_of(i for i in self.machine if target[i] != self.position[i])
-        if self.is_rotated and axes & self._turned():
+    def _dragged(self, motion: Motion, adrift: int) -> Motion:
+        """The motion, left as it is or refused if it moves an axis that has no word and must get none."""
+        if motion.passing or motion.refusal or motion.unknown:
+            return motion
+        moved = mask_of(i for i in self.machine if motion.target[i] != self.position[i])
+        if self.is_rotated and motion.axes & self._turned():
             moved |= self._turned()
-        index = next((i for i in self.machine if (adrift & moved & ~axes & self.places.adrift) >> i & 1), None)
-        return "" if index is None else ADRIFT.format(LETTERS[index])
-
-    def _ask_for_start(self, kind: Kind, unknown: Unknown) -> None:
-        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
-        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
-            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
-            self.settle(everywhere)
-            for index in [index for index, why in unknown.items() if why is AT_START]:
-                del unknown[index]
+        dragged = adrift & moved & ~motion.axes & self.places.adrift
+        index = next((i for i in self.machine if dragged >> i & 1), None)
+        if index is None:
+            return motion
+        why = ADRIFT.format(LETTERS[index])
+        straight = motion.kind in (Kind.RAPID, Kind.FEED)
+        return motion._replace(passing=why) if straight else motion._replace(refusal=why)
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
         """What may be done to the motion, and why."""
@@ -327,6 +337,14 @@ class Control(ABC):
         if not reason and self.external:
             reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
         return (Rule.REFUSE, reason) if reason else (Rule.CORRECT, "")
+
+    def _style_of(self, motion: Motion) -> int:
+        """The style of a motion; behind a contour the one that leads off stays whole."""
+        rule, reason = self._verdict(motion.kind, motion.unknown, motion.refusal, motion.passing)
+        whole, self.whole = self.whole, self.whole or bool(self.beside & motion.axes)
+        style = self._style(motion.kind, rule, reason, motion.code)
+        self.whole = whole
+        return style
 
     def style_of(self, kind: Kind, code: int) -> int:
         """The style of motions whose start and end are known and that have no reason of their own."""
@@ -359,14 +377,3 @@ class Control(ABC):
                 self.tilted,
             )
         )
-
-
-def blanked(position: Vector, unknown: Unknown) -> Vector:
-    """A position with NaN where it is not known."""
-    return [math.nan if index in unknown else value for index, value in enumerate(position)]
-
-
-def first_reason(unknown: Unknown) -> str:
-    """The reason for the first axis whose position is not known."""
-    index = min(unknown)
-    return unknown[index].format(LETTERS[index])

@@ -17,7 +17,8 @@ from ncfix.program.moves import TcpState
 from ncfix.program.pointing import Pointing
 
 if TYPE_CHECKING:
-    from ncfix.program.follow.control import Control, Unknown
+    from ncfix.program.follow.control import Control
+    from ncfix.program.follow.motion import Unknown
 
 PROBE = 128.0
 """mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""

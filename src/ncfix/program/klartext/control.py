@@ -9,10 +9,9 @@ from dataclasses import dataclass, field
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import control as base
 from ncfix.program.follow import tcp
-from ncfix.program.follow.builder import Arc
-from ncfix.program.follow.control import AT_START, Unknown, first_reason
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
 from ncfix.program.follow.knowledge import WORK_OFFSET
+from ncfix.program.follow.motion import AT_START, Motion, Unknown, first_reason
 from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.calculate import Parameters, Scope
 from ncfix.program.klartext.free import Leg
@@ -197,38 +196,30 @@ class Control(base.Control):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def move(
-        self,
-        kind: Kind,
-        axes: int,
-        target: Vector,
-        unknown: Unknown,
-        code: int,
-        *,
-        refusal: str = "",
-        passing: str = "",
-        arc: Arc | None = None,
-        settles: int | None = None,
-    ) -> None:
+    def make(self, motion: Motion) -> None:
         """As of every control.
 
         What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
         (PATHCTRL VECTOR), which in pieces would be turns of axes.
         """
-        if kind == Kind.RAPID and not refusal and AT_START in unknown.values():
-            passing = passing or first_reason(unknown)
-        own = axes | (1 << Z if code == BY_DEPTH else 0)
-        if settles is None:
-            settles = 0 if self.modal.incremental or passing.startswith("machine") else own
+        if motion.kind == Kind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
+            motion = motion._replace(passing=motion.passing or first_reason(motion.unknown))
         whole = self.whole
         self.tilted = self.transformations.tilted and not self.m128
-        turns = any(self.rotary[index] and axes >> index & 1 for index in self.machine)
+        turns = any(self.rotary[index] and motion.axes >> index & 1 for index in self.machine)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.whole = True
-        super().move(kind, axes, target, unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
+        super().make(motion)
         if self.is_rotated:
-            self.places.settle(settles)
+            self.places.settle(self._settles(motion))
         self.whole = whole
+
+    def _settles(self, motion: Motion) -> int:
+        """As of every control; a cycle with depths from the datum says where the tool axis stands, too."""
+        if motion.settles is not None:
+            return motion.settles
+        own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
+        return 0 if self.modal.incremental or motion.passing.startswith("machine") else own
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
         """As of every control; a cycle begins with a rapid, so it does not matter where from."""
@@ -241,14 +232,14 @@ class Control(base.Control):
     def refuse_here(self, reason: str) -> None:
         """A motion that is not followed: none of the axes is known afterwards."""
         unknown = dict.fromkeys(self.machine, f"where the axis {{}} stands is not known after this: {reason}")
-        super().move(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason)
+        super().make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
         self.path.tangent = None
 
     def pass_here(self, reason: str, lost: str, letters: str) -> None:
         """A motion of the control's own; these axes are not known afterwards."""
         unknown = dict(self.unknown)
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
-        super().move(Kind.RAPID, 0, self.position[:], unknown, 0, passing=reason)
+        super().make(Motion(Kind.RAPID, 0, self.position[:], unknown, 0, passing=reason))
         self.path.tangent = None
 
 

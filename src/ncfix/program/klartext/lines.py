@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 
 from ncfix.program.follow import tcp
-from ncfix.program.follow.control import Unknown
 from ncfix.program.follow.coordinates import LETTERS, Vector, dot
+from ncfix.program.follow.motion import Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import DEPARTED, Control
 from ncfix.program.klartext.posture import angles_for

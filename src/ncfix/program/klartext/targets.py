@@ -11,9 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from ncfix.program.follow.control import ADRIFT, AT_START, Unknown
+from ncfix.program.follow.control import ADRIFT
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import AT_START, Unknown
 from ncfix.program.klartext.control import SPATIAL, Control
 
 BAD_POLE = "NCF271"

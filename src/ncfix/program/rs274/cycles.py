@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 
-from ncfix.program.follow.control import Unknown
 from ncfix.program.follow.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Unknown
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ncfix.program.follow import tcp
-from ncfix.program.follow.control import Unknown
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Unknown
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.feeds import check_feed

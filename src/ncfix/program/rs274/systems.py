@@ -6,7 +6,6 @@ Source: LinuxCNC documentation, "Coordinate systems", "G10 L2", "G10 L20". Param
 
 from __future__ import annotations
 
-from ncfix.program.follow.control import Unknown
 from ncfix.program.follow.coordinates import (
     DEGREE,
     IDENTITY,
@@ -23,6 +22,7 @@ from ncfix.program.follow.coordinates import (
     transposed,
 )
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control

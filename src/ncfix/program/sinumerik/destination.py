@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from ncfix.program.follow.control import Unknown
 from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.sinumerik.increments import unsteady
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik

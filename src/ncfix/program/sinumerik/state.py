@@ -16,9 +16,10 @@ import numpy as np
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import rollover, tcp
 from ncfix.program.follow.builder import Arc
-from ncfix.program.follow.control import AT_START, Control, Unknown
+from ncfix.program.follow.control import Control
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.program.follow.modal import Modal
+from ncfix.program.follow.motion import AT_START, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule

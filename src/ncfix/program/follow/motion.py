@@ -1,0 +1,51 @@
+"""A motion as a block means it, and what is not known of where it leads."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ncfix.program.follow.builder import Arc
+from ncfix.program.follow.coordinates import LETTERS, Vector
+from ncfix.program.moves import Kind
+
+AT_START = "where the axis {} stands when the program starts is not given"
+"""Why a position is not known at first; asked of the setup when it matters."""
+
+Unknown = dict[int, str]
+"""Letter index -> why the position of the axis is not known, with a `{}` for its letter."""
+
+
+class Motion(NamedTuple):
+    """One motion of the control.
+
+    axes     axes with a word, as bits
+    target   the command at its end, of every letter; a nominal value along `unknown`
+    code     the motion code, in tenths
+    refusal  why it is refused; empty if it is not
+    passing  why it is passed as it is; empty if it is not
+    settles  the axes whose words say where they stand afterwards; None: those of absolute words
+    """
+
+    kind: Kind
+    axes: int
+    target: Vector
+    unknown: Unknown
+    code: int
+    refusal: str = ""
+    passing: str = ""
+    arc: Arc | None = None
+    settles: int | None = None
+
+
+def blanked(position: Vector, unknown: Unknown) -> Vector:
+    """A position with NaN where it is not known."""
+    if not unknown:
+        return position
+    return [math.nan if index in unknown else value for index, value in enumerate(position)]
+
+
+def first_reason(unknown: Unknown) -> str:
+    """The reason for the first axis whose position is not known."""
+    index = min(unknown)
+    return unknown[index].format(LETTERS[index])
