@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from ncfix.program.language import BulkLayout
@@ -50,51 +51,71 @@ class Layout:
     allowed: frozenset[str] | None = None
 
 
+class BlockWords:
+    """The words of one block, by their address and by their code, and where others go beside them."""
+
+    def __init__(self, program: Program, block: int) -> None:
+        self.program, self.block = program, block
+        self.items = program.items_of(block)
+        self.words = [item for item in self.items if isinstance(item, Word)]
+        self.by_address = {word.address: word for word in self.words}
+        self.axes = {word.address: word for word in self.words if word.address in AXIS_LETTERS}
+
+    def some(self, addresses: Iterable[str]) -> dict[str, Word]:
+        """Those of these addresses that the block has, in this order."""
+        return {address: self.by_address[address] for address in addresses if address in self.by_address}
+
+    def coded(self, address: str, codes: frozenset[float]) -> tuple[Word, ...]:
+        """The words of an address that have one of these codes."""
+        return tuple(word for word in self.words if word.address == address and self._code(word) in codes)
+
+    def first_coded(self, address: str, codes: frozenset[float]) -> Word | None:
+        """The first of them."""
+        return next(iter(self.coded(address, codes)), None)
+
+    @property
+    def skip(self) -> Span | None:
+        """Where block skip stands."""
+        return next((item.span for item in self.items if isinstance(item, Skip)), None)
+
+    def beside(self, words: Sequence[Word]) -> tuple[Anchor, Anchor, str]:
+        """The places behind and before some words, and what stands before the last of them: a blank or nothing."""
+        last = max(words, key=lambda word: self.program.position(self.block, word.span.stop))
+        first = min(words, key=lambda word: self.program.position(self.block, word.span.start))
+        return last.span.stop, first.span.start, self._separator(last)
+
+    def _code(self, word: Word) -> float | None:
+        if isinstance(word.value, Constant):
+            return word.value.value
+        values = self.program.values_of(self.block)
+        return float(values[word.value.slot]) if isinstance(word.value, Literal) else None
+
+    def _separator(self, word: Word) -> str:
+        at = self.program.position(self.block, word.span.start)
+        if at == int(self.program.blocks[self.block, 0]):
+            return " "
+        before = self.program.source[at - 1 : at]
+        return before.decode("latin-1") if before in (b" ", b"\t") else ""
+
+
 def layout_of(program: Program, block: int) -> Layout:
     """The layout of a motion block."""
-    items = program.items_of(block)
-    words = [item for item in items if isinstance(item, Word)]
-    axes = {word.address: word for word in words if word.address in AXIS_LETTERS}
-    anchor_words = list(axes.values()) or words
-    last = max(anchor_words, key=lambda word: program.position(block, word.span.stop))
-    first = min(anchor_words, key=lambda word: program.position(block, word.span.start))
-    by_letter = {word.address: word for word in words}
+    words = BlockWords(program, block)
+    words_at, code_at, blank = words.beside(list(words.axes.values()) or words.words)
     return Layout(
-        axes=axes,
-        centre={letter: by_letter[letter] for letter in CENTRE_LETTERS if letter in by_letter},
-        radius=by_letter.get("R"),
-        turns=by_letter.get("P"),
-        feed=by_letter.get("F"),
-        motion=_coded(program, block, words, "G", MOTION_CODES),
-        feed_mode=_coded(program, block, words, "G", PER_MINUTE),
-        after=tuple(word for word in words if _code(program, block, word, "M") in CODES_AFTER_MOTION),
-        words_at=last.span.stop,
-        code_at=first.span.start,
-        blank=_separator(program, block, last),
-        prefix=next((item.span for item in items if isinstance(item, Skip)), None),
+        axes=words.axes,
+        centre=words.some(CENTRE_LETTERS),
+        radius=words.by_address.get("R"),
+        turns=words.by_address.get("P"),
+        feed=words.by_address.get("F"),
+        motion=words.first_coded("G", MOTION_CODES),
+        feed_mode=words.first_coded("G", PER_MINUTE),
+        after=words.coded("M", CODES_AFTER_MOTION),
+        words_at=words_at,
+        code_at=code_at,
+        blank=blank,
+        prefix=words.skip,
     )
-
-
-def _code(program: Program, block: int, word: Word, address: str) -> float | None:
-    if word.address != address:
-        return None
-    if isinstance(word.value, Constant):
-        return word.value.value
-    return float(program.values_of(block)[word.value.slot]) if isinstance(word.value, Literal) else None
-
-
-def _coded(program: Program, block: int, words: list[Word], address: str, codes: frozenset[float]) -> Word | None:
-    return next((word for word in words if _code(program, block, word, address) in codes), None)
-
-
-def _separator(program: Program, block: int, word: Word) -> str:
-    """The blank before the last axis word, if its block uses blanks between words."""
-    at = program.position(block, word.span.start)
-    start = int(program.blocks[block, 0])
-    if at == start:
-        return " "
-    before = program.source[at - 1 : at]
-    return before.decode("latin-1") if before in (b" ", b"\t") else ""
 
 
 def has_free_text(program: Program, block: int) -> bool:

@@ -12,6 +12,7 @@ from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.follow.modal import NO_MOTION
+from ncfix.program.reach import UNREAD
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.groups import TOOL_CHANGE, Rules
@@ -133,35 +134,52 @@ def words_of(words: Sequence[Word], address: str) -> list[Word]:
 
 def plan_of(template: Template, rules: Rules) -> Plan:
     """The plan for a shape."""
-    words = template.words
-    standby = words_of(words, "T")[1:] if TOOL_CHANGE in template.m_codes else []
-    values = [word for word in words if word.address not in NO_WORDS and word not in standby]
-    code_words = [word for word in words if word.address in "GM"]
     plan = Plan(template)
-    plan.literals = tuple((w.address, w.value.slot) for w in values if isinstance(w.value, Literal))
+    take_values(plan, rules)
+    take_statements(plan, rules)
+    take_codes(plan, rules)
+    plan.lane = lane_of(plan)
+    return plan
+
+
+def take_values(plan: Plan, rules: Rules) -> None:
+    """The words that come as values to the steps of the block."""
+    words = plan.template.words
+    standby = words_of(words, "T")[1:] if TOOL_CHANGE in plan.template.m_codes else []
+    values = [word for word in words if word.address not in NO_WORDS and word not in standby]
+    plain = [(word.address, word.value) for word in values if isinstance(word.value, Literal)]
     computed = [word for word in values if not isinstance(word.value, Literal)]
+    plan.literals = tuple((address, value.slot) for address, value in plain)
+    plan.pointless = tuple(address for address, value in plain if value.pointless)
     plan.computed = tuple((w.address, rules.compiled(w.value, w.address), w.span) for w in computed)
-    plan.pointless = tuple(w.address for w in values if isinstance(w.value, Literal) and w.value.pointless)
     plan.letters = frozenset(word.address for word in values)
     plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
     if plan.letters & POLAR:
         plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
-    plan.assignments = tuple(assignment(item, rules) for item in template.items if isinstance(item, Assignment))
-    plan.flow = next((flow_line(item, rules) for item in template.items if isinstance(item, Flow)), None)
-    plan.skip = any(isinstance(item, Skip) for item in template.items)
-    plan.tape = any(isinstance(item, Tape) for item in template.items)
-    plan.unread = any(isinstance(item, Opaque) and item.kind == "unread" for item in template.items)
-    plan.command = next((i.span for i in template.items if isinstance(i, Opaque) and i.kind == "command"), None)
-    if all(isinstance(word.value, Constant) for word in code_words):
-        pairs = [(word, round(10 * word.value.value)) for word in code_words if isinstance(word.value, Constant)]
-        try:
-            plan.codes = grouped_codes(pairs, plan.letters, rules)
-        except Fault as fault:
-            plan.fault = fault
-    else:
-        plan.code_words = tuple((word, rules.compiled(word.value, word.address)) for word in code_words)
-    plan.lane = lane_of(plan)
-    return plan
+
+
+def take_statements(plan: Plan, rules: Rules) -> None:
+    """What the block is besides words."""
+    items = plan.template.items
+    plan.assignments = tuple(assignment(item, rules) for item in items if isinstance(item, Assignment))
+    plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, Flow)), None)
+    plan.skip = any(isinstance(item, Skip) for item in items)
+    plan.tape = any(isinstance(item, Tape) for item in items)
+    opaque = {item.kind: item.span for item in items if isinstance(item, Opaque)}
+    plan.unread, plan.command = UNREAD in opaque, opaque.get("command")
+
+
+def take_codes(plan: Plan, rules: Rules) -> None:
+    """The codes of the block, by group if they are plain numbers."""
+    words = [word for word in plan.template.words if word.address in "GM"]
+    plain = [(word, round(10 * word.value.value)) for word in words if isinstance(word.value, Constant)]
+    if len(plain) < len(words):
+        plan.code_words = tuple((word, rules.compiled(word.value, word.address)) for word in words)
+        return
+    try:
+        plan.codes = grouped_codes(plain, plan.letters, rules)
+    except Fault as fault:
+        plan.fault = fault
 
 
 def has_words(plan: Plan) -> bool:

@@ -5,21 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ncfix.program.layout import (
-    AXIS_LETTERS,
     CENTRE_LETTERS,
     CODES_AFTER_MOTION,
     MOTION_CODES,
     PER_MINUTE,
+    BlockWords,
     Layout,
-    _code,
-    _coded,
-    _separator,
 )
 from ncfix.program.sinumerik.circles import VIA
 from ncfix.program.sinumerik.orientation import ANGLES, VECTOR
 from ncfix.program.sinumerik.poles import has_partial
 from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS, POLAR
-from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Skip, Tape, Word
+from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Tape, Word
+
+END_OF_SUBPROGRAM = frozenset({17.0})
+"""M17."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,38 +49,34 @@ class SinumerikLayout(Layout):
 
 def layout_of(program: Program, block: int) -> SinumerikLayout | None:
     """The layout of a motion block; None for control structures, calls, and what is not understood."""
-    items = program.items_of(block)
-    if not all((isinstance(item, Command) and is_quiet(item)) or may_stay(item) for item in items):
+    words = BlockWords(program, block)
+    if not all((isinstance(item, Command) and is_quiet(item)) or may_stay(item) for item in words.items):
         return None
-    words = [item for item in items if isinstance(item, Word)]
-    numbered = [word for word in words if word.address not in ("N", ":")]
-    axes = {word.address: word for word in words if word.address in AXIS_LETTERS}
-    anchors = list(axes.values()) or numbered or words
+    numbered = [word for word in words.words if word.address not in ("N", ":")]
+    anchors = list(words.axes.values()) or numbered or words.words
     if not anchors:
         return None
-    last = max(anchors, key=lambda word: program.position(block, word.span.stop))
-    first = min(anchors, key=lambda word: program.position(block, word.span.start))
-    by_address = {word.address: word for word in words}
-    polar = {address: by_address[address] for address in sorted(POLAR) if address in by_address}
+    words_at, code_at, blank = words.beside(anchors)
+    polar = words.some(sorted(POLAR))
     return SinumerikLayout(
-        axes=axes,
-        centre={letter: by_address[letter] for letter in CENTRE_LETTERS if letter in by_address},
-        radius=by_address.get("CR"),
-        turns=by_address.get("TURN"),
-        feed=by_address.get("F"),
-        motion=_coded(program, block, words, "G", MOTION_CODES) or named_motion(program, block),
-        feed_mode=_coded(program, block, words, "G", PER_MINUTE),
-        after=tuple(word for word in words if acts_later(program, block, word)),
-        words_at=last.span.stop,
-        code_at=first.span.start,
-        blank=_separator(program, block, last),
-        prefix=next((item.span for item in items if isinstance(item, Skip)), None),
-        via={address: by_address[address] for address in VIA if address in by_address},
-        angle=by_address.get("AR"),
+        axes=words.axes,
+        centre=words.some(CENTRE_LETTERS),
+        radius=words.by_address.get("CR"),
+        turns=words.by_address.get("TURN"),
+        feed=words.by_address.get("F"),
+        motion=words.first_coded("G", MOTION_CODES) or named_motion(program, block),
+        feed_mode=words.first_coded("G", PER_MINUTE),
+        after=words.coded("M", CODES_AFTER_MOTION | END_OF_SUBPROGRAM),
+        words_at=words_at,
+        code_at=code_at,
+        blank=blank,
+        prefix=words.skip,
+        via=words.some(VIA),
+        angle=words.by_address.get("AR"),
         polar=polar,
         partial_polar=bool(polar) and has_partial(program),
-        vector={address: by_address[address] for address in VECTOR if address in by_address},
-        angles={address: by_address[address] for address in ANGLES if address in by_address},
+        vector=words.some(VECTOR),
+        angles=words.some(ANGLES),
     )
 
 
@@ -102,8 +98,3 @@ def named_motion(program: Program, block: int) -> Word | None:
         if isinstance(item, Command) and item.name in MOTIONS:
             return Word(item.name.upper(), Constant(MOTIONS[item.name] / 10), item.span, item.span)
     return None
-
-
-def acts_later(program: Program, block: int, word: Word) -> bool:
-    """Whether a word acts at the end of the motion."""
-    return _code(program, block, word, "M") in CODES_AFTER_MOTION | {17.0}
