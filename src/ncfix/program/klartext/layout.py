@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from ncfix.program.klartext.plans import FUNCTIONS, OPENING, owners
+from ncfix.program.klartext.plans import opens_block, own_words
 from ncfix.program.klartext.poles import in_lines
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.tree import (
@@ -122,17 +122,14 @@ def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
     """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
     items = shape.template.items
     commands = [item for item in items if isinstance(item, Command)]
-    owned = owners(items)
-    words = [w for k, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and k not in owned]
-    functions = [c for c in commands if c.name in FUNCTIONS or c.name.startswith(OPENING)]
-    function = functions[0] if functions else None
+    words = own_words(items)
+    function = next((command for command in commands if opens_block(command.name)), None)
     axes = {w.address.removeprefix("I"): w for w in words if w.address.removeprefix("I") in AXIS_LETTERS}
     polar = tuple(word for word in words if word.address in POLAR)
     vector = {word.address: word for word in words if word.address in ("TX", "TY", "TZ")}
-    if 0 < len(vector) < 3 or any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar):
+    if 0 < len(vector) < 3 or has_computed_angle(polar):
         return None
     leading = [*axes.values(), *polar]
-    begins = [item.span.start for item in items if not isinstance(item, Skip) and item not in numbers_of(items)]
     last = max(leading, key=lambda word: word.span.stop, default=None)
     layout = Layout(
         name=function.name if function else "",
@@ -142,17 +139,31 @@ def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
         radius=next((word for word in words if word.address == "R"), None),
         sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
         vector=vector,
-        late=tuple(
-            w for w in words if w.address == "M" and isinstance(w.value, Constant) and int(w.value.value) in LATE
-        ),
+        late=tuple(filter(acts_late, words)),
         words_at=last.span.stop if last else function.span.stop if function else Anchor(-1, 0),
-        starts_at=begins[0] if begins else Anchor(-1, 0),
+        starts_at=start_of(items),
         blank=" ",
         comma=False,
         rapid=any(command.name == "fmax" for command in commands),
         corner=False,
     )
     return layout, last
+
+
+def has_computed_angle(polar: Sequence[Word]) -> bool:
+    """Whether the angle of a CP is no plain number."""
+    return any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar)
+
+
+def acts_late(word: Word) -> bool:
+    """Whether a word is an M code that acts at the end of its block."""
+    return word.address == "M" and isinstance(word.value, Constant) and int(word.value.value) in LATE
+
+
+def start_of(items: Sequence[Item]) -> Anchor:
+    """Where the block begins behind its number and block skip."""
+    begins = (item.span.start for item in items if not (isinstance(item, Skip) or is_number(item)))
+    return next(begins, Anchor(-1, 0))
 
 
 def is_corner(program: Program, block: int, way: int) -> bool:
@@ -182,13 +193,12 @@ def is_between(items: Sequence[Item]) -> bool:
 def is_remark(item: Item) -> bool:
     """A comment, a structuring remark, the block number, block skip."""
     structure = isinstance(item, Opaque) and item.kind == "structure"
-    number = isinstance(item, Word) and item.address == "N"
-    return structure or number or isinstance(item, (Comment, Skip))
+    return structure or is_number(item) or isinstance(item, (Comment, Skip))
 
 
-def numbers_of(items: tuple[object, ...]) -> list[object]:
-    """The block number, as an item."""
-    return [item for item in items if isinstance(item, Word) and item.address == "N"]
+def is_number(item: Item) -> bool:
+    """The block number."""
+    return isinstance(item, Word) and item.address == "N"
 
 
 def separator(program: Program, block: int, word: Word | None) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ncfix.program.klartext.calculate import Evaluate, compiled
 from ncfix.program.reach import UNREAD
@@ -13,6 +13,7 @@ from ncfix.program.tree import (
     Constant,
     Flow,
     Item,
+    NamedParameter,
     Opaque,
     Skip,
     Span,
@@ -53,6 +54,7 @@ class Plan:
     spans        address -> where the word stands
     skip         the block may be skipped
     moves        the block has words of axes or of polar coordinates
+    empty        the block does nothing
     """
 
     name: str = ""
@@ -67,8 +69,14 @@ class Plan:
     spans: Mapping[str, Span] = field(default_factory=dict)
     skip: bool = False
     moves: bool = False
-    empty: bool = True
+    empty: bool = False
 
+
+CORNERS = frozenset({"RND", "CHF"})
+"""Words that are a path function by themselves."""
+
+STATEMENTS = frozenset({"program", "statement", UNREAD})
+"""Kinds of text that is not taken apart."""
 
 MOVING = frozenset(
     [letter for axis in "XYZABCUVW" for letter in (axis, "I" + axis)] + ["PA", "IPA", "PR", "IPR"],
@@ -89,51 +97,69 @@ def owners(items: Sequence[Item]) -> dict[int, int]:
     return found
 
 
-def plan_of(template: Template) -> Plan:
-    """Work out what the blocks of one shape do."""
-    name, flags, assignments = "", set(), []
-    words: dict[str, Evaluate] = {}
-    spans: dict[str, Span] = {}
+def opens_block(name: str) -> bool:
+    """Whether a block begins with this, so that it is no block of words alone."""
+    return name in FUNCTIONS or name.startswith(OPENING)
+
+
+def own_words(items: Sequence[Item]) -> list[Word]:
+    """The words of the block itself: not its number, and not what belongs to M codes."""
+    owned = owners(items)
+    return [w for place, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and place not in owned]
+
+
+def codes_of(items: Sequence[Item]) -> tuple[tuple[int, Mapping[str, Evaluate]], ...]:
+    """The M codes, each with the words that are its own."""
+    owned = owners(items)
     codes: list[tuple[int, dict[str, Evaluate]]] = []
-    rest: dict[str, object] = {}
-    owner = owners(template.items)
-    for place, item in enumerate(template.items):
+    for place, item in enumerate(items):
         match item:
-            case Skip():
-                rest["skip"] = True
-            case Command(text) if not name and (text in FUNCTIONS or text.startswith(OPENING)):
-                name = text
-            case Command(text):
-                flags.add(text)
-            case Word("N"):
-                continue
             case Word("M", Constant(value)):
                 codes.append((int(value), {}))
-            case Word(address, value) if place in owner:
+            case Word(address, value) if place in owned:
                 codes[-1][1][address] = compiled(value)
-            case Word("TOOL", value):
-                rest["tool"] = value.value if isinstance(value, Text) else compiled(value)
-            case Word(address, value):
-                if address in ("RND", "CHF"):
-                    name = address.lower()
-                words[address] = compiled(value)
-                spans.setdefault(address, item.span)
-            case Assignment(parameter, value):
-                assignments.append((parameter.name, compiled(value)))  # type: ignore[union-attr]
-            case Flow(_, keyword, arguments):
-                rest["flow"] = item
-                if keyword == "if":
-                    rest["test"] = compiled(arguments[0])
-            case Opaque(kind, span) if kind in ("program", "statement", UNREAD):
-                rest["statement"] = (kind, span)
-    return Plan(
-        name,
-        words,
-        tuple(codes),
-        frozenset(flags),
-        tuple(assignments),
-        spans=spans,
-        moves=not MOVING.isdisjoint(words),
-        empty=not (name or words or codes or flags or assignments or rest),
-        **rest,  # type: ignore[arg-type]
+    return tuple(codes)
+
+
+def assigned(item: Assignment) -> tuple[str, Evaluate]:
+    """The Q parameter that is set, and its value."""
+    assert isinstance(item.target, NamedParameter), "this family has no arrays"
+    return item.target.name, compiled(item.value)
+
+
+def is_motion_word(word: Word) -> bool:
+    """Whether a word is one of the motion: no M code, and not what TOOL CALL and TOOL DEF name."""
+    return word.address != "TOOL" and not (word.address == "M" and isinstance(word.value, Constant))
+
+
+def tool_of(words: Sequence[Word]) -> str | Evaluate | None:
+    """The name of the tool that the block names, or the value of its number."""
+    value = next((word.value for word in words if word.address == "TOOL"), None)
+    if value is None:
+        return None
+    return value.value if isinstance(value, Text) else compiled(value)
+
+
+def plan_of(template: Template) -> Plan:
+    """Work out what the blocks of one shape do."""
+    items = template.items
+    names = [item.name for item in items if isinstance(item, Command)]
+    opening = next(filter(opens_block, names), "")
+    words = list(filter(is_motion_word, own_words(items)))
+    flow = next((item for item in items if isinstance(item, Flow)), None)
+    opaque = (item for item in items if isinstance(item, Opaque) and item.kind in STATEMENTS)
+    plan = Plan(
+        name=next((word.address.lower() for word in words if word.address in CORNERS), opening),
+        words={word.address: compiled(word.value) for word in words},
+        codes=codes_of(items),
+        flags=frozenset(names) - {opening},
+        assignments=tuple(assigned(item) for item in items if isinstance(item, Assignment)),
+        flow=flow,
+        test=compiled(flow.arguments[0]) if flow is not None and flow.keyword == "if" else None,
+        tool=tool_of(template.words),
+        statement=next(((item.kind, item.span) for item in opaque), None),
+        spans={word.address: word.span for word in reversed(words)},
+        skip=any(isinstance(item, Skip) for item in items),
+        moves=any(word.address in MOVING for word in words),
     )
+    return replace(plan, empty=plan == Plan())
