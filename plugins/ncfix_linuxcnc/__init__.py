@@ -22,7 +22,6 @@ LINUXCNC = Dialect(
         rb"#[ \t]*<[ \t]*_?\w+[ \t]*>",
     ),
     line_limit=252,
-    needs_end=True,
     foreign=FOREIGN,
     semantics="linuxcnc",
     understands=(

@@ -38,8 +38,6 @@ class Dialect:
                         "none", or "renumber": all blocks anew
     closure_mm          an arc whose start and end radii differ by more is refused by the control
     closure_relative    the same relative to the radius (both must be exceeded)
-    block_skip_executed blocks with `/` run unless the operator asks otherwise
-    needs_end           the control wants M2/M30 or `%` at the end
     feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
                         "all" (of all axes together), or "" where that differs from control to control
     understands         what is followed and corrected, a short sentence each; for `ncfix dialects NAME`
@@ -62,8 +60,6 @@ class Dialect:
     block_numbers: str = "same"
     closure_mm: float = 0.0283
     closure_relative: float = 0.001
-    block_skip_executed: bool = True
-    needs_end: bool = False
     feed_of: str = ""
     understands: tuple[str, ...] = ()
     passes: tuple[str, ...] = ()

@@ -203,27 +203,40 @@ def compensation(control: Sinumerik, code: int) -> None:
 
 def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
     """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
-    if "T" in words.values or "T" in words.texts:
-        control.fresh_tool = True
-        name = words.texts.get("T")
-        value = words.values.get("T")
-        if name is None and value is None:
-            control.refusal = control.refusal or "the tool (T) is known only at run time"
-            return
-        control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
-    if at_once and control.changed_by_cycle and not change and "D" not in words.values:
+    called, edge = "T" in words.values or "T" in words.texts, "D" in words.values
+    if called and not call_tool(control, words):
+        return
+    if at_once and control.changed_by_cycle and not change and not edge:
         control.suspended["tool"] = WHO_CHANGES
         return
-    if change or (at_once and ("T" in words.values or "T" in words.texts)):
+    if change or (at_once and called):
         into_spindle(control)
-    if "D" in words.values:
-        if words.values["D"] is None:
-            control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
-            return
-        control.edge = round(words.get("D"))
-    if change or at_once or "D" in words.values:
+    if edge and not choose_edge(control, words):
+        return
+    if change or at_once or edge:
         control.at_start = False
         set_length(control)
+
+
+def call_tool(control: Sinumerik, words: Words) -> bool:
+    """T: the tool that is changed next; False where that is not known."""
+    control.fresh_tool = True
+    name, value = words.texts.get("T"), words.values.get("T")
+    if name is None and value is None:
+        control.refusal = control.refusal or "the tool (T) is known only at run time"
+        return False
+    control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
+    return True
+
+
+def choose_edge(control: Sinumerik, words: Words) -> bool:
+    """D: the cutting edge in force; False where that is not known."""
+    value = words.values["D"]
+    if value is None:
+        control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
+        return False
+    control.edge = round(value)
+    return True
 
 
 def into_spindle(control: Sinumerik) -> None:

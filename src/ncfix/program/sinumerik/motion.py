@@ -23,7 +23,7 @@ AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction i
 CORNERS = frozenset({"RND", "CHF", "CHR"})
 """Words with which the control rounds or breaks the corner at the end of the block."""
 
-CIP, CT, POLY = MOTIONS["cip"], MOTIONS["ct"], MOTIONS["poly"]
+CIP, CT = MOTIONS["cip"], MOTIONS["ct"]
 
 
 def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
