@@ -91,7 +91,7 @@ FANUC = [
     case("loop, flat", "#1=0\nWHILE[#1LT2]DO1\nG1 X[5.*#1] F100.\n#1=#1+1\nEND1", flat=True, L0=R),
     case("macro with arguments", "G65 P1 A5. B6.\nM2\nO1\nG1 X#1 Y#2 F100.\nM99", L6=R),
     case("a variable nobody has set", "G1 X#500 F100.\nG0 X5. Y5. Z20.", L3=N, L4=R),
-    case("a tool length in steps", "G91 G43 H3 Z-10.\nX5.\nG90 G0 Z80.", L3=N, L4=N, L5=R),
+    case("a tool length in steps", "G91 G43 H3 Z-10.\nX5.\nG90 G0 Z80.", L3=N, L4=P, L5=R),
     case("position in a variable", "#1=#5041\nG1 X[#1+1.] F100.\nG0 X5. Y5. Z20.", L2=R, L4=N, L5=R),
     case("unknown code", "G107.1\nG1 X5. F100.", L2=R, L4=N),
 ]

@@ -107,7 +107,7 @@ FRAMES = [
     case("TRAORI with a direction", "TRAORI(1,0,0,1)\nG1 X5 F100", L4=N),
     case("TRANSMIT", "TRANSMIT\nG1 X5 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=N, L6=R),
     case("CYCLE800 over a programmed frame", "TRANS X5\nCYCLE800()\nG1 X5 F100\nTRANS\nX7", L5=N, L7=R),
-    case("CYCLE800 deselected", 'CYCLE800(1,"0",0,57,0,0,0,0,0,0,0,0,0,-1)\nG0 X5\nG0 X5 Y5 Z60', L4=N, L5=R),
+    case("CYCLE800 deselected", 'CYCLE800(1,"0",0,57,0,0,0,0,0,0,0,0,0,-1)\nG0 X5\nG0 X5 Y5 Z60', L4=P, L5=R),
     case("CYCLE800 that aligns the tool", 'CYCLE800(0,"T",100,57,0,0,0,9,0,0,0,0,0,-1)\nG0 X1 Y1 Z60', L4=N),
     case("CYCLE800 without rotary axes", "CYCLE800()\nG1 X5 F100", L4=R),
 ]

@@ -53,6 +53,11 @@ def test_tools_and_start() -> None:
     assert setup.assume_zero
 
 
+def test_start_positions_may_be_given_one_by_one_as_messages_ask_for_them() -> None:
+    setup = given("--initial", "X=1", "--initial", "A=2,C=3", "--initial", "X=4").load()
+    assert setup.initial == {"X": 4.0, "A": 2.0, "C": 3.0}
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -137,15 +137,24 @@ def test_nothing_is_assumed_that_is_not_used() -> None:
 def test_reference_points_that_are_not_given_leave_their_axes_unknown() -> None:
     setup = Setup(work_offsets=G54, initial=ZERO)
     followed = follow("G0 X1 Y1 Z1\nG28 Z5\nG0 X2\nG1 Y3 F1\nG0 Z4\nG1 X5", "XYZ", setup)
-    assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
     assert reasons(followed)[3] == "where the axis Z stands after the reference point is approached is not given"
     assert np.isnan(followed.moves.end[3, 2])
     assert np.isnan(followed.moves.start[5, 2])
 
 
+def test_a_rapid_that_says_nothing_of_axes_that_are_not_known_passes_and_counts_for_those_it_names() -> None:
+    setup = Setup(work_offsets=G54, initial=ZERO)
+    followed = follow("G28 Z5\nG0 X1 Y1\nG0 Z4\nG91 G0 X2\nG90 G28 Z5\nG91 G0 Z1", "XYZ", setup)
+    assert rules(followed)[2:5] == [Rule.PASS, Rule.CORRECT, Rule.CORRECT]
+    assert rules(followed)[-1] == Rule.REFUSE
+    assert followed.moves.end[3].tolist() == [1, 1, 4]
+    assert not followed.moves.wordless[3].any()
+
+
 def test_after_probing_only_what_is_named_anew_is_known() -> None:
     followed = follow("F1 G38.2 Z-5\nG0 X1\nG91 G0 Z1\nG90 G0 Z5\nG1 X2")
-    assert rules(followed) == [Rule.PASS, Rule.REFUSE, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert rules(followed) == [Rule.PASS, Rule.PASS, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
     assert reasons(followed)[:2] == ["probing", "where the axis Z stands after probing is known only at run time"]
 
 
@@ -230,12 +239,12 @@ def test_skip_signals_are_probing() -> None:
 
 def test_commands_to_grbl_lose_the_position() -> None:
     followed = follow("G0 X1 Y1 Z1\n$H\nG0 X2\nG0 X1 Y1 Z1\nG1 X5 F1", dialect="iso")
-    assert rules(followed) == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
 
 
 def test_axis_words_before_any_code_are_refused() -> None:
     followed = follow("X1 Y1\nG0 X2\nY2", dialect="iso")
-    assert rules(followed) == [Rule.REFUSE, Rule.REFUSE, Rule.CORRECT]
+    assert rules(followed) == [Rule.REFUSE, Rule.PASS, Rule.CORRECT]
     assert reasons(followed)[0] == "no motion code is in force"
 
 
@@ -251,3 +260,16 @@ def test_further_work_offsets() -> None:
 def test_what_g10_sets_that_controls_take_otherwise_is_refused_in_iso(setting: str) -> None:
     found = follow(f"G0 X1. Y1. Z1.\n{setting}\nG0 X2.", dialect="iso")
     assert "differs from control to control" in reasons(found)[-1]
+
+
+def test_a_code_of_the_builder_that_the_setup_declares_changes_nothing() -> None:
+    text = "G0 X1 Y1 Z1\nG131 R2\nX2\nG131 X5\nX3"
+    declared = follow(text, dialect="iso", passed_codes=frozenset({1310}))
+    assert rules(declared)[:2] == [Rule.CORRECT, Rule.CORRECT]
+    assert rules(declared)[2:] == [Rule.REFUSE, Rule.REFUSE]
+    assert rules(follow(text, dialect="iso"))[1] == Rule.REFUSE
+
+
+def test_machine_coordinates_need_no_motion_code_on_iso_controls() -> None:
+    followed = follow("G53 Z0\nX1\nG0 X1", dialect="iso")
+    assert rules(followed) == [Rule.PASS, Rule.REFUSE, Rule.CORRECT]

@@ -16,6 +16,7 @@ from typing import Any, TextIO
 
 import click
 
+from ncfix.cli.alike import gathered
 from ncfix.diagnostics import Message, Place, UsageError
 from ncfix.files import unwritable
 
@@ -65,9 +66,9 @@ def tell(*messages: Message) -> None:
 
 
 def tell_some(messages: Sequence[Message]) -> None:
-    """Coded messages, at most `MOST` of each code; how many more there are is said."""
+    """Coded messages, those that say the same as one, at most `MOST` of each code; how many more there are is said."""
     seen: Counter[str] = Counter()
-    for message in messages:
+    for message in gathered(messages):
         seen[message.code] += 1
         if seen[message.code] <= MOST:
             tell(message)

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from ncfix.program.dialect import Dialect
     from ncfix.program.setup import Setup
 
+FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
+ACCEPT = "--allow-refused writes the program with the refused motions as they were"
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -65,7 +68,7 @@ class Job:
         find = Noted(subprograms(target.source))
         try:
             with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
-                return replace(_written(fixed, target, self.options.allow_refused), called=find.called)
+                return replace(_written(fixed, target, self.options), called=find.called)
         except console.ReaderGoneError:
             raise
         except Exception as error:
@@ -130,15 +133,17 @@ def _let_stay() -> None:
     gc.freeze()
 
 
-def _written(fixed: Fixed, target: Target, allow_refused: bool) -> Outcome:
+def _written(fixed: Fixed, target: Target, options: FixOptions) -> Outcome:
     entry: dict[str, Any] = fixed.report.as_dict()
     console.tell_some([*fixed.report.warnings, *_refusals(target.source, entry["refused"])])
-    refused = bool(entry["refused"]) and not allow_refused
+    refused = bool(entry["refused"]) and not options.allow_refused
     if not refused:
         _write(fixed, target)
         entry["output"] = target.path
     for line in _summary(entry, refused):
         console.say(line)
+    if refused:
+        console.say(f"  {ACCEPT if options.flatten else FLATTEN + ACCEPT}")
     return Outcome(ExitCode.REFUSED if refused else ExitCode.DONE, entry)
 
 

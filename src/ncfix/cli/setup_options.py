@@ -109,7 +109,12 @@ OPTIONS = (
         help="The length of a tool, mm; and its radius, as 12=120.0,5.0 (repeatable).",
     ),
     click.option("--tool-table", "tool_table", metavar="FILE", help="The control's own tool table."),
-    click.option("--initial", type=Position(), help="Where the axes are at the start, machine coordinates."),
+    click.option(
+        "--initial",
+        type=Position(),
+        multiple=True,
+        help="Where the axes are at the start, machine coordinates (repeatable).",
+    ),
     click.option(
         "--input",
         "inputs",
@@ -136,7 +141,7 @@ class SetupOptions:
     offsets: tuple[tuple[str, dict[str, float]], ...] = ()
     tools: tuple[tuple[str, tuple[float, ...]], ...] = ()
     tool_table: str | None = None
-    initial: dict[str, float] | None = None
+    initial: tuple[dict[str, float], ...] = ()
     inputs: tuple[tuple[str, float], ...] = ()
     no_point: str | None = None
     assume_zero: bool = False
@@ -164,7 +169,7 @@ class SetupOptions:
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
             tools=tools,
             named_tools={**setup.named_tools, **named},
-            initial={**setup.initial, **(self.initial or {})},
+            initial={**setup.initial, **{axis: value for given in self.initial for axis, value in given.items()}},
             inputs={**setup.inputs, **dict(self.inputs)},
             no_point=self.no_point or setup.no_point,
             assume_zero=setup.assume_zero or self.assume_zero,
@@ -181,7 +186,7 @@ def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
         offsets: tuple[tuple[str, dict[str, float]], ...],
         tools: tuple[tuple[str, tuple[float, ...]], ...],
         tool_table: str | None,
-        initial: dict[str, float] | None,
+        initial: tuple[dict[str, float], ...],
         inputs: tuple[tuple[str, float], ...],
         no_point: str | None,
         assume_zero: bool,

@@ -123,14 +123,15 @@ CODES = {
         "Its path or its end is not known from the program, or it is of a kind that a correction of its words would "
         "not put right (splines, threads, turning cycles, positions that are known only at run time). The block is "
         "left as it was.",
-        "Have the CAM system write lines and arcs there, or accept it with `--allow-refused`.",
+        "Have the CAM system write lines and arcs there, or accept it with `--allow-refused`. `--flatten` writes out "
+        "what cycles with incremental words, patterns of holes and other repetitions make.",
     ),
     "NCF433": Code(
         "a block that cannot be written once for all",
         "The block is executed several times from different places and needs another correction each time, or it has "
         "to stay as it is because a refused arc, whose line is named, begins where it ends: only so does the arc "
         "close.",
-        "Write the loop out, or accept it with `--allow-refused`.",
+        "`--flatten` writes loops and subprograms out, or accept it with `--allow-refused`.",
     ),
     "NCF437": Code(
         "a tool length was taken as zero",

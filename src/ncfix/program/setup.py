@@ -54,6 +54,7 @@ class Setup:
     no_point          what numbers without a decimal point mean to controls that tell: "calculator" (X50 is 50 mm), or
                       an increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
     most_blocks       blocks that may be executed beyond those of the text; with more the program counts as endless
+    passed_codes      G codes of the machine's builder that move nothing and change no coordinates, in tenths (G5.3: 53)
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 
@@ -69,4 +70,5 @@ class Setup:
     block_skip: bool = False
     most_blocks: int = MOST_BLOCKS
     no_point: str = ""
+    passed_codes: frozenset[int] = frozenset()
     named_tools: Mapping[str, Tool] = field(default_factory=dict)

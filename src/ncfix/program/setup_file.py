@@ -33,6 +33,9 @@ LARGEST = 1e12
 VARIABLE = re.compile(r"#\d+|#<[^<>]*>|[A-Z_$][A-Z\d_$]*(?:\[[-\d, ]+\])?")
 """Parameters and variables: of RS274 and Fanuc with #, of other controls in upper case (R1, Q5, _DEPTH, LIST[2])."""
 
+G_CODE = re.compile(r"G(\d{1,4})(?:\.(\d))?")
+"""A G code as a program has it."""
+
 TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 """A tool is called by its number or by a name."""
 
@@ -91,6 +94,7 @@ class Reading:
             "block_skip": self.flag,
             "no_point": self.no_point,
             "most_blocks": self.count,
+            "passed_codes": self.codes,
         }
         if key not in readers:
             close = get_close_matches(key, readers, 1)
@@ -105,6 +109,14 @@ class Reading:
             self.fault(WRONG_VALUE, key, "expected a table")
             return {}
         return {name: reader(f"{key}.{name}", value) for name, value in flattened(table).items()}
+
+    def codes(self, key: str, value: Any) -> frozenset[int]:
+        """A list of G codes, in tenths."""
+        found = [G_CODE.fullmatch(each) for each in value if isinstance(each, str)] if isinstance(value, list) else []
+        codes = frozenset(10 * int(match[1]) + int(match[2] or 0) for match in found if match)
+        if not isinstance(value, list) or len(found) < len(value) or None in found:
+            self.fault(WRONG_VALUE, key, f'expected a list of G codes such as ["G332"], found {value!r}')
+        return codes
 
     # -- single values ------------------------------------------------------------------------------------------------
 

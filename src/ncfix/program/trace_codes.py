@@ -153,7 +153,9 @@ TRACE_CODES: dict[str, Code] = {
         "Unknown G code, motions refused",
         "The code is not one that ncfix knows for ISO controls. It may move axes or change coordinates, so nothing "
         "after it is corrected.",
-        "Name the dialect with --dialect, if there is one for the control.",
+        "Name the dialect with --dialect, if there is one for the control. Of a code of the machine's builder that "
+        'neither moves nor changes coordinates, the setup file can say so: `passed_codes = ["G131"]`; in a block with '
+        "words of axes it is refused all the same.",
     ),
     "NCF229": Code(
         "Unknown M code",

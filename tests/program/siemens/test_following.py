@@ -149,8 +149,13 @@ def test_a_block_that_nobody_understands_refuses_what_follows() -> None:
 
 def test_a_cycle_that_nobody_knows_leaves_axes_anywhere() -> None:
     followed = follow("G0 X1 Y1 Z1\nHEAD_CLEAN\nG0 X2\nG0 Y2 Z2\nG1 X3 F100")
-    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.CORRECT, Rule.CORRECT]
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
     assert [message.code for message in followed.messages] == ["NCF252"]
+
+
+def test_a_rapid_passes_behind_such_a_cycle_only_where_the_program_says_that_it_is_one() -> None:
+    followed = follow("G0 X1 Y1 Z1\nHEAD_CLEAN\nX2\nG0 X3")
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.REFUSE, Rule.PASS]
 
 
 # -- arcs -------------------------------------------------------------------------------------------------------------

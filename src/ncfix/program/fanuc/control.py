@@ -8,6 +8,7 @@ from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.fanuc.rules import RULES
 from ncfix.program.fanuc.scaling import Scaling
+from ncfix.program.fanuc.squaring import stands_square
 from ncfix.program.fanuc.variables import Variables
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.language import Run
@@ -46,6 +47,10 @@ class MacroControl(Control):
         self.definition: dict[int, Block] = {}
         self.dynamic = False
         self.vectors = False
+
+    def stands_square(self) -> bool:
+        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
+        return self.tilted and stands_square(self)
 
     def refresh(self) -> None:
         """Compose the offsets; a number without a point counts increments of the unit in force."""

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
 
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
+SAME = 2e-4
+"""Directions closer than this, rad, are one: rotary words have three decimals of a degree, 9e-6 rad each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +38,12 @@ class Squared:
 
 
 def turned_square(control: MacroControl) -> Squared | None:
-    """The nearest rotary positions with the tool along Z of the frame in force; None if it cannot be known."""
+    """The nearest rotary positions with the tool along Z of the frame in force; None if it cannot be known.
+
+    Where X Y Z stand does not matter for these.
+    """
     machine, kinematics = control.machine, control.kinematics
-    if kinematics is None or control.unknown.keys() & set(machine) or not {X, Y, Z} <= set(machine):
+    if kinematics is None or any(control.rotary[index] for index in control.unknown) or not {X, Y, Z} <= set(machine):
         return None
     pointing = control.pointing
     if pointing is None:
@@ -55,3 +60,11 @@ def turned_square(control: MacroControl) -> Squared | None:
         position[index] = value
     about_tip = [position[i] if control.rotary[i] else control.position[i] for i in range(len(position))]
     return Squared(position, about_tip, tuple(value / DEGREE for value in position), len(ways) > 1)
+
+
+def stands_square(control: MacroControl) -> bool:
+    """Whether the tool is known to lie along Z of the frame in force."""
+    if control.pointing is None or any(control.rotary[index] for index in control.unknown):
+        return False
+    tool = control.pointing.direction(np.array([control.position[index] for index in control.machine]))
+    return bool(np.linalg.norm(tool - [row[2] for row in control.rotation]) < SAME)

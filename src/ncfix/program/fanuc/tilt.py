@@ -112,7 +112,7 @@ def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
     for index in (X, Y, Z):
         feature[index] = control.modal.unit * origin.get(LETTERS[index])
     control.offsets.feature = feature
-    control.tilted = True
+    control.tilted, control.said = True, None
     tcp.switch(control, control.offsets.tool, True)
     control.refresh()
 
@@ -136,7 +136,7 @@ def end(control: MacroControl) -> None:
     """Out of the tilted plane."""
     if not control.tilted:
         return
-    control.tilted = False
+    control.tilted, control.said = False, None
     control.offsets.rotation, control.offsets.feature = IDENTITY, zeros()
     tcp.switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
     turned_back(control)
@@ -152,12 +152,15 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
     """
     turning = [index for index in control.machine if control.rotary[index]]
+    control.settle(turning)
     target, unknown = control.position[:], dict(control.unknown)
     found = turned_square(control) if turning else None
     if turning and found is None:
         unknown |= {index: NOT_SOLVED for index in (*turning, X, Y, Z) if index in control.machine}
     elif found is not None:
         target = found.about_tip if code == ABOUT_TIP else found.position
+        if not unknown.keys().isdisjoint((X, Y, Z)):
+            unknown |= {index: NOT_SOLVED for index in (X, Y, Z) if index in control.machine}
         if found.several:
             angles = " ".join(f"{LETTERS[index]}{found.degrees[index]:.3f}" for index in turning)
             name = f"G{code / 10:g}"

@@ -29,7 +29,7 @@ from ncfix.program.follow.coordinates import (
 )
 from ncfix.program.follow.knowledge import Knowledge
 from ncfix.program.follow.modal import Modal, Offsets, Tools
-from ncfix.program.follow.motion import AT_START, Motion, Unknown, blanked, first_reason
+from ncfix.program.follow.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
 from ncfix.program.follow.places import Places, mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Moves, Rule
@@ -37,6 +37,7 @@ from ncfix.program.pointing import Pointing
 from ncfix.program.recurrence import Budget
 
 UNKNOWN_AXIS = "NCF206"
+NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'
 
 ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion is left as it is, or refused, that moves an axis without naming it."""
@@ -61,6 +62,8 @@ class Control(ABC):
     whole      the motions of the block must not be split, as under cutter compensation
     at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
+    said       what is not known along the axes of a tilted plane, where its words have said more than the machine's
+               axes alone tell; None: they tell all. `saying`: the same at the end of the motion of this block
     places     which axes the program itself has brought to where they stand
     budget     how much may still be executed
     """
@@ -90,6 +93,8 @@ class Control(ABC):
         self.whole = self.at_corner = False
         self.beside = 0
         self.ends: list[Vector] | None = None
+        self.said: Unknown | None = None
+        self.saying: Unknown | None = None
         self.external = ""
         self.tcp = run.setup.tcp
         self.shaky: Unknown = {}
@@ -133,11 +138,13 @@ class Control(ABC):
         if text not in self.messages:
             self.messages[text] = Message(code, text, self.place(), hint)
 
-    def refuse_after(self, name: str) -> None:
-        """A code is not known, and may change coordinates or move: nothing behind it is certain."""
-        if not self.refusal:
-            self.refusal = f"{name} is not known, and may move axes or change coordinates"
-            self.warn("NCF228", self.refusal, "all motions after it are refused")
+    def refuse_after(self, code: int, *, with_axes: bool) -> None:
+        """A G code (tenths) is not known: it may move or change coordinates; the setup says if not, but for `with_axes`."""
+        if self.refusal or (code in self.setup.passed_codes and not with_axes):
+            return
+        name = f"G{code / 10:g}"
+        self.refusal = f"{name} is not known, and may move axes or change coordinates"
+        self.warn("NCF228", self.refusal, NEITHER.format(name))
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
@@ -170,7 +177,7 @@ class Control(ABC):
 
     def spatial_anchor(self, index: int) -> Hashable:
         """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
-        return self.tcp, self.tools.offset if self.tcp or index == Z else None
+        return self.tcp, self.tools.offset if (self.tcp and not self.tilted) or index == Z else None
 
     @property
     def frame(self) -> int:
@@ -207,9 +214,14 @@ class Control(ABC):
 
     def lose(self, indices: Sequence[int], reason: str) -> None:
         """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
+        self.said = None
         for index in indices:
             if index in self.machine:
                 self.unknown[index] = reason
+
+    def stands_square(self) -> bool:
+        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
+        return False
 
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
@@ -241,6 +253,8 @@ class Control(ABC):
         if not motion.passing:
             self._ask_for_start(motion)
         settles = self._settles(motion)
+        if motion.kind == Kind.RAPID and not (motion.passing or motion.refusal) and self._leaves_unknown(motion):
+            motion = motion._replace(passing=first_reason(motion.unknown))
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)
         fate = self._dragged(motion, adrift)
@@ -282,9 +296,15 @@ class Control(ABC):
         if motion.passing and motion.kind != Kind.DWELL:
             target, here = motion.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
+        self.said, self.saying = self.saying, None
         self.places.settle(settles)
-        self.places.lose(mask_of(motion.unknown))
+        self.places.lose(mask_of(motion.unknown if self.said is None else self.said))
         self.places.begun = True
+
+    def _leaves_unknown(self, rapid: Motion) -> bool:
+        """Whether a rapid passes, see `motion.leaves_unknown`."""
+        before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
+        return leaves_unknown(rapid, before, turned=self.is_rotated and not self.modal.incremental)
 
     def _adrift(self, settled: int) -> int:
         """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""

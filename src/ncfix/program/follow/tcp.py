@@ -51,14 +51,24 @@ def converted(control: Control, position: Vector, unknown: Unknown, before: TcpS
     return True
 
 
+def lost_in_frame(control: Control) -> Unknown:
+    """What is not known along the axes of the program's frame."""
+    return control.said if control.said is not None and control.unknown else control.unknown
+
+
 def switch(control: Control, tool: Vector, on: bool) -> None:
-    """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not."""
+    """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
+
+    Where the tool lies along Z of a tilted plane, another length moves the tip along that only.
+    """
+    lost = {**lost_in_frame(control), Z: TURNED} if on and control.tcp and control.stands_square() else None
     before = TcpState(control.tcp, control.offsets.tool[Z])
     after = TcpState(on, tool[Z])
     if (before.shift != after.shift or control.tcp != on) and not converted(
         control, control.position, control.unknown, before, after
     ):
         control.lose((X, Y, Z), TURNED)
+        control.said = lost
     control.tcp = on
 
 

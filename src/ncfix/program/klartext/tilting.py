@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ncfix.program.follow import tcp
+from ncfix.program.follow.control import AT_START
 from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
@@ -69,10 +70,12 @@ FORMS: Mapping[str, Callable[[Values], Rotation | None]] = {
 
 def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> None:
     """A PLANE block."""
-    control.use()
     values = words.values
     if "MB" in values:
         flags |= {RETRACTING}
+    if form == "reset" and is_idle(control, flags):
+        return
+    control.use()
     if form == "reset":
         tilt_to(control, None, flags)
         return
@@ -88,6 +91,20 @@ def plane(control: Control, form: str, words: Words, flags: frozenset[str]) -> N
         if found is None:
             raise Fault(BAD_PLANE, f"PLANE {form.upper()} gives no plane: its vectors or points are in one line")
         tilt_to(control, found, flags)
+
+
+def is_idle(control: Control, flags: frozenset[str]) -> bool:
+    """Whether the end of a tilt changes nothing: none has begun, and where the rotary axes stand is not asked yet.
+
+    Many programs begin with it. Then Q120 to Q122 are not known.
+    """
+    asked = any(control.rotary[index] and why is AT_START for index, why in control.unknown.items())
+    turns = flags & {"turn", "move", RETRACTING}
+    idle = asked and not turns and not control.transformations.tilted and TILTED not in control.suspended
+    if idle:
+        for name in CALCULATED:
+            control.scope.parameters.assign(name, 0.0, runtime=True)
+    return idle
 
 
 def by_axes(control: Control, values: Values, flags: frozenset[str]) -> None:
@@ -193,8 +210,10 @@ def cycle_19(control: Control, words: Words) -> None:
 
     Where the axes stand tells which of the two is meant.
     """
-    control.use()
     values = {letter: words.values[letter] for letter in "ABC" if letter in words.values}
+    if not values and is_idle(control, frozenset()):
+        return
+    control.use()
     if not values:
         tilt_to(control, None, frozenset())
         return

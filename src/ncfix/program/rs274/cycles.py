@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Unknown
@@ -141,7 +142,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
 def hole_unknown(control: Control, block: Block) -> Unknown:
     """Which axes are not known at the bottom of a hole."""
     modal = control.modal
-    unknown = dict(unknown_after(control, block, modal.incremental))
+    unknown = dict(unknown_after(control, block, modal.incremental, tcp.lost_in_frame(control)))
     if not modal.incremental:
         unknown.pop(modal.plane.across, None)
         if modal.plane.across in control.shaky:

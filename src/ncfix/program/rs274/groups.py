@@ -76,8 +76,11 @@ ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 8
     UNFOLLOWED=(121, 131, 1120, 1130, 150, 160, 500, 501, 510, 511, 682, 683, 684),
 )
 
-ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187)) | {51}
-"""Codes of ISO controls that move nothing and change no coordinates: exact stop, look-ahead, smoothing, limits."""
+ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187, 332)) | {51, 53}
+"""Codes of ISO controls that move nothing and change no coordinates: exact stop, look-ahead, smoothing, limits.
+
+G5.3 P is how smooth Hurco makes a surface, G332 R how fast or true DMG MORI goes.
+"""
 
 LINUXCNC_M = grouped(
     STOP=(0, 10, 20, 300, 600),

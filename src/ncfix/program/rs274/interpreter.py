@@ -286,7 +286,7 @@ class Interpreter:
         }
         for code in codes.unknown:
             self.span = spans.get(code / 10)
-            unknown_code(self.control, code)
+            unknown_code(self.control, code, with_axes=bool(plan.axes))
         self.span = None
 
     def note_foreign(self, plan: Plan) -> None:

@@ -56,9 +56,10 @@ def tool_offset(control: Control, block: Block, code: int) -> None:
         control.refusal = control.refusal or "the tool direction is given by I J K (G43.5)"
     control.tip_control = code in (434, 435)
     on = control.setup.tcp or control.tip_control or control.tilted
+    across = (X, Y) if on and not (control.tcp and control.stands_square()) else ()
     if on or control.tcp:
         tcp.switch(control, tool, on)
-    control.places.shift(mask_of((X, Y, Z) if on else (Z,)))
+    control.places.shift(mask_of((*across, Z)))
     control.offsets.tool, control.tools.offset = tool, number if on or any(tool) or lacking else None
     control.modal.tool_code = 490 if number is None else 430
     control.refresh()

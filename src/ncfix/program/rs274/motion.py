@@ -50,14 +50,18 @@ def straight(control: Control, block: Block, code: int) -> None:
 
 
 def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
-    """G53 with G0 or G1."""
+    """G53 with G0 or G1; where neither is in force, ISO controls go there in rapid."""
     if code not in (0, 10):
-        raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
+        if control.rules.strict:
+            raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
+        code, modal = 0, code
+    else:
+        modal = code
     if control.modal.incremental and control.rules.strict:
         raise Fault(BAD_MOTION, "G53 cannot be used with incremental coordinates (G91)")
     if code:
         check_feed(control, block)
-    control.modal.motion = code
+    control.modal.motion = modal
     if block.axes:
         target, unknown = machine_destination(control, block)
         kind = Kind.FEED if code else Kind.RAPID

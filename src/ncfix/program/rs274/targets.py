@@ -57,14 +57,14 @@ def words_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
             index = INDEX[letter]
             origin = target[index] if incremental else control.offset[index]
             target[index] = origin + control.scale[index] * value
-    return target, unknown_after(control, block, incremental)
+    return target, unknown_after(control, block, incremental, control.unknown)
 
 
-def unknown_after(control: Control, block: Block, incremental: bool) -> Unknown:
-    """Which axes are not known where the motion ends."""
-    if not (control.unknown or control.shaky or block.runtime):
-        return control.unknown
-    unknown = dict(control.unknown)
+def unknown_after(control: Control, block: Block, incremental: bool, before: Unknown) -> Unknown:
+    """Which axes are not known where the motion ends, of those that were not `before`."""
+    if not (before or control.shaky or block.runtime):
+        return before
+    unknown = dict(before)
     for index, letter in enumerate(LETTERS):
         if not block.axes >> index & 1 or index not in control.machine:
             continue
@@ -95,7 +95,8 @@ def rotated_destination(control: Control, block: Block, incremental: bool) -> tu
 
 def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknown:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
-    own = unknown_after(control, block, incremental)
+    own = unknown_after(control, block, incremental, tcp.lost_in_frame(control))
+    control.saying = own if control.tilted else None
     if not own:
         return own
     unknown = {index: why for index, why in own.items() if index > Z}

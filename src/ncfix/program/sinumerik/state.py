@@ -19,7 +19,7 @@ from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.program.follow.modal import Modal
-from ncfix.program.follow.motion import AT_START, Unknown
+from ncfix.program.follow.motion import AT_START, Motion, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule
@@ -60,6 +60,7 @@ class Sinumerik(Control):
     fresh_tool  a tool has been called since the last motion
     changed_by_cycle  a name that is not known has followed a call of a tool at once: it may be what changes it
     counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
+    stated   the motion code is what the program has said itself, not what something that is not followed may have left
     heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
@@ -75,6 +76,7 @@ class Sinumerik(Control):
         self.pattern: tuple[tuple[float, float], ...] = ()
         self.heading: Sequence[float] | None = None
         self.whole = self.cornered = False
+        self.stated = True
         self.solitary: frozenset[int] = frozenset()
         self.variables = Variables.given(run.setup.variables)
         self.named = Named()
@@ -196,7 +198,11 @@ class Sinumerik(Control):
     # -- what is known ------------------------------------------------------------------------------------------------
 
     def lose_all(self, reason: str) -> None:
-        """No axis stands where it is known to from here on; `reason` has a `{}` for the axis letter."""
+        """No axis stands where it is known to from here on; `reason` has a `{}` for the axis letter.
+
+        Nor is the motion code known to be what it was.
+        """
+        self.stated = False
         self.lose_axes(self.machine, reason)
 
     def lose_axes(self, indices: tuple[int, ...], reason: str) -> None:
@@ -259,9 +265,15 @@ class Sinumerik(Control):
             self.ask_for_length()
         self._note_heading(kind, end, arc, follows=not passing and not refusal)
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
+        if self.is_rotated:
+            self.places.settle(settles & ~mask_of(self.lost))
         self.whole = False
         stand(self, axes, by_machine=by_machine)
         self.forget_settled()
+
+    def _leaves_unknown(self, rapid: Motion) -> bool:
+        """As for all controls; whether it is a rapid, the program has to have said."""
+        return self.stated and super()._leaves_unknown(rapid)
 
     def _counted(self, words: Words) -> list[int]:
         """The axes whose words count from where they stand."""

@@ -118,7 +118,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name in framing.PROGRAMMABLE:
         turn.frame = name
     elif name in MOTIONS:
-        control.modal.motion = MOTIONS[name]
+        control.modal.motion, control.stated = MOTIONS[name], True
     elif name in ("diamon", "diam90", "diamof"):
         framing.diameter(control, name)
     elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
@@ -297,7 +297,7 @@ def codes(control: Sinumerik, turn: Turn) -> None:
         raise Fault(CONFLICT, f"G{first} and G{second} exclude one another (both set the motion)")
     for code in turn.plan.g:
         if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS:
-            control.modal.motion = code
+            control.modal.motion, control.stated = code, True
         elif code in SETTINGS:
             SETTINGS[code](control, code)
         elif code in (900, 910):
@@ -307,7 +307,7 @@ def codes(control: Sinumerik, turn: Turn) -> None:
         elif code in TAKES_WORDS:
             takes_words(control, turn, code)
         elif code not in PASSED:
-            control.refuse_after(f"G{code / 10:g}")
+            control.refuse_after(code, with_axes=bool(turn.words.axes))
 
 
 def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:

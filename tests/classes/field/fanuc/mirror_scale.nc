@@ -13,6 +13,6 @@ G0 X0 Y0 Z10. (@ X0 Y0 Z10)
 G51 X0 Y0 Z0 I2. J1. K1.
 G0 X3. Y4. Z5. (@ refused)
 G50
-G0 X0 Y0 Z10. (@ refused)
+G0 X0 Y0 Z10. (@ passed)
 G0 X0 Y0 Z10. A0 C0 (@ X0 Y0)
 M30

@@ -3,7 +3,7 @@ O4004 (PROBE THE BLANK, THEN FACE IT)
 G17 G21 G40 G49 G80 G90 G54
 T9 M6
 G65 P9832
-G0 A0. C0. X0. Y0. (@ refused)
+G0 A0. C0. X0. Y0. (@ passed)
 G43 H9 Z100. (@ X0 Y0 Z100)
 G65 P9810 Z10. F3000.
 G65 P9811 Z0. S1.
@@ -13,7 +13,7 @@ G1 X5. (@ refused)
 G91 G28 Z0. (@ passed)
 G90
 T1 M6
-G0 X0. Y0. (@ refused)
+G0 X0. Y0. (@ passed)
 G43 H1 Z50. A0. C0. (@ X0 Y0 Z50 A0)
 G1 Z0. F500. (@ X0 Y0 Z0)
 G31 Z-5. F50. (@ passed)

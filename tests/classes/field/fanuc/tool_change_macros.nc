@@ -19,7 +19,7 @@ G92 X0.
 G1 X3. (@ X4 Y5 Z60)
 G30 P3 Z10. (@ passed)
 G49
-G0 X0. Y0. (@ refused)
+G0 X0. Y0. (@ passed)
 G0 X0. Y0. Z80. (@ X1 Y0 Z80)
 M30
 %
