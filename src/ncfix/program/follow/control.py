@@ -139,7 +139,7 @@ class Control(ABC):
             self.messages[text] = Message(code, text, self.place(), hint)
 
     def refuse_after(self, code: int, *, with_axes: bool) -> None:
-        """A G code (tenths) is not known: it may move or change coordinates; the setup says if not, but for `with_axes`."""
+        """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not."""
         if self.refusal or (code in self.setup.passed_codes and not with_axes):
             return
         name = f"G{code / 10:g}"
