@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ncfix.program.follow import tcp
-from ncfix.program.follow.control import AT_START
 from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import AT_START
 from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
 from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
