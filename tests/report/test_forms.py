@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import UsageError
-from ncfix.report import html, markdown
+from ncfix.report import frame, html, markdown
 from ncfix.report.document import Document, Dots, Line, Plot, Section, Table, Text
 from ncfix.report.forms import form_of
 
@@ -58,11 +58,11 @@ def test_a_page_is_well_formed_and_stands_alone() -> None:
 
 
 def test_a_plot_holds_its_curves_their_bands_and_zero() -> None:
-    frame = html.Frame.around([Line(X, X + 20.0, np.full(5, 3.0))])
-    assert frame.across == (-10.0, 10.0)
-    assert frame.up == (0.0, 33.0)
-    places = [tuple(map(float, each.split(","))) for each in frame.points(X, X + 20.0).split()]
-    assert all(0 <= a <= html.WIDTH and 0 <= b <= html.HEIGHT for a, b in places)
+    drawn = frame.Frame.around([Line(X, X + 20.0, np.full(5, 3.0))])
+    assert drawn.across == (-10.0, 10.0)
+    assert drawn.up == (0.0, 33.0)
+    places = [tuple(map(float, each.split(","))) for each in drawn.points(X, X + 20.0).split()]
+    assert all(0 <= a <= frame.WIDTH and 0 <= b <= frame.HEIGHT for a, b in places)
     assert [b for _, b in places] == sorted((b for _, b in places), reverse=True)
 
 
@@ -82,3 +82,26 @@ def test_the_suffix_says_the_form() -> None:
     with pytest.raises(UsageError) as caught:
         form_of("page.docx")
     assert caught.value.code == "NCF018"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (-358.7, 359.5, [-300, -200, -100, 0, 100, 200, 300]),
+        (-0.0151, 0.0124, [-0.015, -0.01, -0.005, 0, 0.005, 0.01]),
+        (0.0, 900.0, [0, 200, 400, 600, 800]),
+        (3.0, 3.0, [3]),
+    ],
+)
+def test_ticks_stand_at_round_numbers_within_the_axis(low: float, high: float, expected: list[float]) -> None:
+    assert frame.ticks(low, high, 6).tolist() == pytest.approx(expected, abs=1e-12)
+
+
+def test_ticks_of_any_range_are_few_and_inside() -> None:
+    for power in range(-12, 12):
+        for low, width in ((0.0, 1.0), (-3.3, 7.7), (100.0, 0.9)):
+            ends = low * 10.0**power, (low + width) * 10.0**power
+            found = frame.ticks(*ends, frame.UP)
+            assert 2 <= len(found) <= 2 * frame.UP
+            assert ends[0] - 1e-9 * width * 10.0**power <= found.min()
+            assert found.max() <= ends[1] + 1e-9 * width * 10.0**power

@@ -46,6 +46,12 @@ def at_the_ends(machine: Machine, effect: Effect) -> Array:
     return _values(machine, effect, np.where(np.isfinite(ranges), ranges, [0.0, 2 * np.pi]).T, 1)
 
 
+def with_unit(machine: Machine, name: str) -> str:
+    """The name of an axis with the unit of its positions; that of a signal as it is."""
+    units = {axis.name: "degree" if axis.rotary else "mm" for axis in machine.axes}
+    return f"{name}, {units[name]}" if name in units else name
+
+
 def _values(machine: Machine, effect: Effect, q: Array, direction: int) -> Array:
     _, poses = flatten(q, State(direction=direction), machine.axes, frozenset())
     found: Array = np.asarray(effect.coefficients) @ course_of(machine.axes, effect).rows(poses)

@@ -23,6 +23,7 @@ from ncfix.diagnose.words import (
     why,
 )
 from ncfix.machine import Effect
+from ncfix.machine.summary import with_unit
 from ncfix.measure.measurement import Array
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
 
@@ -69,9 +70,12 @@ def _chances(found: Diagnosis) -> Iterator[Part]:
     if found.p_lack is None or found.p_left is None:
         yield Text("Whether what is left is more than noise cannot be said: there are no repeats and no stated noise.")
         return
-    yield Text(
-        f"Noise alone would leave a gap as large as before with p = {_p(found.p_lack)}, after {_p(found.p_left)}."
-    )
+    before, after = _chance(found.p_lack), _chance(found.p_left)
+    yield Text(f"Noise alone would leave a gap as large as before with {before}, after with {after}.")
+
+
+def _chance(p: float) -> str:
+    return f"p {'=' if p > LEAST else 'below'} {max(p, LEAST):.1g}"
 
 
 def _p(value: float) -> str:
@@ -127,7 +131,8 @@ def _component(found: Diagnosis, effect: Effect) -> Iterator[Part]:
     variance = np.einsum("nk,kl,nl->n", design, np.asarray(effect.covariance), design)
     factor, unit = (1e6, "urad") if effect.rotational else (1e3, "um")
     value = factor * (design @ np.asarray(effect.coefficients))
-    caption = f"{effect.name}, {unit} over {effect.signal}; band: two standard deviations"
+    over = with_unit(found.view.machine, effect.signal or "")
+    caption = f"{effect.name}, {unit} over {over}; band: two standard deviations"
     yield Plot(caption, [Line(x, value, 2 * factor * np.sqrt(np.maximum(variance, 0.0)))])
 
 
@@ -152,7 +157,7 @@ def _maps(found: Diagnosis) -> Iterator[Part]:
         if view.reach.moved(axis):
             x = view.q[view.row[inside], index] / axis.unit
             dots = [Dots(x, np.clip(values, -limit, limit), label) for label, values in sides.items()]
-            yield Plot(f"um over {axis.name}", dots)
+            yield Plot(f"um over {with_unit(view.machine, axis.name)}", dots)
     yield from _in_time(found, "um", {label: np.clip(each, -limit, limit) for label, each in every.items()})
 
 

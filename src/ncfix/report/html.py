@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from html import escape
 from itertools import cycle
 
-import numpy as np
-
-from ncfix.machine.se3 import Array
 from ncfix.report.document import Document, Dots, Line, Part, Plot, Section, Table, Text
+from ncfix.report.frame import Frame
 
-WIDTH, HEIGHT, EDGE = 560, 170, 34
 COLOURS = ("#2c6fb5", "#b5452c", "#3f8f3f", "#7a4fa0")
+NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?")
+"""Cells that stand to the right."""
 STYLE = (
-    "body{font:15px/1.45 sans-serif;max-width:70em;margin:2em auto;padding:0 1em;color:#222}"
+    "body{font:15px/1.45 sans-serif;max-width:74em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
-    "svg{background:#fafafa;margin:.3em 0}figure{margin:.8em 0}figcaption{font-size:13px;color:#444}"
+    "td.n{text-align:right}svg{background:#fafafa}figure{display:inline-block;margin:.4em 1em .6em 0}"
+    "figcaption{font-size:13px;color:#444}"
     "@media print{section{break-inside:avoid}}"
 )
 
@@ -48,8 +49,13 @@ def _part(part: Part) -> str:
 
 def _table(table: Table) -> str:
     head = "".join(f"<th>{escape(cell)}</th>" for cell in table.header)
-    rows = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
     return f"<table>{f'<tr>{head}</tr>' if head else ''}{rows}</table>"
+
+
+def _cell(text: str) -> str:
+    opened = '<td class="n">' if NUMBER.fullmatch(text) else "<td>"
+    return f"{opened}{escape(text)}</td>"
 
 
 def _plot(plot: Plot) -> str:
@@ -77,45 +83,3 @@ def _legend(drawn: Sequence[Line | Dots]) -> str:
         if each.label
     ]
     return f" ({', '.join(named)})" if named else ""
-
-
-class Frame:
-    """A plot's axes: from data to places on the page."""
-
-    def __init__(self, across: tuple[float, float], up: tuple[float, float]) -> None:
-        self.across, self.up = across, up
-
-    @classmethod
-    def around(cls, drawn: Sequence[Line | Dots]) -> Frame:
-        """Axes that hold everything, lines with their bands, and zero."""
-        x = np.concatenate([each.x for each in drawn])
-        edges = np.concatenate([edge for each in drawn for edge in _edges(each)])
-        up = min(0.0, float(edges.min())), max(0.0, float(edges.max()))
-        return cls((float(x.min()), float(x.max())), up)
-
-    def points(self, x: Array, y: Array) -> str:
-        """Places as SVG has them."""
-        (left, right), (low, high) = self.across, self.up
-        px = EDGE + (WIDTH - 2 * EDGE) * (x - left) / max(right - left, 1e-12)
-        py = HEIGHT - EDGE - (HEIGHT - 2 * EDGE) * (y - low) / max(high - low, 1e-12)
-        return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(px.tolist(), py.tolist(), strict=True))
-
-    def around_it(self, inside: str) -> str:
-        """The figure with its scale and its zero line."""
-        zero = self.points(np.array(self.across), np.zeros(2))
-        labels = (
-            (2, EDGE, f"{self.up[1]:.3g}"),
-            (2, HEIGHT - EDGE, f"{self.up[0]:.3g}"),
-            (EDGE, HEIGHT - 12, f"{self.across[0]:.4g}"),
-            (WIDTH - 2 * EDGE, HEIGHT - 12, f"{self.across[1]:.4g}"),
-        )
-        texts = "".join(f'<text x="{x}" y="{y}" font-size="11">{text}</text>' for x, y, text in labels)
-        line = f'<polyline points="{zero}" stroke="#999" stroke-dasharray="3"/>'
-        box = f'viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}"'
-        return f'<svg {box} role="img">{line}{inside}{texts}</svg>'
-
-
-def _edges(what: Line | Dots) -> tuple[Array, ...]:
-    if isinstance(what, Dots) or what.spread is None:
-        return (what.y,)
-    return what.y - what.spread, what.y + what.spread

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ncfix.machine import Axis, Effect, Machine
-from ncfix.machine.summary import depends_on, extent, facts, title_of, travel_of, vector
+from ncfix.machine.summary import depends_on, extent, facts, title_of, travel_of, vector, with_unit
 from ncfix.machine.survey import Curve, Drift, curves, drifts
 from ncfix.report.document import Line, Part, Plot, Section, Table, Text
 
@@ -42,12 +42,12 @@ def _tip(machine: Machine) -> Section:
         "Actual minus nominal position of the tool tip in the workpiece frame, as one axis moves and the others stand "
         "in the middle of their travel; tool length zero, approached from below."
     )
-    return Section("Error of the tool tip", [Text(words), *map(_drift, drifts(machine))])
+    return Section("Error of the tool tip", [Text(words), *(_drift(machine, each) for each in drifts(machine))])
 
 
-def _drift(drift: Drift) -> Plot:
+def _drift(machine: Machine, drift: Drift) -> Plot:
     lines = [Line(drift.x, 1e3 * values, label=f"d{name}") for name, values in zip("xyz", drift.error.T, strict=True)]
-    return Plot(f"um over {drift.axis}", lines)
+    return Plot(f"um over {with_unit(machine, drift.axis)}", lines)
 
 
 def _effects(machine: Machine) -> Table:
@@ -93,7 +93,7 @@ def _plots(machine: Machine, effect: Effect) -> Iterator[Part]:
     if found:
         _, unit = _unit(effect)
         band = "; band: two standard deviations" if found[0].sigma is not None else ""
-        caption = f"{effect.name} ({effect.basis.name}), {unit} over {found[0].axis}{band}"
+        caption = f"{effect.name} ({effect.basis.name}), {unit} over {with_unit(machine, found[0].axis)}{band}"
         yield Plot(caption, [_line(effect, curve) for curve in found])
 
 
