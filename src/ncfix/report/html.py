@@ -12,7 +12,7 @@ from ncfix.report.frame import Frame
 
 COLOURS = ("#2c6fb5", "#b5452c", "#3f8f3f", "#7a4fa0")
 NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?")
-"""Cells that stand to the right."""
+"""Cells that stand to the right under their header."""
 STYLE = (
     "body{font:15px/1.45 sans-serif;max-width:74em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.2em .8em;border-bottom:1px solid #ccc;text-align:left}"
@@ -49,12 +49,12 @@ def _part(part: Part) -> str:
 
 def _table(table: Table) -> str:
     head = "".join(f"<th>{escape(cell)}</th>" for cell in table.header)
-    rows = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in table.rows)
+    rows = "".join(f"<tr>{''.join(_cell(cell, bool(head)) for cell in row)}</tr>" for row in table.rows)
     return f"<table>{f'<tr>{head}</tr>' if head else ''}{rows}</table>"
 
 
-def _cell(text: str) -> str:
-    opened = '<td class="n">' if NUMBER.fullmatch(text) else "<td>"
+def _cell(text: str, aligned: bool) -> str:
+    opened = '<td class="n">' if aligned and NUMBER.fullmatch(text) else "<td>"
     return f"{opened}{escape(text)}</td>"
 
 

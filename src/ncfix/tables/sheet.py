@@ -36,6 +36,7 @@ BEFORE = (
 """What is the same with every control."""
 JUMP = 1.5
 """How many times the largest correction no axis may move by."""
+STYLE = "body{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#222}li{margin:.2em 0}"
 LONGER = 50.0
 """mm: the tool with which it is shown what another length leaves."""
 
@@ -170,7 +171,8 @@ def as_html(markdown: str) -> str:
     if opened:
         body.append(f"</{opened}>")
     title = escape(markdown.splitlines()[0].removeprefix("# "))
-    head = f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title></head><body>'
+    head = f'<meta charset="utf-8"><title>{title}</title><style>{STYLE}</style>'
+    head = f'<!doctype html>\n<html lang="en"><head>{head}</head><body>'
     return "\n".join([head, *body, "</body></html>"]) + "\n"
 
 
