@@ -7,10 +7,10 @@ stays as it is; a jump that depends on it cannot be written out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from ncfix.program.flatten import TOO_LONG, FlatLine
-from ncfix.program.follow.faults import Fault
+from ncfix.program.flatten import FlatLine
+from ncfix.program.follow.flat import Change, FlatLines, changed
 from ncfix.program.klartext.calculate import Scope, compiled
 from ncfix.program.klartext.contours import written_out
 from ncfix.program.klartext.control import Control
@@ -45,16 +45,14 @@ class Recorder:
 
     main   the program that is written out
     steps  axis letter -> least increment
-    limit  lines that may be written
     style  of numbers
-    lines  those written so far
+    out    the lines so far
     """
 
     main: Program
     steps: Mapping[str, float]
-    limit: int
     style: Style
-    lines: list[FlatLine] = field(default_factory=list)
+    out: FlatLines
 
     def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
         """Write down a block that is about to be executed; `row` is the block of the main program that led to it."""
@@ -65,9 +63,7 @@ class Recorder:
         text = "\n".join(holes) if holes else self.flat_text(unit.program, block, control.scope)
         line = unit.program.line(block) if not unit.name else self.line_of_call(row)
         for offset, part in enumerate(text.splitlines()):
-            self.lines.append(FlatLine(part.rstrip(), line + (offset if not unit.name and not holes else 0)))
-        if len(self.lines) > self.limit:
-            raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines")
+            self.out.write(part.rstrip(), line + (offset if not unit.name and not holes else 0))
 
     def holes(self, plan: Plan, control: Control) -> list[str]:
         """The holes of a pattern one by one; empty for other blocks, and where they are not known."""
@@ -119,22 +115,19 @@ class Recorder:
 
     def flat_text(self, program: Program, block: int, scope: Scope) -> str:
         """The text of a block with numbers for its formulas, and without its number."""
-        start, stop = (int(edge) for edge in program.blocks[block])
-        edits: list[tuple[int, int, str]] = []
+        edits: list[Change] = []
         for item in program.items_of(block):
             if isinstance(item, Word) and item.address == "N":
-                edits.append((*program.span(block, item.span), ""))
+                edits.append(Change(*program.span(block, item.span)))
             elif isinstance(item, Word) and not isinstance(item.value, (Literal, Constant, Text)):
                 found = self.number(program, block, item.value_span, item.value, scope, self.digits(item.address))
-                edits += [(a, b, text.lstrip("+") if item.address[0] in UNSIGNED else text) for a, b, text in found]
+                unsigned = item.address[0] in UNSIGNED
+                edits += [each._replace(text=each.text.lstrip("+")) if unsigned else each for each in found]
             elif isinstance(item, Assignment) and not isinstance(item.value, (Literal, Text)):
                 found = self.number(program, block, item.span, item.value, scope, OTHERS)
                 name = program.slice(block, item.span).split("=")[0].strip()
-                edits += [(a, b, f"{name} = {text}") for a, b, text in found]
-        text = program.source[start:stop].decode("latin-1")
-        for begin, end, new in sorted(edits, reverse=True):
-            text = text[: begin - start] + new + text[end - start :]
-        return text.lstrip(" \t")
+                edits += [each._replace(text=f"{name} = {each.text}") for each in found]
+        return changed(program, block, edits).lstrip(" \t")
 
     def digits(self, address: str) -> int:
         """Digits after the point of a word."""
@@ -143,19 +136,19 @@ class Recorder:
 
     def number(
         self, program: Program, block: int, span: Span, value: Expression, scope: Scope, digits: int
-    ) -> list[tuple[int, int, str]]:
-        """The edit that puts a number in the place of a formula; none where it is known only at run time."""
+    ) -> list[Change]:
+        """The change that puts a number in the place of a formula; none where it is known only at run time."""
         scope.parameters.touched = False
         found = compiled(value)(scope)
         if scope.parameters.touched:
             return []
         text = self.short(found) if digits == OTHERS else self.style.number(found, digits)
-        return [(*program.span(block, span), text)]
+        return [Change(*program.span(block, span), text)]
 
 
 def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int, comma: bool) -> Sequence[FlatLine]:
     """Follow a program and write down its blocks; raises SourceError NCF237 and NCF238."""
-    recorder = Recorder(interpreter.program, steps, limit, Style(comma))
+    recorder = Recorder(interpreter.program, steps, Style(comma), FlatLines(limit))
     interpreter.recorder = recorder
     interpreter.run()
     program = interpreter.program
@@ -169,4 +162,4 @@ def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int, c
     ]
     head = FlatLine(names[0], program.line(first))
     tail = FlatLine(names[0].upper().replace("BEGIN", "END", 1), program.line(last))
-    return [head, *recorder.lines, tail]
+    return [head, *recorder.out.lines, tail]

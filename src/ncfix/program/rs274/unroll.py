@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
+from ncfix.program.flatten import RUNTIME, FlatLine
 from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.flat import Change, FlatLines, changed
 from ncfix.program.follow.places import mask_of
 from ncfix.program.number_style import decimals_for
 from ncfix.program.rs274.control import Block, Control
@@ -42,28 +43,18 @@ LENGTHS = frozenset((*CENTRE_LETTERS, "R", "Q"))
 
 
 @dataclass(slots=True)
-class Change:
-    """Text of a block to be replaced: from `start` up to `stop`, places in the source."""
-
-    start: int
-    stop: int
-    text: str = ""
-
-
-@dataclass(slots=True)
 class Recorder:
     """Writes blocks down.
 
     steps  axis letter -> least increment of its axis, mm or degree
-    limit  lines that may be written
+    out    the lines so far
     carry  axis letter -> what rounding has left over, program units
     headed  a program number has been written
     """
 
     control: Control
     steps: Mapping[str, float]
-    limit: int
-    lines: list[FlatLine] = field(default_factory=list)
+    out: FlatLines
     carry: dict[str, float] = field(default_factory=dict)
     headed: bool = False
     line: int = 1
@@ -72,10 +63,7 @@ class Recorder:
 
     def write(self, text: str) -> None:
         """One line."""
-        if len(self.lines) >= self.limit:
-            hint = "a program so long is better corrected where it is made"
-            raise Fault(TOO_LONG, f"written out flat the program has more than {self.limit} lines", hint)
-        self.lines.append(FlatLine(text, self.line))
+        self.out.write(text, self.line)
 
     def whole(self, unit: Unit, block: int) -> None:
         """A block as it stands."""
@@ -122,15 +110,12 @@ class Recorder:
         incremental = self.control.modal.incremental
         written = unit.program.templates[unit.template[index]].words
         words = [w for w in written if w.address in POLAR or w.address in INDEX or (incremental and is_distance(w))]
-        spans = {unit.program.span(index, word.span) for word in words}
-        kept = [change for change in changes if not inside(change, spans)]
         stop = end_of_words(unit, index)
         if incremental or not {"@", "^"} <= block.values.keys():
             self.must_stand(mask_of((X, Y)))
         others = "".join(x for x in LETTERS if x in self.steps and (x in "XY" or block.axes >> INDEX[x] & 1))
         text = (" G90" if incremental else "") + self.place(self.control.position, others)
-        kept += [self.removal(unit, index, word) for word in words]
-        self.put(unit, index, [*kept, Change(stop, stop, text)])
+        self.put(unit, index, [*self.without(unit, index, words, changes), Change(stop, stop, text)])
         if incremental:
             self.write("G91")
 
@@ -250,26 +235,32 @@ class Recorder:
     ) -> None:
         """The holes of a block, one block each, in absolute coordinates."""
         drop = [word for word in plan.template.words if is_place(word, self.control)]
-        spans = {unit.program.span(index, word.span) for word in drop}
-        kept = [change for change in changes if (change.start, change.stop) not in spans and not inside(change, spans)]
-        kept += [self.removal(unit, index, word) for word in drop]
         stop = end_of_words(unit, index)
         incremental = self.control.modal.incremental
-        plane, level = self.control.modal.plane, self.control.modal.cycle.level / self.control.modal.unit
-        if incremental:
-            self.must_stand(block.axes | 1 << plane.across)
-        adrift = self.control.places.adrift & ~block.axes
-        known = [i for i in (plane.first, plane.second) if not adrift >> i & 1]
-        over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
-        named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
-        letters = over + named.replace(LETTERS[plane.across], "") + LETTERS[plane.across]
+        level = self.control.modal.cycle.level / self.control.modal.unit
+        over, depth = self.letters_of_holes(block)
         mode = " G90" if incremental or any(is_distance(word) for word in drop) else ""
-        first = mode + self.place(holes[0], letters) + " R" + self.number_at("R", level)
-        self.put(unit, index, [*kept, Change(stop, stop, first)])
+        first = mode + self.place(holes[0], over + depth) + " R" + self.number_at("R", level)
+        self.put(unit, index, [*self.without(unit, index, drop, changes), Change(stop, stop, first)])
         for hole in holes[1:]:
             self.write(self.place(hole, over).strip())
         if incremental:
             self.write("G91")
+
+    def letters_of_holes(self, block: Block) -> tuple[str, str]:
+        """The letters that say where a hole is in the plane, and what else the first one needs, its depth last.
+
+        Raises `Fault` where an increment would have to become a word for an axis that the program has not placed.
+        """
+        plane = self.control.modal.plane
+        if self.control.modal.incremental:
+            self.must_stand(block.axes | 1 << plane.across)
+        adrift = self.control.places.adrift & ~block.axes
+        known = [i for i in (plane.first, plane.second) if not adrift >> i & 1]
+        over = "".join(LETTERS[i] for i in known if LETTERS[i] in self.steps)
+        across = LETTERS[plane.across]
+        named = "".join(x for x in LETTERS if block.axes >> INDEX[x] & 1 and x in self.steps and x not in over)
+        return over, named.replace(across, "") + across
 
     def place(self, hole: Vector, letters: str) -> str:
         """The words of a hole for some letters."""
@@ -287,31 +278,31 @@ class Recorder:
 
     # -- lines --------------------------------------------------------------------------------------------------------
 
+    def without(self, unit: Unit, index: int, words: list[Word], changes: list[Change]) -> list[Change]:
+        """The changes of a block from which some words fall away."""
+        spans = {unit.program.span(index, word.span) for word in words}
+        kept = [change for change in changes if not inside(change, spans)]
+        return kept + [self.removal(unit, index, word) for word in words]
+
     def put(self, unit: Unit, index: int, changes: list[Change]) -> None:
         """Write a block with changes made; not if nothing is left of it."""
-        start, stop = map(int, unit.program.blocks[index])
-        text, at = "", start
-        for change in sorted(changes, key=lambda each: (each.start, each.stop)):
-            if change.start < at and change.stop <= at:
-                continue
-            text += unit.program.source[at : max(at, change.start)].decode("latin-1") + change.text
-            at = change.stop
-        text += unit.program.source[at:stop].decode("latin-1")
-        if text.strip() or (not changes and start == stop):
+        text = changed(unit.program, index, changes)
+        if text.strip() or not (changes or text):
             self.write(text.strip() if changes else text)
 
 
 def unrolled(interpreter: Interpreter, steps: Mapping[str, float], limit: int) -> list[FlatLine]:
     """Run an interpreter and write down what it executes; raises SourceError where no flat program can say it."""
-    recorder = Recorder(interpreter.control, steps, limit)
+    recorder = Recorder(interpreter.control, steps, FlatLines(limit))
     interpreter.recorder, interpreter.control.ends = recorder, []
     interpreter.run()
     if why := interpreter.control.unwritten:
         raise SourceError.of(RUNTIME, f"{why}, so the program cannot be written out flat", interpreter.place())
-    begins, ends = (recorder.lines[at].text.lstrip()[:1] == "%" if recorder.lines else False for at in (0, -1))
-    if begins and (not ends or len(recorder.lines) == 1):
+    lines = recorder.out.lines
+    begins, ends = (lines[at].text.lstrip()[:1] == "%" if lines else False for at in (0, -1))
+    if begins and (not ends or len(lines) == 1):
         recorder.write("%")
-    return recorder.lines
+    return lines
 
 
 def trimmed(value: float, decimals: int) -> str:

@@ -113,7 +113,7 @@ class Interpreter:
             raise SourceError.of(RUNTIME, DECIDED_AT_RUNTIME, self.place()) from None
         except Fault as fault:
             raise self.error(fault) from None
-        return recorder.lines
+        return recorder.out.lines
 
     def walk(self) -> bool:
         """Block after block; whether the program ends before its text does."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.finish import finished
+from ncfix.program.follow.flat import FlatLines
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import bulk_layout
 from ncfix.program.moves import Moves, Trace
@@ -45,7 +46,7 @@ def follow(program: Program, run: Run) -> Trace:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
-    return following(program, run).unrolled(Recorder(steps, limit))
+    return following(program, run).unrolled(Recorder(steps, FlatLines(limit)))
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from ncfix.program.flatten import RUNTIME, TOO_LONG, FlatLine
+from ncfix.program.flatten import RUNTIME
 from ncfix.program.follow.coordinates import LETTERS
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.flat import Change, FlatLines, changed
 from ncfix.program.number_style import decimals_for
 from ncfix.program.sinumerik.patterns import PATTERNS
 from ncfix.program.sinumerik.plans import ANY_PARAMETER, Calling, Letting, names_in
@@ -57,33 +58,28 @@ class Recorder:
     """Writes blocks down.
 
     steps  axis letter -> least increment of its axis, mm or degree
-    limit  lines that may be written
+    out    the lines so far
     """
 
     steps: Mapping[str, float]
-    limit: int
-    lines: list[FlatLine] = field(default_factory=list)
+    out: FlatLines
 
     def record(self, scope: Sinumerik, unit: Unit, block: int, turn: Turn, *, main: bool, line: int) -> None:
         """Write a block down as it is executed."""
-        if len(self.lines) >= self.limit:
-            raise Fault(TOO_LONG, f"the flat program would have more than {self.limit} lines")
-        text = unit.program.text_of(block)
-        start = int(unit.program.blocks[block, 0])
         changes = []
         for item in unit.plan(block).template.items:
             new = self.rewritten(scope, item, turn, main=main)
-            if new is None:
-                continue
-            span, words = new
-            first, last = (place - start for place in unit.program.span(block, span))
-            changes.append((first, last, words if words is not None else self.number(item, turn, text[first:last])))
-        for first, last, words in sorted(changes, reverse=True):
-            text = text[:first] + words + text[last:]
-        text = text.strip()
+            if new is not None:
+                first, last = unit.program.span(block, new[0])
+                words = new[1]
+                if words is None:
+                    words = self.number(item, turn, unit.program.slice(block, new[0]))
+                changes.append(Change(first, last, words))
+        text = changed(unit.program, block, changes).strip()
         if text.split(";")[0].strip() or (main and text):
-            self.lines.append(FlatLine(text, line))
-        self.lines += [FlatLine(self.place(scope, point), line) for point in scope.pattern[1:]]
+            self.out.write(text, line)
+        for point in scope.pattern[1:]:
+            self.out.write(self.place(scope, point), line)
         scope.pattern = ()
 
     def rewritten(self, scope: Sinumerik, item: Item, turn: Turn, *, main: bool) -> tuple[Span, str | None] | None:
