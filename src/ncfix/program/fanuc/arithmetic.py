@@ -197,7 +197,7 @@ def comparison(operator: str, left: Evaluate, right: Evaluate) -> Evaluate:
     def evaluate(scope: Scope) -> float:
         a, b = left(scope), right(scope)
         if in_doubt(a, b):
-            scope.parameters.touched = True  # type: ignore[attr-defined]
+            scope.parameters.touched = True
         return relation(operator, a, b)
 
     return evaluate

@@ -13,8 +13,7 @@ from ncfix.program.fanuc.arithmetic import number
 from ncfix.program.fanuc.outline import Outline
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.expressions import Evaluate
-from ncfix.program.rs274.flow import NO_SUBPROGRAM, RUNTIME_BRANCH, TOO_DEEP
+from ncfix.program.rs274.flow import NO_SUBPROGRAM, TOO_DEEP
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine, has_words
 from ncfix.program.rs274.unit import Unit
@@ -104,15 +103,6 @@ class MacroFlow:
 
     # -- statements ---------------------------------------------------------------------------------------------------
 
-    def value(self, evaluate: Evaluate) -> float:
-        """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
-        parameters = self.control.parameters
-        parameters.touched = False
-        value = evaluate(self.control)
-        if parameters.touched:
-            self.control.refusal = self.control.refusal or RUNTIME_BRANCH
-        return value
-
     def program(self, flow: FlowLine) -> None:
         """An O-word: the head of the program that runs, or that of the next one."""
         here = self.block - 1
@@ -124,7 +114,7 @@ class MacroFlow:
     def jump(self, flow: FlowLine) -> None:
         """GOTO n."""
         label = flow.label
-        self.go_to(int(label) if isinstance(label, str) else round(number(self.value(label))))
+        self.go_to(int(label) if isinstance(label, str) else round(number(self.control.deciding(label))))
 
     def go_to(self, target: int) -> None:
         """Go on at block N of this program."""
@@ -137,19 +127,19 @@ class MacroFlow:
 
     def branch(self, flow: FlowLine) -> None:
         """IF [..] GOTO n."""
-        if self.value(flow.arguments[0]) != 0.0:
+        if self.control.deciding(flow.arguments[0]) != 0.0:
             self.jump(flow)
 
     def condition(self, flow: FlowLine) -> None:
         """IF [..] THEN: whether the rest of the block is done."""
-        self.passed = self.value(flow.arguments[0]) != 0.0
+        self.passed = self.control.deciding(flow.arguments[0]) != 0.0
 
     def loop(self, flow: FlowLine) -> None:
         """WHILE [..] DO m, and DO m, which never ends by itself."""
         end = self.outline.partner.get(self.block - 1)
         if end is None:
             raise Fault(BAD_JUMP, f"DO{flow.label} has no END{flow.label}")
-        if flow.arguments and self.value(flow.arguments[0]) == 0.0:
+        if flow.arguments and self.control.deciding(flow.arguments[0]) == 0.0:
             self.block = end + 1
 
     def loop_end(self, flow: FlowLine) -> None:

@@ -21,7 +21,6 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.groups import NON_MODAL, ROTATION
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
 from ncfix.program.rs274.order import DWELL, MACHINE
@@ -377,13 +376,10 @@ class MacroInterpreter(Interpreter):
 
     def argument(self, word: Word) -> tuple[float, bool]:
         """The value of a word of a macro call, and whether it is known only at run time."""
-        parameters = self.control.parameters
-        parameters.touched = False
-        function: Evaluate = self.control.rules.compiled(word.value, word.address)
-        value = function(self.control)
+        value, at_runtime = self.control.value_of(self.control.rules.compiled(word.value, word.address))
         if isinstance(word.value, Literal) and word.value.pointless and word.address in LENGTHS:
             value = self.control.without_point(word.address, value)
-        return value, parameters.touched
+        return value, at_runtime
 
     def call_modal(self) -> None:
         """After a motion, call the macro that G66 named, unless it is running."""

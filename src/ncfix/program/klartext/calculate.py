@@ -69,6 +69,12 @@ class Scope:
     first: int = 0
     parameters: Parameters = field(default_factory=Parameters)
 
+    def value_of(self, function: Evaluate) -> tuple[float, bool]:
+        """The value of a formula, and whether it is known only at run time; raises `Fault`."""
+        self.parameters.touched = False
+        value = function(self)
+        return value, self.parameters.touched
+
 
 Evaluate = Callable[[Scope], float]
 

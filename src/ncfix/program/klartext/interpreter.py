@@ -215,42 +215,32 @@ class Interpreter:
     def holds(self, plan: Plan) -> bool:
         """Whether a condition is met; raises `Fault` if that is known only at run time."""
         assert plan.test is not None
-        parameters = self.control.scope.parameters
-        parameters.touched = False
-        met = plan.test(self.control.scope) != 0.0
-        if parameters.touched:
+        value, at_runtime = self.control.scope.value_of(plan.test)
+        if at_runtime:
             code = AT_RUN_TIME if self.recorder is None else WRITTEN_AT_RUN_TIME
-            text = f"where the program goes on depends on {parameters.lacking}, which is known only at run time"
-            raise Fault(code, text, f'variables."{parameters.lacking}" in the setup file gives it a value')
-        return met
+            lacking = self.control.scope.parameters.lacking
+            text = f"where the program goes on depends on {lacking}, which is known only at run time"
+            raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')
+        return value != 0.0
 
     def assign(self, plan: Plan) -> None:
         """Set Q parameters."""
-        parameters = self.control.scope.parameters
+        scope = self.control.scope
         for name, value in plan.assignments:
-            parameters.touched = False
-            found = value(self.control.scope)
-            parameters.assign(name, found, parameters.touched)
+            scope.parameters.assign(name, *scope.value_of(value))
 
     def evaluated(self, words: Mapping[str, Evaluate]) -> Words:
         """The words of a block as numbers."""
-        parameters = self.control.scope.parameters
-        values, runtime = {}, []
-        for address, value in words.items():
-            parameters.touched = False
-            values[address] = value(self.control.scope)
-            if parameters.touched:
-                runtime.append(address)
-        return Words(values, frozenset(runtime))
+        found = {address: self.control.scope.value_of(value) for address, value in words.items()}
+        runtime = frozenset(address for address, (_, at_runtime) in found.items() if at_runtime)
+        return Words({address: value for address, (value, _) in found.items()}, runtime)
 
     def tool_of(self, plan: Plan) -> str | float | None:
         """The number or name of a tool; a name for a number that is known only at run time."""
         if plan.tool is None or isinstance(plan.tool, str):
             return plan.tool
-        parameters = self.control.scope.parameters
-        parameters.touched = False
-        number = plan.tool(self.control.scope)
-        return parameters.lacking if parameters.touched else number
+        number, at_runtime = self.control.scope.value_of(plan.tool)
+        return self.control.scope.parameters.lacking if at_runtime else number
 
     def names(self, plan: Plan, flow: FlowControl) -> str:
         """The words of a cycle definition that have no value."""

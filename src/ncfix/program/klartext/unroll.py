@@ -138,9 +138,8 @@ class Recorder:
         self, program: Program, block: int, span: Span, value: Expression, scope: Scope, digits: int
     ) -> list[Change]:
         """The change that puts a number in the place of a formula; none where it is known only at run time."""
-        scope.parameters.touched = False
-        found = compiled(value)(scope)
-        if scope.parameters.touched:
+        found, at_runtime = scope.value_of(compiled(value))
+        if at_runtime:
             return []
         text = self.short(found) if digits == OTHERS else self.style.number(found, digits)
         return [Change(*program.span(block, span), text)]

@@ -11,8 +11,11 @@ from ncfix.program.follow import rollover
 from ncfix.program.follow.coordinates import LETTERS, zeros
 from ncfix.program.follow.modal import Saved
 from ncfix.program.language import Run
+from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
 from ncfix.program.rs274.parameters import Parameters
+
+RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 
 
 @dataclass(slots=True)
@@ -77,6 +80,19 @@ class Control(shared.Control):
             (system, own[i], tool[i], self.spatial_anchor(i) if i < len(self.rotation) else None)
             for i in range(len(LETTERS))
         ]
+
+    def value_of(self, function: Evaluate) -> tuple[float, bool]:
+        """The value of an expression, and whether it is known only at run time; raises `Fault`."""
+        self.parameters.touched = False
+        value = function(self)
+        return value, self.parameters.touched
+
+    def deciding(self, function: Evaluate) -> float:
+        """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
+        value, at_runtime = self.value_of(function)
+        if at_runtime:
+            self.refusal = self.refusal or RUNTIME_BRANCH
+        return value
 
     def coordinate(self, index: int) -> float:
         """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""

@@ -12,7 +12,12 @@ from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, Na
 
 
 class Values(Protocol):
-    """The parameters as expressions see them."""
+    """The parameters as expressions see them.
+
+    touched  a value known only at run time has been read
+    """
+
+    touched: bool
 
     def numbered(self, index: int) -> float:
         """The value of `#index`; raises `Fault`."""

@@ -29,7 +29,6 @@ NO_SUBPROGRAM = "NCF231"
 TOO_DEEP = "NCF232"
 GLOBAL = frozenset({"sub", "endsub", "call", "return", "program"})
 ENDS_OF_LOOPS = {"endwhile": "while", "endrepeat": "repeat"}
-RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 
 
 @dataclass(slots=True)
@@ -159,14 +158,9 @@ class FlowControl:
         self.skipping = name
         self.skipping_from = (self.unit, self.block - 1)
 
-    def argument(self, flow: FlowLine, index: int = 0) -> float:
-        """The value of a condition or argument; where it is known only at run time nothing after it is certain."""
-        parameters = self.control.parameters
-        parameters.touched = False
-        value = flow.arguments[index](self.control)
-        if parameters.touched:
-            self.control.refusal = self.control.refusal or RUNTIME_BRANCH
-        return value
+    def argument(self, flow: FlowLine) -> float:
+        """The value of a condition or argument."""
+        return self.control.deciding(flow.arguments[0])
 
     # -- the walk -----------------------------------------------------------------------------------------------------
 
@@ -234,10 +228,7 @@ class FlowControl:
     def call(self, flow: FlowLine, name: str) -> None:
         """`call [..] [..]`: the arguments become #1, #2, ..."""
         parameters = self.control.parameters
-        arguments = []
-        for argument in flow.arguments:
-            parameters.touched = False
-            arguments.append((argument(self.control), parameters.touched))
+        arguments = [self.control.value_of(argument) for argument in flow.arguments]
         saved = parameters.locals()
         self.begin(Call(name, self.unit, self.block, saved=saved))
         parameters.set_locals(arguments)

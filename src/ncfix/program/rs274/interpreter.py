@@ -15,8 +15,8 @@ from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
-from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.flow import RUNTIME_BRANCH, Course, FlowControl
+from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
+from ncfix.program.rs274.flow import Course, FlowControl
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
@@ -238,14 +238,13 @@ class Interpreter:
     def evaluate(self, plan: Plan, index: int) -> Block:
         """The values of a block; its assignments take effect when all have been read."""
         control = self.control
-        numbers, first, parameters = control.numbers, control.first, control.parameters
+        numbers, first = control.numbers, control.first
         values = {letter: numbers[first + slot] for letter, slot in plan.literals}
         runtime = []
         for letter, function, span in plan.computed:
-            parameters.touched = False
             self.span = span
-            values[letter] = function(control)
-            if parameters.touched:
+            values[letter], at_runtime = control.value_of(function)
+            if at_runtime:
                 runtime.append(letter)
         if plan.assignments:
             self.assign(plan)

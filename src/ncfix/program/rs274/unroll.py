@@ -19,8 +19,7 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.flat import Change, FlatLines, changed
 from ncfix.program.follow.places import mask_of
 from ncfix.program.number_style import decimals_for
-from ncfix.program.rs274.control import Block, Control
-from ncfix.program.rs274.flow import RUNTIME_BRANCH
+from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
 from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
