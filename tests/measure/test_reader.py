@@ -197,10 +197,12 @@ RTL = """HEADER::
 File type: x
 DEVIATIONS here later
 TARGET DATA::
+Target-count: 3
 Targets:
 0.000 50.000 100.000
 USER-TEXT::
 Axis: X
+TITLE: spring
 RUNS::
 DEVIATIONS::
 Run Target Data:
@@ -221,6 +223,51 @@ def test_an_interferometers_file():
     assert found.columns["direction"].tolist() == [1, 1, 1, -1, -1, -1]
     assert found.columns["value"][4] == pytest.approx(1.5e-3)
     assert found.columns["position"].tolist() == [0, 50, 100, 100, 50, 0]
+
+
+AS_SAVED = RTL.replace("Targets:\n0.000 50.000 100.000\n", "Targets :\n0.000  50.000 \n100.000 \nFlags: 0 0 2 0\n\n")
+"""The key and the folded targets as the instrument's own software has them."""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        AS_SAVED,
+        AS_SAVED.replace("\n", "\r\n"),
+        AS_SAVED.replace("Axis: X", "Axis:X-axis"),
+        AS_SAVED.replace("ENVIRONMENT::", "\nEQUIPMENT::\nSerial: 1 2 3\nEOF::\n"),
+        "\n" + AS_SAVED.replace(" 2 1.2", "\t2\t1.2"),
+    ],
+)
+def test_the_forms_of_an_interferometers_file(text: str):
+    found, plain = reads(text.encode(), THREE), reads(RTL.encode(), THREE)
+    assert found.labels == plain.labels
+    for name in ("position", "value", "direction", "run"):
+        assert found.columns[name].tolist() == plain.columns[name].tolist()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("Axis: X", "Axis: C", "rotary axis"),
+        ("Axis: X", "Axis:", "the axis is ''"),
+        ("TITLE: spring", "TITLE: Straightness of X", "another error than positioning"),
+        ("2 1 0.4", "2 4 0.4", "target 4 of 3"),
+        ("2 1 0.4", "2 1", "not a line of run, target and deviation"),
+        ("2 1 0.4", "2 1 0,4", "'0,4' is not a number"),
+        ("Target-count: 3", "Target-count: 4", "is a part of the file missing?"),
+        ("Targets:", "Target:", "no line `Targets:`"),
+    ],
+)
+def test_interferometers_files_that_cannot_be_taken_for_positioning(old: str, new: str, said: str):
+    assert old in RTL
+    with pytest.raises(ConfigError) as caught:
+        reads(RTL.replace(old, new).encode(), THREE)
+    assert said in str(caught.value)
+
+
+def test_a_run_that_was_cut_off_is_remarked():
+    assert remarks(RTL.replace("2 1 0.4\n", "")) == {"NCF618"}
 
 
 def test_tables_of_controls_are_direct_readings():

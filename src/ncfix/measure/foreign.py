@@ -16,12 +16,13 @@ import numpy as np
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.machine import Machine
 from ncfix.measure import checks
+from ncfix.measure import renishaw as rtl
 from ncfix.measure.measurement import Measurement
+from ncfix.measure.renishaw import number_of
 from ncfix.plugins import registry
 
 GRID = re.compile(r"\[(\w+)\]")
 ERROR = re.compile(r"E[XYZABC][A-Z]")
-MICROMETRE = 1e-3
 
 Reader = Callable[[str, str], Measurement | None]
 """Makes a measurement of a text and its path, or None if the text is not of its kind."""
@@ -75,7 +76,7 @@ def _by_plugin(text: str, path: str) -> Measurement | None:
 
 
 def _reader(text: str) -> Callable[[str, str], Measurement] | None:
-    if text.startswith("HEADER::") and "DEVIATIONS::" in text:
+    if text.lstrip().startswith("HEADER::") and "DEVIATIONS::" in text:
         return renishaw
     if "Gridpoints" in text or re.search(r"^\[[ABC]0[A-Z]\]", text, re.MULTILINE):
         return etalon
@@ -85,25 +86,14 @@ def _reader(text: str) -> Callable[[str, str], Measurement] | None:
 
 def renishaw(text: str, path: str) -> Measurement:
     """A Renishaw `.rtl`: targets in mm, deviations in um by run and target; a run goes the way of its targets."""
-    lines = text.splitlines()
-    axis = next((line.split(":")[1].strip() for line in lines if line.startswith("Axis:")), "")
-    start = next((k for k, line in enumerate(lines) if line.startswith("Targets:")), None)
-    if start is None or len(axis) != 1 or start + 1 >= len(lines):
-        raise ConfigError.of("NCF618", "there is no line `Axis:` or `Targets:`", Place(path))
-    targets = [_number(word, path, start + 2) for word in lines[start + 1].split()]
-    rows, first = Rows(path), lines.index(next(line for line in lines if line.startswith("DEVIATIONS::"))) + 1
-    readings = []
-    for number, line in enumerate(lines[first:], first + 1):
-        words = line.split()
-        if len(words) == 3 and words[0].isdigit():
-            readings.append((int(words[0]), int(words[1]), _number(words[2], path, number), number))
-    for run in dict.fromkeys(each[0] for each in readings):
-        mine = [each for each in readings if each[0] == run]
-        way = int(np.sign(targets[mine[-1][1] - 1] - targets[mine[0][1] - 1])) if len(mine) > 1 else 0
-        for _, target, value, number in mine:
-            if not 1 <= target <= len(targets):
-                raise ConfigError.of("NCF618", f"target {target} of {len(targets)}", Place(path, number))
-            rows.add(f"E{axis}{axis}", targets[target - 1], value * MICROMETRE, number, run, way)
+    file = rtl.read(text, path)
+    axis, rows = file.axis(), Rows(path)
+    for way, readings in file.runs():
+        if len(readings) < len(file.targets):
+            said = f"run {readings[0].run} has {len(readings)} of {len(file.targets)} targets"
+            rows.remarks.append(Message("NCF618", said, Place(path, readings[0].line), "was it cut off?"))
+        for each in readings:
+            rows.add(f"E{axis}{axis}", file.targets[each.target - 1], each.value, each.line, each.run, way)
     return rows.measurement("line", "Renishaw")
 
 
@@ -121,7 +111,7 @@ def isg(text: str, path: str) -> Measurement:
             continue
         if len(words) != len(names):
             raise ConfigError.of("NCF606", f"{len(words)} cells, there are {len(names)} columns", Place(path, number))
-        values = [_number(word, path, number) for word in words]
+        values = [number_of(word, path, number) for word in words]
         for name, value in zip(names[1:], values[1:], strict=True):
             rows.add(name, values[0], value, number)
     return rows.measurement("none", "ISG VOLCOMP CSV")
@@ -139,7 +129,7 @@ def etalon(text: str, path: str) -> Measurement:
             what = f"[{section}] is a location error, not an error motion: put E{section} into the machine file"
             rows.remarks.append(Message("NCF618", what, Place(path, number, 1, line)))
         elif section and len(plain.split()) == 2 and ERROR.fullmatch(section):
-            position, value = (_number(word, path, number) for word in plain.split())
+            position, value = (number_of(word, path, number) for word in plain.split())
             rows.add(section, position, value, number)
     return rows.measurement("none", "Etalon exchange")
 
@@ -151,13 +141,3 @@ def _first_words(text: str) -> list[str]:
         if plain:
             return re.split(r"[\s;,]+", plain)
     return []
-
-
-def _number(word: str, path: str, line: int) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise ConfigError.of("NCF608", f"{word!r} is not a number", Place(path, line), "numbers have a decimal point")
-    return value
