@@ -11,6 +11,7 @@ nearest point of the intended path.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -177,9 +178,18 @@ class Intent:
 
     def gap(self, rows: Index, fraction: Array, commands: Array) -> Array:
         """Actual tip of the real machine under `commands` minus intended tip at the fractions, (k, 3) mm."""
-        actual = self.machine.actual_tip(self.joints(rows, commands), self.states(rows, fraction))
-        gap: Array = actual - self.tip(rows, fraction)
-        return gap
+        q, programmed = self.joints(rows, commands), self.segments.at(rows, fraction)
+        return self.gaps(rows, programmed, [q], self.states(rows, fraction))[0]
+
+    def gaps(self, rows: Index, programmed: Array, done: Sequence[Array], states: State) -> list[Array]:
+        """Actual tip with the axes at each of `done` minus intended tip under commands `programmed`, (k, 3) mm.
+
+        All (k, n_axes), of motions `rows` (k,).
+        """
+        if not self.moves.tcp[rows].any():
+            return self.machine.gaps(programmed, done, states)
+        tip = self.meant(rows, programmed)
+        return [self.machine.actual_tip(q, states) - tip for q in done]
 
     def follows(self, rows: Index, commands: Array) -> Array:
         """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""

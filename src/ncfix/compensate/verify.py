@@ -159,7 +159,7 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
     along &= written.intent.moving[move]
     for begins, rows in ((written.segments.start, which), (written.start, move), (written.intent.moves.start, move)):
-        along &= finite(begins)[rows]
+        along &= finite(picked(begins, rows))
     counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
@@ -204,11 +204,9 @@ def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> 
     tools, states = intent.lengths(move), intent.states(move, at)
     commands = written.segments.at(piece, fraction)
     programmed = intent.segments.at(move, at)
-    intended, done, tip = intent.joints(move, programmed), intent.joints(move, commands), intent.meant(move, programmed)
-    before, after = (
-        lengths(correctable(intent, move, commands, intent.machine.actual_tip(q, states) - tip))
-        for q in (intended, done)
-    )
+    intended, done = intent.joints(move, programmed), intent.joints(move, commands)
+    gaps = intent.gaps(move, programmed, (intended, done), states)
+    before, after = (lengths(correctable(intent, move, commands, gap)) for gap in gaps)
     if not tilts:
         return Samples(move, at, before, after, _way(written, piece), 0.0, 0.0)
     ends = np.flatnonzero(fraction == 1.0)

@@ -40,6 +40,23 @@ def breakpoints(axes: tuple[Axis, ...], effects: tuple[Effect, ...], index: int)
     return np.array(sorted(places), dtype=np.float64)
 
 
+def kinks(
+    axes: tuple[Axis, ...], effects: tuple[Effect, ...], points: tuple[Array, ...]
+) -> tuple[tuple[int, Array], ...]:
+    """The axes (columns) with kinks or jumps of their errors, and where these are, ascending, mm and rad.
+
+    That is at the breakpoints (`points`, of each axis), and at the ends of what a basis is given for, where its end
+    values begin to hold.
+    """
+    places = {axis.name: set(own.tolist()) for axis, own in zip(axes, points, strict=True)}
+    units = {axis.name: axis.unit for axis in axes}
+    for effect in effects:
+        if effect.active and effect.signal in places:
+            ends = [end for end in effect.basis.domain if np.isfinite(end)]
+            places[effect.signal].update((effect.center + effect.scale * end) * units[effect.signal] for end in ends)
+    return tuple((j, np.array(sorted(places[axis.name]))) for j, axis in enumerate(axes) if places[axis.name])
+
+
 def needs_tool_length(axes: tuple[Axis, ...], effect: Effect) -> bool:
     """Whether an effect moves the tip by an amount that depends on the tool's length.
 

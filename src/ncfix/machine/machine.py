@@ -22,7 +22,7 @@ from ncfix.machine.jacobian import Jacobians
 from ncfix.machine.route import Route, Turns, route_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.signals import Signal, inputs_of, with_lags
-from ncfix.machine.state import Poses, State, flatten
+from ncfix.machine.state import Poses, State, flatten, poses_first
 from ncfix.machine.steps import SMALL
 from ncfix.machine.transport import columns
 
@@ -147,17 +147,8 @@ class Machine:
 
     @cached_property
     def kinks(self) -> tuple[tuple[int, Array], ...]:
-        """The axes (columns) with kinks or jumps of their errors, and where these are, ascending, mm and rad.
-
-        With those at the ends of what a basis is given for, where its end values begin to hold.
-        """
-        places = {name: set(self.breakpoints(name).tolist()) for name in self.axis_names}
-        for effect in self.effects:
-            if effect.active and effect.signal in places:
-                unit = self.axes[self.axis_names.index(effect.signal)].unit
-                ends = [end for end in effect.basis.domain if np.isfinite(end)]
-                places[effect.signal].update((effect.center + effect.scale * end) * unit for end in ends)
-        return tuple((j, np.array(sorted(places[name]))) for j, name in enumerate(self.axis_names) if places[name])
+        """The axes (columns) with kinks or jumps of their errors, and where these are, see `bending.kinks`."""
+        return bending.kinks(self.axes, self.effects, self._breakpoints)
 
     @cached_property
     def depends_on_direction(self) -> bool:
@@ -199,6 +190,24 @@ class Machine:
         """Where the tip really is in the workpiece frame, shape (..., 3) [mm]."""
         return self._tip(q, state, None if self.is_perfect else self._model)
 
+    def gaps(self, meant: Array, done: Sequence[Array], state: State = State()) -> list[Array]:  # noqa: B008
+        """Where the tip really is with the axes at each of `done`, minus where a perfect machine has it at `meant`.
+
+        All (n, n_axes); (n, 3) mm each. What `actual_tip` and `tip` say, with sines worked out once if they can be.
+        """
+        model, perfect = None if self.is_perfect else self._model, self._perfect_route
+        assert perfect is not None
+        route = perfect if model is None else self._route
+        goals, *others = (self._poses(q, state, model)[1] for q in (meant, *done))
+        found = [np.empty((3, goals.positions.shape[1])) for _ in done]
+        for part, goal in goals.chunks():
+            turns = (route or perfect).turns(goal)
+            target = self._tips_along(perfect, goal, None, turns)
+            for out, here in zip(found, (each.part(part) for each in others), strict=True):
+                alike = np.array_equal(here.positions[self.rotary], goal.positions[self.rotary])
+                out[:, part] = self._tips_along(route, here, model, turns if alike else None) - target
+        return [np.ascontiguousarray(out.T) for out in found]
+
     def aim(
         self,
         q: ArrayLike,
@@ -223,11 +232,11 @@ class Machine:
         return Aim(place.T, arrived, gap.T)
 
     def _aim(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
-        perfect, route = self._perfect_route, self._route
-        assert perfect is not None
+        route = self._route
         if route is None or not at_once(route, poses, axes):
             return self._aim_plainly(poses, axes, target)
-        found, rest = aimed_at_once(poses, axes, perfect, route, target)
+        assert self._perfect_route is not None
+        found, rest = aimed_at_once(poses, axes, self._perfect_route, route, target)
         rows = np.flatnonzero(rest)
         if rows.size:
             goal = None if target is None else target[:, rows]
@@ -269,7 +278,7 @@ class Machine:
         out = np.empty((3, len(axes), poses.positions.shape[1]))
         for part, chunk in poses.chunks():
             out[:, :, part] = self._perfect_route.follows(chunk, axes)
-        return _poses_first(out, shape)
+        return poses_first(out, shape)
 
     def placed(self, q: ArrayLike, axes: tuple[int, ...], target: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """Where X, Y and Z (columns `axes`) of a perfect machine have to be for the tip to be at `target` (n, 3) mm.
@@ -311,7 +320,8 @@ class Machine:
         `jacobians(q).joints` it is `error(q)` up to terms of second order.
         """
         shape, poses = self._poses(q, state, self._model)
-        return _poses_first(linear.joint_errors(self.axes, self.tool, self._active, poses), shape)
+        active = [effect for effect in self.effects if effect.active]
+        return poses_first(linear.joint_errors(self.axes, self.tool, active, poses), shape)
 
     def design(
         self,
@@ -327,11 +337,7 @@ class Machine:
         effects = self.effects if effects is None else tuple(effects)
         shared = linear.Shared.of(self.axes, effects)
         shape, poses = self._with_signals(q, state, shared.signals)
-        return _poses_first(linear.design(self.axes, self.tool, effects, shared, poses), shape)
-
-    @property
-    def _active(self) -> tuple[Effect, ...]:
-        return tuple(effect for effect in self.effects if effect.active)
+        return poses_first(linear.design(self.axes, self.tool, effects, shared, poses), shape)
 
     def _poses(self, q: ArrayLike, state: State, model: ErrorModel | None) -> tuple[tuple[int, ...], Poses]:
         """The common leading shape, and the poses with all the signals that the model needs."""
@@ -391,10 +397,4 @@ class Machine:
         out = np.empty((3, width, poses.positions.shape[1]))
         for part, chunk in poses.chunks():
             out[:, :, part] = function(chunk)
-        return _poses_first(out, shape)
-
-
-def _poses_first(values: Array, shape: tuple[int, ...]) -> Array:
-    """From (..., n) to (*shape, ...), contiguous."""
-    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape((*shape, *values.shape[:-1]))
-    return first
+        return poses_first(out, shape)

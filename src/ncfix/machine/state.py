@@ -53,15 +53,16 @@ class Poses:
         size = LARGE if fast.engaged() else CHUNK
         for start in range(0, self.positions.shape[1], size):
             part = slice(start, start + size)
-            yield (
-                part,
-                Poses(
-                    self.positions[:, part],
-                    _part(self.tool_length, part),
-                    _part(self.direction, part),
-                    {name: values[part] for name, values in self.inputs.items()},
-                ),
-            )
+            yield part, self.part(part)
+
+    def part(self, part: slice) -> Poses:
+        """Some of the poses."""
+        return Poses(
+            self.positions[:, part],
+            _part(self.tool_length, part),
+            _part(self.direction, part),
+            {name: values[part] for name, values in self.inputs.items()},
+        )
 
 
 def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset[str]) -> tuple[tuple[int, ...], Poses]:
@@ -105,3 +106,9 @@ def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
 
 def _part(values: Array, part: slice) -> Array:
     return values if values.shape[-1] == 1 else values[..., part]
+
+
+def poses_first(values: Array, shape: tuple[int, ...]) -> Array:
+    """From (..., n) to (*shape, ...), contiguous."""
+    first: Array = np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape((*shape, *values.shape[:-1]))
+    return first
