@@ -35,7 +35,7 @@ def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
     """Where the last character before a place is that is no blank: as `numbers.last_before`."""
     at = place - 1
     least = max(at - blanks, 0)
-    while at > least and blank[text[at]]:
+    while at > least and blank[text[np.uint64(at)]]:
         at -= 1
     return at
 
@@ -43,19 +43,21 @@ def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
 @LIBRARY.helper
 def run_of(text: Bytes, place: int, stop: int) -> tuple[int, int, int, int, np.uint64]:
     """A run of digits and points: where it ends, its points, digits, decimals, and its digits as a whole number."""
-    begin, points, point, mantissa = place, 0, stop, np.uint64(0)
-    while place < stop:
-        digit = np.uint64(text[place]) - np.uint64(ZERO)
+    at, end, mantissa = np.uint64(place), np.uint64(stop), np.uint64(0)
+    points, point = 0, end
+    while at < end:
+        digit = np.uint64(text[at]) - np.uint64(ZERO)
         if digit < np.uint64(10):
             mantissa = np.uint64(10) * mantissa + digit
-        elif text[place] == POINT:
+        elif text[at] == POINT:
             points += 1
-            point = min(point, place)
+            point = min(point, at)
         else:
             break
-        place += 1
-    decimals = place - point - 1 if points else 0
-    return place, points, place - begin - points, decimals, mantissa
+        at += np.uint64(1)
+    past = np.int64(at)
+    decimals = past - np.int64(point) - 1 if points else 0
+    return past, points, past - place - points, decimals, mantissa
 
 
 @LIBRARY.helper
@@ -133,7 +135,7 @@ def number_from(
         return FIXED, place, past, points > 0, 0.0
     if points > 1 or digits == 0 or digits > digits_most:
         return BROKEN, place, past, points > 0, 0.0
-    value = float(mantissa) / powers[decimals]
+    value = float(mantissa) / powers[np.uint64(decimals)]
     if kinds[leader] == SIGN and takes_sign(text, at, unsigned_after, blank, blanks):
         return FREE, at, past, points > 0, -value if leader == MINUS else value
     return FREE, place, past, points > 0, value
@@ -175,17 +177,19 @@ def in_shape(
     for mark in shape:
         if place >= stop:
             return NONE
-        kind = kinds[text[place]]
+        character = text[np.uint64(place)]
+        kind = kinds[character]
         if mark == marks[0] or mark == marks[1]:
             at = place + (kind == SIGN)
-            if before_number == NUMERIC or at >= stop or kinds[text[at]] != NUMERIC:
+            if before_number == NUMERIC or at >= stop or kinds[text[np.uint64(at)]] != NUMERIC:
                 return NONE
             form, start, past, pointed, value = number_from(text, at, stop, tables, most, powers)
             if form != FREE or start != place or mark != (marks[0] if pointed else marks[1]):
                 return NONE
-            spans[count, 0], spans[count, 1], values[count] = start, past, value
+            row = np.uint64(count)
+            spans[row, 0], spans[row, 1], values[row] = start, past, value
             count, place, before_number = count + 1, past, NUMERIC
-        elif text[place] == mark and kind < COMMENT:
+        elif character == mark and kind < COMMENT:
             place, before_number = place + 1, kind
         else:
             return NONE

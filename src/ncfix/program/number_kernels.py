@@ -19,10 +19,26 @@ ROOM = LONGEST + MOST_STEPS + 4
 """Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
 
 
+def word_at(data: Bytes, place: np.uint64) -> np.uint64:
+    """Eight bytes as one number. A place without a sign is no place from the end: that makes it one load."""
+    word = np.uint64(0)
+    for k in range(np.uint64(8)):
+        word |= np.uint64(data[place + k]) << (np.uint64(8) * k)
+    return word
+
+
 def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
-    """Copy some bytes to `at`; where the next one goes."""
-    for place in range(start, stop):
-        out[at + place - start] = data[place]
+    """Copy some bytes to `at`; where the next one goes. What stands behind it may change: it is yet to be written."""
+    to, first, done, count = np.uint64(at), np.uint64(start), np.uint64(0), np.uint64(stop - start)
+    most = min(len(data) - start, len(out) - at) - 8
+    while done < count and np.int64(done) <= most:
+        word, place = word_at(data, first + done), to + done
+        for k in range(np.uint64(8)):
+            out[place + k] = np.uint8(word >> (np.uint64(8) * k))
+        done += np.uint64(8)
+    while done < count:
+        out[to + done] = data[first + done]
+        done += np.uint64(1)
     return at + stop - start
 
 
@@ -31,17 +47,19 @@ def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool
 
     `signed`: a minus sign counts as one, too: what had a sign keeps one.
     """
-    first = start + (text[start] == PLUS or text[start] == MINUS)
-    point = -1
-    for place in range(first, stop):
+    head = text[np.uint64(start)]
+    first = start + (head == PLUS or head == MINUS)
+    point, place, end = np.int64(-1), np.uint64(first), np.uint64(stop)
+    while place < end:
         character = text[place]
         if character == POINT and point < 0:
-            point = place
+            point = np.int64(place)
         elif character < ZERO or character > ZERO + 9:
             return 0, False, False, 0, False
+        place += np.uint64(1)
     decimals = stop - point - 1 if point >= 0 else 0
     clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
-    plus = text[start] == PLUS or (signed != 0 and text[start] == MINUS)
+    plus = head == PLUS or (signed != 0 and head == MINUS)
     return decimals, point >= 0, plus, stop - first - decimals - (point >= 0), clear
 
 
@@ -55,26 +73,33 @@ def steps_of(value: float, decimals: int) -> int:
     return int(np.rint(steps))
 
 
+def put_digits(data: Bytes, at: int, number: np.uint64, count: int) -> int:
+    """Write the last digits of a number at `at`; where the next byte goes."""
+    first = np.uint64(at)
+    place = first + np.uint64(count)
+    while place > first:
+        place -= np.uint64(1)
+        rest = number // np.uint64(10)
+        data[place] = np.uint8(np.uint64(ZERO) + number - np.uint64(10) * rest)
+        number = rest
+    return at + count
+
+
 def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, point: bool) -> int:
     """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero."""
-    whole, fraction = steps // TENS[decimals], steps % TENS[decimals]
+    number, one = np.uint64(steps), np.uint64(TENS[decimals])
+    whole = number // one
     if sign:
-        data[at] = sign
+        data[np.uint64(at)] = sign
         at += 1
-    count = max(least, 0 if whole == 0 and least < 0 and decimals > 0 else 1)
-    while count < 18 and whole >= TENS[count]:
+    count = max(least, 0 if whole == np.uint64(0) and least < 0 and decimals > 0 else 1)
+    while count < 18 and whole >= np.uint64(TENS[count]):
         count += 1
-    for place in range(at + count - 1, at - 1, -1):
-        data[place] = ZERO + whole % 10
-        whole //= 10
-    at += count
+    at = put_digits(data, at, whole, count)
     if point or decimals > 0:
-        data[at] = POINT
+        data[np.uint64(at)] = POINT
         at += 1
-    for place in range(at + decimals - 1, at - 1, -1):
-        data[place] = ZERO + fraction % 10
-        fraction //= 10
-    return at + decimals
+    return put_digits(data, at, number - whole * one, decimals)
 
 
 def put_in_style(
@@ -122,5 +147,5 @@ def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int, sign
     return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
 
 
-HELPERS = (copied, style_of, steps_of, put, put_in_style, put_all, put_new)
+HELPERS = (word_at, copied, style_of, steps_of, put_digits, put, put_in_style, put_all, put_new)
 """Functions that kernels are made of."""

@@ -7,31 +7,37 @@ from numpy.typing import NDArray
 
 from ncfix.kernel import Library
 from ncfix.program.kernels import MINUS, POINT, before, run_of, takes_sign
+from ncfix.program.number_kernels import word_at
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LIBRARY = Library(__file__, (before, run_of, takes_sign))
+LIBRARY = Library(__file__, (before, run_of, takes_sign, word_at))
 
 
 @LIBRARY.helper
 def same(old: Bytes, at: int, new: Bytes, to: int, count: int) -> bool:
     """Whether so many bytes are the same in two texts."""
-    different = 0
-    for place in range(count):
-        different += old[at + place] != new[to + place]
-    return different == 0
+    a, b, done, whole = np.uint64(at), np.uint64(to), np.uint64(0), np.uint64(count)
+    different = np.uint64(0)
+    while done + np.uint64(8) <= whole:
+        different |= word_at(old, a + done) ^ word_at(new, b + done)
+        done += np.uint64(8)
+    while done < whole:
+        different |= np.uint64(old[a + done] ^ new[b + done])
+        done += np.uint64(1)
+    return different == np.uint64(0)
 
 
 @LIBRARY.helper
 def has_point(text: Bytes, begin: int, end: int) -> bool:
     """Whether there is a decimal point in a span."""
-    found = False
-    for place in range(begin, end):
-        found = found or text[place] == POINT
-    return found
+    place, stop = np.uint64(begin), np.uint64(end)
+    while place < stop and text[place] != POINT:
+        place += np.uint64(1)
+    return place < stop
 
 
 @LIBRARY.helper
