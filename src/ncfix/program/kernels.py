@@ -43,21 +43,20 @@ def before(text: Bytes, place: int, blank: Mask, blanks: int) -> int:
 @LIBRARY.helper
 def run_of(text: Bytes, place: int, stop: int) -> tuple[int, int, int, int, np.uint64]:
     """A run of digits and points: where it ends, its points, digits, decimals, and its digits as a whole number."""
-    at, end, mantissa = np.uint64(place), np.uint64(stop), np.uint64(0)
-    points, point = 0, end
-    while at < end:
-        digit = np.uint64(text[at]) - np.uint64(ZERO)
+    begin, points, point, mantissa = place, 0, stop, np.uint64(0)
+    while place < stop:
+        character = text[np.uint64(place)]
+        digit = np.uint64(character) - np.uint64(ZERO)
         if digit < np.uint64(10):
             mantissa = np.uint64(10) * mantissa + digit
-        elif text[at] == POINT:
+        elif character == POINT:
             points += 1
-            point = min(point, at)
+            point = min(point, place)
         else:
             break
-        at += np.uint64(1)
-    past = np.int64(at)
-    decimals = past - np.int64(point) - 1 if points else 0
-    return past, points, past - place - points, decimals, mantissa
+        place += 1
+    decimals = place - point - 1 if points else 0
+    return place, points, place - begin - points, decimals, mantissa
 
 
 @LIBRARY.helper

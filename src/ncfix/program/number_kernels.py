@@ -48,18 +48,17 @@ def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool
     `signed`: a minus sign counts as one, too: what had a sign keeps one.
     """
     head = text[np.uint64(start)]
-    first = start + (head == PLUS or head == MINUS)
-    point, place, end = np.int64(-1), np.uint64(first), np.uint64(stop)
-    while place < end:
-        character = text[place]
+    first = start + (head in (PLUS, MINUS))
+    point = -1
+    for place in range(first, stop):
+        character = text[np.uint64(place)]
         if character == POINT and point < 0:
-            point = np.int64(place)
+            point = place
         elif character < ZERO or character > ZERO + 9:
             return 0, False, False, 0, False
-        place += np.uint64(1)
     decimals = stop - point - 1 if point >= 0 else 0
     clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
-    plus = head == PLUS or (signed != 0 and head == MINUS)
+    plus = bool(head == PLUS) or (signed != 0 and bool(head == MINUS))
     return decimals, point >= 0, plus, stop - first - decimals - (point >= 0), clear
 
 

@@ -28,16 +28,15 @@ def same(old: Bytes, at: int, new: Bytes, to: int, count: int) -> bool:
     while done < whole:
         different |= np.uint64(old[a + done] ^ new[b + done])
         done += np.uint64(1)
-    return different == np.uint64(0)
+    return bool(different == np.uint64(0))
 
 
 @LIBRARY.helper
 def has_point(text: Bytes, begin: int, end: int) -> bool:
     """Whether there is a decimal point in a span."""
-    place, stop = np.uint64(begin), np.uint64(end)
-    while place < stop and text[place] != POINT:
-        place += np.uint64(1)
-    return place < stop
+    while begin < end and text[np.uint64(begin)] != POINT:
+        begin += 1
+    return begin < end
 
 
 @LIBRARY.helper
