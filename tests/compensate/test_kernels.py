@@ -16,7 +16,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import _look, bounds, uneasy_starts
 from ncfix.compensate.path import plan
 from ncfix.compensate.segments import Segments
-from ncfix.compensate.split import Grid, fewest
+from ncfix.compensate.split import STRETCH, Grid, fewest
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import path_error
 from ncfix.machine import Machine, State, load
@@ -31,9 +31,9 @@ def _plain_again(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     fast.disengage()
 
 
-def grid(rng: np.random.Generator, motions: int) -> Grid:
+def grid(rng: np.random.Generator, motions: int, most: int = 200) -> Grid:
     """Motions that bow to and fro, from 1 um to 0.1 mm."""
-    counts = rng.integers(2, 200, motions)
+    counts = rng.integers(2, most, motions)
     fraction = np.concatenate([np.linspace(0, 1, count) for count in counts])
     phase = np.repeat(rng.uniform(0, 6, motions), counts)
     size = 10 ** np.repeat(rng.uniform(-3, -1, motions), counts)
@@ -43,10 +43,11 @@ def grid(rng: np.random.Generator, motions: int) -> Grid:
     return Grid(counts.astype(np.intp), fraction, command, follow)
 
 
+@pytest.mark.parametrize("most", [200, 5 * STRETCH])
 @pytest.mark.parametrize("seed", range(6))
-def test_fewest_pieces(seed: int) -> None:
+def test_fewest_pieces(seed: int, most: int) -> None:
     pytest.importorskip("numba", reason="the `fast` extra is not installed")
-    nodes = grid(np.random.default_rng(seed), 40)
+    nodes = grid(np.random.default_rng(seed), 40, most)
     plain = fewest(nodes, 0.002)
     assert fast.engage()
     for found, expected in zip(fewest(nodes, 0.002), plain, strict=True):

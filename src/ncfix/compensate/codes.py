@@ -100,6 +100,12 @@ CODES = {
         "`ncfix verify` looks along the whole path and says where; a larger tolerance makes the warning go away, not "
         "the error.",
     ),
+    "NCF417": Code(
+        "a motion is too long to be looked at",
+        "The tip is followed along each motion, as closely as the errors of the machine may bend. A motion of several "
+        "hundred turns, or of many times the travel, would take more looks at it than ncfix has; it is refused.",
+        "Make several motions of it, or check its number of turns.",
+    ),
     "NCF420": Code(
         "the corrected program does not follow the original",
         "The motions of the two programs cannot be put side by side: somewhere the second does not come to where the "

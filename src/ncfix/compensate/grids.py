@@ -24,6 +24,8 @@ PER_PIECE = 32
 """Nodes to each piece expected; a piece is longest to one part in so many."""
 FEW = 14
 """Pieces with fewer nodes on average are worth a finer grid."""
+SPARSE = 4
+"""Pieces with fewer have not been looked at in between."""
 REFINEMENTS = 3
 INSTANT = 1e-7
 """Fraction of a motion from one side of a jump or reversal to the other."""
@@ -69,6 +71,8 @@ def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cu
 
     real    where all motions really start and end
     pieces  (g,) about how many pieces to expect
+
+    Of motions that are too long to be looked at between so many pieces the largest deviation is infinite.
     """
     if not rows.size:
         empty = np.empty(0)
@@ -86,7 +90,9 @@ def split(intent: Intent, real: Segments, rows: Index, pieces: Array, cutter: Cu
         chosen = [short[part] for part in batches(nodes[short], BATCH)]
         finer = [_split(intent, real, rows[each], nodes[each], cutter) for each in chosen]
         parts = [_replaced(result, short, joined(finer))]
-    return joined(parts)
+    result = joined(parts)
+    result.worst[(nodes >= MOST) & (nodes < SPARSE * result.counts)] = np.inf
+    return result
 
 
 def joined(parts: list[Split]) -> Split:

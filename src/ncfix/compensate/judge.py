@@ -8,9 +8,9 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import largest, owners, slices
+from ncfix.compensate.ragged import batches, largest, owners, slices
 from ncfix.compensate.rows import every, farthest, lengths, picked, some
-from ncfix.compensate.sampling import interior, merged, passed
+from ncfix.compensate.sampling import MOST, bends, interior, merged, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.machine.aim import CLOSE
@@ -35,7 +35,7 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
 
     Motions that cannot be off by over half of the tolerance, by a bound, need no look. Short ones of the others get one
     sample in the middle at first. Those that are off by so much are looked at again, as closely as the error model may
-    bend.
+    bend. Of those that are too long for it the deviation is infinite.
     """
     worst = bounds(intent, real, rows, uneasy)
     unknown = np.flatnonzero(~(worst <= SURE * tolerance))
@@ -45,11 +45,16 @@ def deviations(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolera
 
 def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, tolerance: float) -> Array:
     """As `deviations`, of motions that no bound speaks for."""
-    worst = _look(intent, real, rows, uneasy, FIRST, 1)
-    doubtful = np.flatnonzero(~(worst <= SURE * tolerance))
-    if doubtful.size:
-        closer = _look(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
-        worst[doubtful] = np.maximum(worst[doubtful], closer)
+    worst = np.full(len(rows), np.inf)
+    samples = DENSITY * bends(intent, rows) + LEAST
+    seen = np.flatnonzero(samples < MOST)
+    for part in batches(np.ceil(samples[seen]).astype(np.intp), MOST):
+        now = seen[part]
+        worst[now] = _look(intent, real, rows[now], uneasy, FIRST, 1)
+        doubtful = now[~(worst[now] <= SURE * tolerance)]
+        if doubtful.size:
+            closer = _look(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
+            worst[doubtful] = np.maximum(worst[doubtful], closer)
     return worst
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.compensate.split import STRETCH
 from ncfix.kernel import Library
 
 Array = NDArray[np.float64]
@@ -44,8 +45,11 @@ def fewest(
     """
     first = 0
     for motion in range(len(counts)):
-        at, stop, usual = first, first + counts[motion] - 1, 1
-        while at < stop:
+        at, last, usual = first, first + counts[motion] - 1, 1
+        stop = at
+        while at < last:
+            if at == stop:
+                stop, usual = at + STRETCH if last - at >= 2 * STRETCH else last, 1
             near, far, step, reached = at + 1, stop + 1, usual, 0.0
             fresh = True
             while near < stop:

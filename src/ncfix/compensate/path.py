@@ -25,7 +25,8 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import beside, deviations, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.round import may_be_round
-from ncfix.compensate.rows import finite
+from ncfix.compensate.rows import every, finite
+from ncfix.compensate.sampling import too_long
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
 from ncfix.compensate.strategies import Strategy
@@ -100,9 +101,16 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     followed = _followed(intent, real, kept, strategy, demands)
     deviation = _judged(intent, real, kept, broken, followed, demands)
     limit = demands.budget.path
-    over = np.flatnonzero((deviation > limit) & ~bound)
+    over = _not_far_off(intent, np.flatnonzero((deviation > limit) & ~bound))
+    over = over[~too_long(intent, over)]
     parts = in_pieces(intent, real, over, deviation[over], strategy, demands)
     deviation[over] = parts.worst
+    unseen = _not_far_off(intent, np.flatnonzero(np.isinf(deviation)))
+    if unseen.size:
+        also = kept.copy()
+        also[unseen] = True
+        again = _plan(intent, strategy, demands, also)
+        return replace(again, findings=(*ends.findings, _too_long(unseen), *again.findings))
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
     known = Known(ends.before, ends.wanted, beside(intent, real, np.flatnonzero(followed)))
@@ -195,6 +203,18 @@ def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, toler
 def _stuck(rows: Index) -> Finding:
     text = "this arc would have to be made of straight pieces, and must not be split"
     return Finding("NCF415", rows, np.zeros(len(rows)), text)
+
+
+def _not_far_off(intent: Intent, rows: Index) -> Index:
+    """Motions `rows` (k,) without those that end farther beyond a range than it is wide: for that they are refused."""
+    low, high = intent.machine.ranges.T
+    q = intent.joints_at(rows, np.ones(len(rows)))
+    return rows[every((q > 2 * low - high) & (q < 2 * high - low))]
+
+
+def _too_long(rows: Index) -> Finding:
+    text = "this motion is so long, or makes so many turns, that it cannot be looked at closely enough"
+    return Finding("NCF417", rows, np.zeros(len(rows)), text, hint="make several motions of it")
 
 
 def _remarks(

@@ -135,6 +135,8 @@ class Planner:
             alone[others.rows] = False
         real = replace(intent.segments, start=ends[0], end=ends[1])
         over, parts = self._split(intent, real, shift, alone)
+        if over.size and parts is None:
+            return None
         pieces, first = pieces_of(real, over, parts, others)
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
@@ -149,7 +151,7 @@ class Planner:
         return moving if self.demands.split_rapids else moving & (moves.kind == Kind.FEED)
 
     def _split(self, intent: Intent, real: Segments, shift: Array, among: Mask) -> tuple[Index, Split | None]:
-        """The motions that must be split, and their pieces; `among` (n,) motions."""
+        """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way."""
         moves, limit = intent.moves, self.demands.budget.path
         bound = self._bounds(real, shift, intent.lengths(np.arange(1)))
         bound[passed(intent, real.start, real.end)[0]] = np.inf
@@ -159,7 +161,10 @@ class Planner:
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
         over = worst > limit
         rows = rows[over]
-        return rows, in_pieces(intent, real, rows, worst[over], self.strategy, self.demands) if rows.size else None
+        if not rows.size or np.isinf(worst).any():
+            return rows, None
+        parts = in_pieces(intent, real, rows, worst[over], self.strategy, self.demands)
+        return rows, parts if np.isfinite(parts.worst).all() else None
 
     def _bounds(self, real: Segments, shift: Array, tool_length: Array) -> Array:
         """What the deviation of the tip does not exceed along each motion, (n,) mm."""

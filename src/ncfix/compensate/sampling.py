@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
@@ -14,8 +15,10 @@ from ncfix.machine import Machine
 TURN = 2 * np.pi
 EIGHTH = TURN / 8
 """rad; whatever the errors do, turning an axis bends their effect in the workpiece over an eighth of a turn."""
-MOST = 1 << 14
-"""Samples on one motion."""
+MOST = 1 << 19
+"""Samples on one motion, so many that they take a second or two."""
+MOST_TURNS = MOST / DENSITY * EIGHTH
+"""rad; a motion that turns an axis by more cannot be looked at."""
 BISECTIONS = 40
 
 
@@ -44,6 +47,12 @@ def bends(intent: Intent, rows: Index) -> Array:
     count: Array = way.sum(axis=1)
     count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
     return count
+
+
+def too_long(intent: Intent, rows: Index) -> Mask:
+    """Motions (k,) on which the error may bend so often that they are not looked at closely enough."""
+    found: Mask = DENSITY * bends(intent, rows) >= MOST
+    return found
 
 
 def _reach(intent: Intent, rows: Index) -> Array:
@@ -76,9 +85,11 @@ def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least
     """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
 
     `per_bend` samples for each time that the error may bend, at least `least`, and one wherever an axis passes a kink
-    or a jump of the error model, done as `real` has the motions.
+    or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
     """
-    counts = np.clip(np.ceil(per_bend * bends(intent, rows)), least, MOST).astype(np.intp)
+    often = bends(intent, rows)
+    often[DENSITY * often >= MOST] = 0.0
+    counts = np.maximum(np.ceil(per_bend * often), least).astype(np.intp)
     fraction = even(counts)
     if not intent.kinks:
         return counts, fraction
@@ -102,9 +113,10 @@ def passed(intent: Intent, before: Array, after: Array) -> tuple[Index, Array]:
     """Where axes going from `before` to `after` (k, n_axes) pass a kink or a jump: which motion, share of its way."""
     found = [(np.zeros(0, dtype=np.intp), np.zeros(0))]
     for j, points in intent.kinks:
-        endless = intent.machine.axes[j].endless
-        everywhere = _unrolled(points, before[:, j], after[:, j]) if endless else points
-        found.append(_crossings(before[:, j], after[:, j], everywhere))
+        begin, end = before[:, j], after[:, j]
+        if intent.machine.axes[j].endless:
+            begin, end, points = _unrolled(begin, end, points)
+        found.append(_crossings(begin, end, points))
     return np.concatenate([each[0] for each in found]), np.concatenate([each[1] for each in found])
 
 
@@ -128,12 +140,18 @@ def _nodes(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array]:
     return owners(many), at
 
 
-def _unrolled(points: Array, before: Array, after: Array) -> Array:
-    """Places of kinks of an endless axis over the range that is passed: they come again with every turn."""
+def _unrolled(before: Array, after: Array, points: Array) -> tuple[Array, Array, Array]:
+    """Ways (k,) of an endless axis, without the turns that lie behind both ends, and the kinks on them.
+
+    Kinks come again with every turn. Of a motion with more than `MOST_TURNS` only the beginning is looked at.
+    """
+    after = before + np.clip(after - before, -MOST_TURNS, MOST_TURNS)
+    behind = TURN * np.floor(np.minimum(before, after) / TURN)
+    before, after = before - behind, after - behind
     ends = np.concatenate([before, after])
     low, high = np.nanmin(ends, initial=0.0), np.nanmax(ends, initial=0.0)
     turns = np.arange(np.floor((low - points[-1]) / TURN), np.ceil((high - points[0]) / TURN) + 1)
-    return np.unique(points[None] + TURN * turns[:, None])
+    return before, after, np.unique(points[None] + TURN * turns[:, None])
 
 
 def _crossings(before: Array, after: Array, points: Array) -> tuple[Index, Array]:

@@ -6,9 +6,9 @@ exact command, times how the tip follows commands; the error model need not be e
 order of the tolerance, so what is left out is smaller by the gradient of the errors (under a thousandth).
 
 Going as far as possible from each point gives the fewest pieces that can be had with ends on the exact path. All
-motions are worked on at once: a round tries one end for each of them. The first one tried is as far as the piece before
-went, then ends ever farther on from there, or back, until the farthest is between two that were tried; then the gap is
-halved.
+motions are worked on at once, and all stretches of those with very many nodes: a round tries one end for each of them.
+The first one tried is as far as the piece before went, then ends ever farther on from there, or back, until the
+farthest is between two that were tried; then the gap is halved.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.ragged import largest, offsets
+from ncfix.compensate.ragged import largest, offsets, owners, places
+
+STRETCH = 1024
+"""Nodes of a motion after which a piece ends in any case."""
 
 
 class Cuttable(Protocol):
@@ -93,10 +96,9 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
         follow = np.ascontiguousarray(grid.follow)
         kernels.fewest(grid.counts, grid.fraction, grid.command, follow, tolerance, nodes, motions)
         return nodes, motions
-    first = offsets(grid.counts)
-    ends = np.zeros(int(first[-1]), dtype=bool)
-    worst = np.zeros(len(grid.counts))
-    at, stop = first[:-1].copy(), first[1:] - 1
+    stretches, at, stop = _stretches(grid.counts)
+    ends = np.zeros(int(grid.counts.sum()), dtype=bool)
+    worst = np.zeros(len(at))
     near, far, reached = at + 1, stop + 1, np.zeros(len(at))
     usual = np.ones(len(at), dtype=np.intp)
     step, fresh = usual.copy(), np.ones(len(at), dtype=bool)
@@ -118,7 +120,16 @@ def fewest(grid: Cuttable, tolerance: float) -> tuple[Mask, Array]:
         at[done], reached[done], far[done], step[done], fresh[done] = near[done], 0.0, stop[done] + 1, usual[done], True
         near[done] = np.minimum(at[done] + 1, stop[done])
         active = active[at[active] < stop[active]]
-    return ends, worst
+    return ends, largest(worst, stretches)
+
+
+def _stretches(counts: Index) -> tuple[Index, Index, Index]:
+    """How many stretches motions with `counts` (g,) nodes have; the first and the last node of each stretch."""
+    many = np.maximum((counts - 1) // STRETCH, 1)
+    begin = offsets(counts)[:-1][owners(many)] + places(many) * STRETCH
+    end = begin + STRETCH
+    end[offsets(many)[1:] - 1] = offsets(counts)[1:] - 1
+    return many, begin, end
 
 
 def _next_trial(at: Index, near: Index, far: Index, stop: Index, step: Index) -> Index:
