@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE
 from ncfix.program.sinumerik.framing import into_spindle, set_length
 from ncfix.program.sinumerik.plans import Calling, plain_text
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
 
 Find = Callable[[str], Unit | None]
 
-NO_SUBPROGRAM = "NCF231"
 UNKNOWN_CYCLE = "NCF252"
 TRANSFORMING = ("traori", "transmit", "tracyl", "traang", "tracon", "trafoo")
 """How names of transformations by kinematic chains begin, `TRANSMIT_K`."""
@@ -44,7 +42,12 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
             f"the transformation {step.name.upper()} is in force, which ncfix does not follow"
         )
         return
-    text = f"{step.name.upper()} is not known: it is taken as a cycle that leaves coordinates as they are"
+    ran_elsewhere(control, step.name.upper())
+
+
+def ran_elsewhere(control: Sinumerik, name: str) -> None:
+    """A name or number that is no subprogram at hand: taken as a cycle of the builder, perhaps the change of the tool."""
+    text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
     control.lose_all(AFTER_CYCLE)
     control.changed_by_cycle |= control.fresh_tool
@@ -76,5 +79,6 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
         return
     unit = find(f"L{value:g}")
     if unit is None:
-        raise Fault(NO_SUBPROGRAM, f"there is no subprogram L{value:g}", "put its file beside the program")
+        ran_elsewhere(control, f"L{value:g}")
+        return
     turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))

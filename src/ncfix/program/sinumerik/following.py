@@ -15,7 +15,6 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.following import PartFollower
 from ncfix.program.language import Run
 from ncfix.program.parts import NotInPartsError
-from ncfix.program.sinumerik.calling import NO_SUBPROGRAM
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.interpreter import Interpreter, changes_tools
@@ -63,8 +62,6 @@ class PartInterpreter(Interpreter):
         except AtRuntimeError:
             raise NotInPartsError("what is executed is decided at run time") from None
         except Fault as fault:
-            if fault.code == NO_SUBPROGRAM:
-                raise NotInPartsError("a subprogram may stand further down") from None
             raise self.error(fault) from None
 
     def evaluate(self, plan: Plan, index: int) -> Words:
