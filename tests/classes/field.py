@@ -66,6 +66,15 @@ def faults(path: Path, dialect: str, machine: Machine) -> list[str]:
     return [*lines_left_out(moves, lines, text), *wrong_lines(moves, lines, text, refused)]
 
 
+def refused(path: Path, dialect: str, machine: Machine, setup: Setup) -> list[int]:
+    """The lines of which a motion is refused."""
+    source = path.read_bytes()
+    named = DIALECT.search(source.decode())
+    program = read(source, path.name, named["name"] if named else dialect)
+    moves = follow(program, machine, setup).trace.moves
+    return sorted({program.line(int(block)) for block in moves.block[moves.rule == Rule.REFUSE]})
+
+
 def lines_left_out(moves: Moves, lines: Lines, text: str) -> list[str]:
     """Lines with a motion of which no comment says what becomes of it."""
     known = marks(text)

@@ -168,6 +168,8 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
     ]
     if entry["error_before_um"]:
         without = "; without what is refused" if entry["refused"] else ""
+        if any(left["cuts"] for left in entry["left_where_it_stands"]):
+            without += "; without what is left where it stands (NCF439)"
         lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}{without}")
         lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
     if entry["leaves"]:
