@@ -46,7 +46,7 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
 
 
 def ran_elsewhere(control: Sinumerik, name: str) -> None:
-    """A name or number that is no subprogram at hand: taken as a cycle of the builder, perhaps the change of the tool."""
+    """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
     text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
     control.lose_all(AFTER_CYCLE)
