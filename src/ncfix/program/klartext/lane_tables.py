@@ -61,10 +61,7 @@ def lane_of(template: Template, plan: Plan, axes: int) -> Lane | None:
     """The fast lane's view of a shape; None if its blocks are more than a straight motion with plain numbers."""
     if plan.empty:
         return NOTHING
-    other = plan.skip or plan.flow or plan.assignments or plan.tool is not None or plan.statement
-    if other or plan.name not in STRAIGHT or not plan.flags <= FLAGS or len(plan.flags & SIDES.keys()) > 1:
-        return None
-    if any(code not in HARMLESS or own for code, own in plan.codes) or (plan.name == "ln" and not plan.moves):
+    if not is_straight(plan):
         return None
     values = {word.address: word.value for word in template.words if not isinstance(word.value, Constant)}
     slots = {address: value.slot for address, value in values.items() if isinstance(value, Literal) and address != "N"}
@@ -74,3 +71,14 @@ def lane_of(template: Template, plan: Plan, axes: int) -> Lane | None:
     if any(not axes >> index & 1 for index, _ in words):
         return None
     return Lane(words, slots.get("F", -1), RAPID if "fmax" in plan.flags else FEED)
+
+
+def is_straight(plan: Plan) -> bool:
+    """Whether a block does nothing but move straight, by what it has besides words with numbers."""
+    if plan.skip or plan.flow or plan.assignments or plan.tool is not None or plan.statement:
+        return False
+    if plan.name not in STRAIGHT or (plan.name == "ln" and not plan.moves):
+        return False
+    if any(code not in HARMLESS or own for code, own in plan.codes):
+        return False
+    return plan.flags <= FLAGS and len(plan.flags & SIDES.keys()) <= 1

@@ -20,7 +20,6 @@ from ncfix.program.tree import (
     Constant,
     Expression,
     Flow,
-    Literal,
     NamedParameter,
     Opaque,
     Parameter,
@@ -125,17 +124,12 @@ class Plan:
 def plan_of(template: Template) -> Plan:
     """The plan for a shape."""
     items = template.items
-    words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
     plan = Plan(template)
-    plan.settings = tuple(map(setting, words))
-    let = {name for item in items if isinstance(item, Assignment) for name in names_in(item.target)}
-    if let:
-        own = zip(plan.settings, words, strict=True)
-        plan.settings = tuple(each.unsure() if names_one(let, word.value) else each for each, word in own)
+    plan.settings = settings_of(template)
     makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, Flow: branching}
     plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
     plan.g, plan.m = template.g_codes, template.m_codes
-    plan.axes = sum(1 << INDEX[letter] for letter in {word.address for word in words} if letter in INDEX)
+    plan.axes = sum({1 << INDEX[each.address] for each in plan.settings if each.address in INDEX})
     plan.skip = next((item.level for item in items if isinstance(item, Skip)), -1)
     plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
     plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
@@ -143,6 +137,13 @@ def plan_of(template: Template) -> Plan:
     if plan.lane is not None and not template.slots.keys().isdisjoint(DIRECTION):
         plan.vector = tuple(template.slots.get(address, -1) for address in DIRECTION)
     return plan
+
+
+def settings_of(template: Template) -> tuple[Setting, ...]:
+    """The words of a block but N and plain codes; unsure where the block itself sets a variable that they name."""
+    words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
+    let = {name for item in template.items if isinstance(item, Assignment) for name in names_in(item.target)}
+    return tuple(setting(word).unsure() if names_one(let, word.value) else setting(word) for word in words)
 
 
 def is_code(word: Word) -> bool:
@@ -229,19 +230,14 @@ def branching(item: Flow) -> Branching:
 
 def lane_of(plan: Plan) -> Lane | None:
     """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
-    items = plan.template.items
-    plain = all(isinstance(item, Word | Comment) for item in items)
-    words = plan.template.words
-    letters = {word.address for word in words} - {"G", ":"}
-    pointed = not letters.isdisjoint(DIRECTION)
+    template, slots = plan.template, plan.template.slots
+    words = [word for word in template.words if not is_code(word)]
+    if len(slots) < len(words) or not all(isinstance(item, Word | Comment) for item in template.items):
+        return None
+    pointed = not slots.keys().isdisjoint(DIRECTION)
     allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS
-    if not plain or plan.m or len(plan.g) > 1 or not set(plan.g) <= {0, 10} or not letters <= allowed:
+    if plan.m or plan.g not in ((), (0,), (10,)) or not slots.keys() <= allowed:
         return None
-    if any(not isinstance(word.value, Literal) for word in words if not is_code(word)) or len(letters) < len(
-        [word for word in words if not is_code(word)]
-    ):
-        return None
-    slots = {word.address: word.value.slot for word in words if isinstance(word.value, Literal)}
     axes = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)
     return Lane(axes, slots.get("F", -1), plan.g[0] if plan.g else -1)
 
