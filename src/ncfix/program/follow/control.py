@@ -1,36 +1,19 @@
-"""The control while it follows a program: modal state, offsets, what is known, and where the axes stand."""
+"""The control while it follows a program: its motions, and what may be done to each of them."""
 
 from __future__ import annotations
 
-import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
-from ncfix.diagnostics import Message, Place
+from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import contour, tcp
 from ncfix.program.follow.builder import Arc, Builder, Style
-from ncfix.program.follow.coordinates import (
-    DEGREE,
-    IDENTITY,
-    INDEX,
-    LETTERS,
-    ROTARY_LETTERS,
-    Rotation,
-    Vector,
-    Z,
-    dot,
-    product,
-    rotated,
-    transposed,
-    zeros,
-)
-from ncfix.program.follow.knowledge import Knowledge
-from ncfix.program.follow.modal import Modal, Offsets, Tools
+from ncfix.program.follow.coordinates import LETTERS, Vector
 from ncfix.program.follow.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
-from ncfix.program.follow.places import Places, mask_of
+from ncfix.program.follow.places import mask_of
+from ncfix.program.follow.standing import Standing
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pointing import Pointing
@@ -46,78 +29,40 @@ SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
 
-class Control(ABC):
-    """What every control keeps while it follows a program, whatever its language.
+class Control(Standing):
+    """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
 
-    position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
-    unknown    letter index -> why the position is not known
-    shaky      letter index -> why the offset of the letter is not known
+    budget     how much may still be executed
     needs_feed a motion at feed is an error where no feed is set
     refusal    why every motion from here on is refused; empty while all is well
-    suspended  the same, for as long as a code is in force
-    increments what a number without a decimal point counts, linear and rotary words
-    points     a block gave the direction of the tool as a vector
+    suspended  the same, for as long as a code is in force: what suspends them -> why
+    foreign    the axes that the program moves and the machine lacks
+    external   the subprogram file that is executed; empty in the program itself
+    row_block  the block of the program to which motions belong: in a subprogram file the one that has called
+    numbers, first  the numbers of the text that is executed, and where those of the block begin
     ends       where the motions of a block end, if somebody wants to know
-    tilted     a tilted plane is in force, in which X Y Z are those of the tip
+    points     a block gave the direction of the tool as a vector
     whole      the motions of the block must not be split, as under cutter compensation
     at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
-    said       what is not known along the axes of a tilted plane, where its words have said more than the machine's
-               axes alone tell; None: they tell all. `saying`: the same at the end of the motion of this block
-    places     which axes the program itself has brought to where they stand
-    budget     how much may still be executed
     """
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
-        self.setup = run.setup
-        self.kinematics = run.kinematics
-        self.dialect = dialect
-        self.machine = tuple(INDEX[axis] for axis in run.axes)
-        self.rotary = tuple(
-            (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
-        )
+        super().__init__(run, dialect)
         self.builder = Builder(run.axes, run.rotary)
-        self.needs_feed = False
-        self.modal = Modal()
-        self.offsets = Offsets()
-        self.knowledge = Knowledge(run.setup, self.place)
         self.budget = Budget(run.setup.most_blocks, run.setup.most_blocks)
-        self.tools = Tools()
-        self.messages: dict[str, Message] = {}
-        self.foreign: dict[str, Message] = {}
+        self.needs_feed = False
         self.refusal = ""
         self.suspended: dict[str, str] = {}
-        self.increments = (1.0, 1.0)
-        self.tilted = False
+        self.foreign: dict[str, Message] = {}
+        self.external = ""
+        self.row_block = 0
+        self.numbers: Sequence[float] = ()
+        self.first = 0
+        self.ends: list[Vector] | None = None
         self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
-        self.ends: list[Vector] | None = None
-        self.said: Unknown | None = None
-        self.saying: Unknown | None = None
-        self.external = ""
-        self.tcp = run.setup.tcp
-        self.shaky: Unknown = {}
-        self.row_block = 0
-        self.locate: Callable[[], Place] = lambda: Place("")
-        self.numbers: Sequence[float] = ()
-        self.first = 0
-        self.offset_checked = False
-        self._frame = -1
-        self.places = Places.at_start(run.setup, run.axes, LETTERS)
-        self.rotation: Rotation = IDENTITY
-        self.position = zeros()
-        self.unknown: Unknown = {}
-        self._start(run.axes)
-
-    def _start(self, axes: tuple[str, ...]) -> None:
-        """The start position, as far as it is given."""
-        for axis in axes:
-            index = INDEX[axis]
-            if axis in self.setup.initial:
-                self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)
-            else:
-                self.unknown[index] = AT_START
 
     @cached_property
     def pointing(self) -> Pointing | None:
@@ -129,15 +74,6 @@ class Control(ABC):
         moves = self.builder.moves()
         return replace(moves, pointing=self.pointing) if self.points else moves
 
-    def place(self) -> Place:
-        """Where in the program we are."""
-        return self.locate()
-
-    def warn(self, code: str, text: str, hint: str = "") -> None:
-        """A remark, once per text."""
-        if text not in self.messages:
-            self.messages[text] = Message(code, text, self.place(), hint)
-
     def refuse_after(self, code: int, *, with_axes: bool) -> None:
         """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not."""
         if self.refusal or (code in self.setup.passed_codes and not with_axes):
@@ -145,39 +81,6 @@ class Control(ABC):
         name = f"G{code / 10:g}"
         self.refusal = f"{name} is not known, and may move axes or change coordinates"
         self.warn("NCF228", self.refusal, NEITHER.format(name))
-
-    # -- frames -------------------------------------------------------------------------------------------------------
-
-    def refresh(self) -> None:
-        """Compose the offsets; to be called after any of them, the unit or the diameter mode has changed."""
-        offsets = self.offsets
-        centre = offsets.centre
-        if offsets.rotation is not IDENTITY:
-            turned = rotated(offsets.rotation, centre)
-            parts = zip(offsets.shift, offsets.local, centre, turned, offsets.feature, strict=True)
-            inner = [shift + own + c - t + f for shift, own, c, t, f in parts]
-        else:
-            shifts = zip(offsets.shift, offsets.local, offsets.feature, strict=True)
-            inner = [shift + own + f for shift, own, f in shifts]
-        outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
-        tool = zeros() if self.tcp else offsets.tool
-        self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
-        self.rotation = product(offsets.turn, offsets.rotation)
-        self.is_rotated = self.rotation != IDENTITY
-        self.inverse = transposed(self.rotation)
-        self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]
-        if self.modal.diameter:
-            self.scale[0] /= 2
-        self._frame = -1
-        self.places.watch(self.anchors(), self.rotation)
-
-    @abstractmethod
-    def anchors(self) -> list[Hashable]:
-        """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
-
-    def spatial_anchor(self, index: int) -> Hashable:
-        """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
-        return self.tcp, self.tools.offset if (self.tcp and not self.tilted) or index == Z else None
 
     @property
     def frame(self) -> int:
@@ -187,50 +90,6 @@ class Control(ABC):
                 self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
             )
         return self._frame
-
-    def program_position(self) -> Vector:
-        """Where the control stands in the frame of the program, mm and rad."""
-        inner = [p - o for p, o in zip(self.position, self.offset, strict=True)]
-        return rotated(self.inverse, inner) if self.is_rotated else inner
-
-    def in_frame(self, step: Vector) -> Vector:
-        """A difference of commands in the axes of the program's frame, mm and rad."""
-        if not self.is_rotated:
-            return step
-        return [dot(row, step) for row in self.inverse] + step[3:]
-
-    def unit_of(self, index: int) -> float:
-        """mm or rad per program unit of an axis, X not as a diameter."""
-        return DEGREE if self.rotary[index] else self.modal.unit
-
-    # -- what is known ------------------------------------------------------------------------------------------------
-
-    def settle(self, indices: Sequence[int]) -> None:
-        """The start positions of these axes matter: they are given, or lacking and taken as zero."""
-        for index in indices:
-            if self.unknown.get(index) is AT_START:
-                self.knowledge.start_position(LETTERS[index])
-                del self.unknown[index]
-
-    def lose(self, indices: Sequence[int], reason: str) -> None:
-        """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
-        self.said = None
-        for index in indices:
-            if index in self.machine:
-                self.unknown[index] = reason
-
-    def stands_square(self) -> bool:
-        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
-        return False
-
-    def tool_length(self) -> tuple[int, float]:
-        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
-        if self.tools.offset is not None:
-            return self.tools.offset, self.offsets.tool[2]
-        known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
-        return self.tools.spindle, math.nan if known is None else known
-
-    # -- motions ------------------------------------------------------------------------------------------------------
 
     def move(
         self,
