@@ -38,6 +38,8 @@ PROGRAMS = {
     "an open comment": Bad(HEAD + b"G1 X1 (one\nM2\n", product.UNREADABLE, "NCF111", 3),
     "an exponent": Bad(HEAD + b"G1 X1e-5 F100\nM2\n", product.UNREADABLE, "NCF116", 3),
     "a word twice": Bad(HEAD + b"G1 X1 Y2 X3 F100\nM2\n", product.UNREADABLE, "NCF117", 3),
+    "a number of twenty digits": Bad(HEAD + b"G1 X99999999999999999999 F100\nM2\n", product.UNREADABLE, "NCF248", 3),
+    "a centre a thousand kilometres away": Bad(HEAD + b"G2 X30 I2000000000 F9\nM2\n", product.UNREADABLE, "NCF", 3),
     "two points": Bad(HEAD + b"G1 X1.2.3 F100\nM2\n", product.UNREADABLE, "NCF1", 3),
     "two signs": Bad(HEAD + b"G1 X--5 F100\nM2\n", product.UNREADABLE, "NCF1", 3),
     "a point alone": Bad(HEAD + b"G1 X. F100\nM2\n", product.UNREADABLE, "NCF1", 3),

@@ -268,6 +268,12 @@ TRACE_CODES: dict[str, Code] = {
         "corrected, and the motion is not split: pieces could lead the axis round against what the program did.",
         "Write such a turn in two blocks, if it is meant to go the longer way; on SINUMERIK with ACP, ACN or DC.",
     ),
+    "NCF248": Code(
+        "Farther away than any machine goes",
+        "A motion leads more than 1e9 mm away, or turns an axis by as many radians, or turns about a point there: its "
+        "numbers have too many digits. A control stops at them.",
+        "Check the numbers of the block, and the increments, shifts and scales before it.",
+    ),
     "NCF381": Code(
         "The setup file is no TOML",
         "The file cannot be read as TOML; the message says where.",

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
-from ncfix.diagnostics import UsageError
+import numpy as np
+
+from ncfix.diagnostics import SourceError, UsageError
 from ncfix.program import stamp
 from ncfix.program.follow import rollover
 from ncfix.program.follow.control import Control
-from ncfix.program.moves import Moves, Trace
+from ncfix.program.moves import Moves, Rule, Trace
 from ncfix.program.tree import Program
+
+FAR = 1e9
+"""mm or rad; no machine goes farther from zero, and sums of such numbers do not tell micrometres apart."""
+TOO_FAR = "NCF248"
+
+
+def check_reach(program: Program, moves: Moves) -> None:
+    """Raise SourceError at the first motion that leads farther away than any machine goes."""
+    far = (np.abs(moves.end) > FAR).any(axis=1) | (np.abs(moves.centre) > FAR).any(axis=1)
+    rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
+    if rows.size:
+        text = "this leads farther away than any machine goes (1e9 mm or radians)"
+        raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
 
 
 def finished(control: Control, program: Program, moves: Moves) -> Trace:
     """The trace of a program; raises UsageError with all that was not given."""
+    check_reach(program, moves)
     rollover.say(control, program)
     lacking = (*control.foreign.values(), *control.knowledge.missing.values())
     if lacking:

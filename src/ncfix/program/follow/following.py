@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message
 from ncfix.program.follow import rollover
 from ncfix.program.follow.control import Control
+from ncfix.program.follow.finish import check_reach
 from ncfix.program.language import Run
 from ncfix.program.moves import Moves
 from ncfix.program.tree import Program
@@ -63,6 +64,7 @@ class PartFollower(ABC):
         self.control.builder.clear()
         self.interpreter.run_part(last, self.budget(program))
         moves = self.control.moves()
+        check_reach(program, moves)
         rollover.say(self.control, program)
         return moves
 
