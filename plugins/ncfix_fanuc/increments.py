@@ -53,7 +53,10 @@ def _with_cells(
     number: int,
     cells: int,
 ) -> Pitch | None:
-    """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said."""
+    """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said.
+
+    Points are numbered so that the reference position has a number of zero or more, wherever it lies.
+    """
     column = request.machine.axis_names.index(axis)
     described = request.machine.axes[column]
     low, high = (request.space[column] / described.unit).tolist()
@@ -73,6 +76,7 @@ def _with_cells(
     increments, magnification = diffused(sense * curve / units[int(described.rotary)])
     if not increments.any() or np.mean((mean - curve) ** 2) > np.mean(mean**2):
         return None
+    number = max(number, first)
     return Pitch(axis, number, increments, number - first, magnification, interval, turn)
 
 

@@ -50,11 +50,15 @@ def read_folder(files: Files) -> Folder:
 
 
 def _look_across(folder: Folder, remarks: Remarks) -> None:
-    """What only shows when all tables are looked at together."""
+    """What only shows when all tables are looked at together.
+
+    Where factors are added by themselves, too, a table of an axis over itself takes that off again.
+    """
     own = {table.output for table in folder.eec}
     pointed = {table.multiply for table in folder.cec if table.multiply}
+    offsets = bool(pointed) and folder.said.get("product_terms", "only") != "only"
     for table in folder.cec:
-        plain = not table.multiply and table.index + 1 not in pointed
+        plain = not table.multiply and table.index + 1 not in pointed and not offsets
         if plain and table.input == table.output and table.output in own:
             remarks.doubt(0, f"{table.output} over itself is corrected twice, by table {table.index + 1} and by EEC")
     _look_at_limits(folder, remarks)
@@ -81,7 +85,7 @@ def _look_at_pairs(tables: tuple[Table, ...], remarks: Remarks) -> None:
 
 def reading_of(folder: Folder) -> tuple[Reading | None, Remarks]:
     """How the tables are to be taken, from what the comments say, with remarks on what they do not say."""
-    remarks = Remarks("; ncfix:")
+    remarks = Remarks(folder.remarks[0].path if folder.remarks else "")
     axes = {key: value for key, value in folder.said.items() if len(key) == 1}
     used = {name for table in (*folder.cec, *folder.eec) for name in (table.input, table.output)}
     for name in sorted(used - set(axes.values())):

@@ -32,6 +32,15 @@ def long_screw() -> dict[str, bytes]:
     return dict(export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100).native)
 
 
+def test_a_range_far_from_machine_zero_keeps_its_reference_point() -> None:
+    """Points near 250 mm, some 5 mm apart: that of machine zero gets a number all the same, and the sums hold."""
+    machine = single_error("EXX").replace(effects=(Effect("EXX", (1e-9,), Polynomial((3,))),))
+    space = ranges_of(machine, {"X": (200.0, 300.0)})
+    made = export(CONTROL, Request(machine, space, 0.0, 0.001, SETTINGS), 500)
+    assert b"N03620A1P0" in made.native["parameters.txt"]
+    assert [message.text for message in made.messages] == ["the reference position is outside the points"]
+
+
 def test_the_contract() -> None:
     check_control(CONTROL, {"sign": "error"})
 

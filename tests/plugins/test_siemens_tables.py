@@ -308,3 +308,13 @@ def test_a_scheme_that_takes_more_tables_than_there_are() -> None:
 def test_polynomials_for_any_machine() -> None:
     machine = single_error("EXX").replace(effects=(Effect("EYX", (1e-4,), Polynomial((1,))),))
     assert made(machine, scheme="poly25").left.after.max() < 1e-4
+
+
+def test_what_takes_a_factor_off_again_beside_encoder_tables_is_not_corrected_twice() -> None:
+    machine = single_error("EBX", 20e-6).replace(
+        effects=(
+            Effect("EBX", (20e-6,), Polynomial((1,)), scale=300.0),
+            Effect("EXX", (0.01,), Polynomial((2,)), scale=300.0),
+        )
+    )
+    assert not made(machine, product_terms="plus_both", positioning="eec").messages
