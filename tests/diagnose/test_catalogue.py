@@ -80,6 +80,9 @@ def test_names_are_alike_if_either_shows_what_the_other_does() -> None:
     apart = turned + 0.3 * random.normal(size=turned.shape)
     assert ((without(orthonormal(apart), shown[:, None])) ** 2).sum() > TOLD
     assert not alike(own, shown, apart)  # the data tell them
+    basis = orthonormal(own)
+    assert alike(own, shown, basis)
+    assert not alike(own, shown, basis * [1.0, 1.0, 1.0, 1e-3])  # of which the last had to be 8 mm and not 8 um
 
 
 def test_a_spindle_that_grows_may_be_a_frame_that_drifts_where_no_tool_turns() -> None:

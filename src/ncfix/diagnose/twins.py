@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ncfix.diagnose.evidence import Court, Member
+from ncfix.diagnose.evidence import SIZES, Court, Member
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
 
@@ -36,8 +36,17 @@ def _white(court: Court, group: int, share: float) -> Array:
 
 def alike(first: Array, shown: Array, second: Array) -> bool:
     """Whether the second columns can show what is shown, and either what the other may show."""
-    left = without(orthonormal(second), shown[:, None])
-    return float((left**2).sum()) < TOLD and min(_held(first, second), _held(second, first)) > SAME
+    return _left(shown, second) < TOLD and min(_held(first, second), _held(second, first)) > SAME
+
+
+def _left(shown: Array, by: Array) -> float:
+    """Squares of what is shown that columns of the largest size considered cannot show, and of the numbers behind them.
+
+    Without the latter a combination that hardly shows could stand for anything.
+    """
+    sized = SIZES[-1] * by
+    seen = sized.T @ shown
+    return float(shown @ shown - seen @ np.linalg.solve(np.eye(sized.shape[1]) + sized.T @ sized, seen))
 
 
 def _held(columns: Array, by: Array) -> float:
