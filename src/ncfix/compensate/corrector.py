@@ -71,16 +71,23 @@ class Corrector:
         self.stamped = b""
 
     def work(self, share: Share) -> Iterator[tuple[int, Done]]:
-        """The number of each part of the share, and what it has become; the others are only followed."""
-        foreign = False
+        """The number of each part of the share, and what it has become; the others are followed, or passed over."""
+        foreign, self.units.share = False, share
         for number, unit in enumerate(self.units):
             if not share.has(number):
                 foreign = True
-                self.again.first_line += unit.part.program.lines_ended
-                self.proof.follow(unit.part.program, unit.part.last)
+                self._follow_on(unit.part)
                 continue
             yield number, self._corrected(unit, number, share, foreign)
             foreign = False
+
+    def _follow_on(self, part: Part) -> None:
+        """Take the proof past a part of another process."""
+        if part.passage is not None:
+            self.again.first_line += part.passage.lines
+            self.proof.resume(part.passage.remains)
+        self.again.first_line += part.program.lines_ended
+        self.proof.follow(part.program, part.last)
 
     def stamp(self) -> bytes:
         """The stamp as it has to be by what is known now."""

@@ -1,8 +1,9 @@
-"""Several processes that correct one program: each reads and follows all of it, and corrects parts of its own.
+"""Several processes that correct one program: each corrects parts of its own, and knows what the others leave behind.
 
-Parts are taken in turn. What a part has to know of the one before (`Before`) is handed on as soon as that is written,
-so that the next one can be written, too, while it is still being proved. The text comes to the others from the first
-process, and what they have done goes back to it.
+Parts are taken in turn. What a part leaves in the control (`Passage`) is told to all as soon as it has been followed;
+only where that is more than can be told, the others read and follow it, too. What it leaves to the motions behind it
+(`Before`) is handed on as soon as it is written, so that the next one can be written, too, while it is still being
+proved. The text comes to the others from the first process, and what they have done goes back to it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from queue import Empty
 from typing import Any, Generic, Protocol, TypeVar
 
 from ncfix import fast
+from ncfix.compensate.passage import Passage
 from ncfix.compensate.settle import Before
 
 Result = TypeVar("Result")
@@ -39,6 +41,9 @@ class Share:
     outbox   where the process hears of it that has the next part
     others   whether the others are still there
     last     what the last part has left, where there are no others
+    news     where this process hears what parts of others leave in the control, `hearers` where each of the others does
+    heard    what it has heard of parts, by their numbers
+    silent   processes that will not tell any more
     """
 
     jobs: int = 1
@@ -47,10 +52,39 @@ class Share:
     outbox: Any = None
     others: Callable[[], bool] = field(default=lambda: True)
     last: Before | None = None
+    news: Any = None
+    hearers: tuple[Any, ...] = ()
+    heard: dict[int, Passage | None] = field(default_factory=dict)
+    silent: set[int] = field(default_factory=set)
 
     def has(self, number: int) -> bool:
         """Whether a part is its own."""
         return number % self.jobs == self.mine
+
+    def shares(self, number: int) -> bool:
+        """Whether a part is its own, and others want to know of it."""
+        return self.jobs > 1 and self.has(number)
+
+    def announce(self, number: int, passage: Passage | None) -> None:
+        """Tell the others what an own part leaves in the control; None: they have to follow it themselves."""
+        for each in self.hearers:
+            each.put((number, passage))
+
+    def fall_silent(self) -> None:
+        """Let the others know that nothing more will be told."""
+        self.announce(-1 - self.mine, None)
+
+    def passage(self, number: int) -> Passage | None:
+        """What a part of another process leaves in the control; None: it has to be followed. Waits for it."""
+        owner = number % self.jobs
+        while not self.has(number) and number not in self.heard and owner not in self.silent:
+            which, found = waited_for(self.news, self.others)
+            if which < 0:
+                self.silent.add(-1 - which)
+            else:
+                self.heard[which] = found
+        self.heard = {which: found for which, found in self.heard.items() if which >= number}
+        return self.heard.get(number)
 
     def before(self, number: int) -> Before | None:
         """What the part before that one has left, as soon as it is known; None for the first part.
@@ -72,6 +106,25 @@ class Share:
             self.last = before
 
 
+@dataclass(slots=True)
+class Ahead:
+    """Reads a text in pieces of just the size that is wanted, and so many pieces ahead; the last one may be shorter."""
+
+    source: Read
+    pieces: int = 0
+    kept: bytes = b""
+    ended: bool = False
+
+    def __call__(self, size: int) -> bytes:
+        """The next bytes."""
+        while not self.ended and len(self.kept) < (1 + self.pieces) * size:
+            text = self.source(size)
+            self.ended = not text
+            self.kept += text
+        text, self.kept = self.kept[:size], self.kept[size:]
+        return text
+
+
 class Worker(Protocol[Done]):
     """Corrects the parts of a share."""
 
@@ -91,7 +144,7 @@ class Crew(Generic[Result]):
     given: int = 0
 
     def spread(self, read: Read) -> Read:
-        """A way to read that lets the others read the same."""
+        """A way to read that lets the others read the same, and so much ahead that they need not wait for it."""
 
         def spreading(size: int) -> bytes:
             text = read(size)
@@ -99,7 +152,7 @@ class Crew(Generic[Result]):
                 each.put(text)
             return text
 
-        return spreading if self.texts else read
+        return Ahead(spreading, len(self.texts)) if self.texts else read
 
     def put(self, number: int, result: Result) -> None:
         """Note what this process has done."""
@@ -155,8 +208,15 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
     forks = "fork" in multiprocessing.get_all_start_methods()
     context: Any = multiprocessing.get_context("fork" if forks else None)
     boxes, texts = [context.Queue() for _ in range(jobs)], [context.Queue() for _ in range(jobs - 1)]
-    results = context.Queue()
-    shares = [Share(jobs, mine, boxes[mine], boxes[(mine + 1) % jobs]) for mine in range(jobs)]
+    results, news = context.Queue(), [context.Queue() for _ in range(jobs)]
+    shares = [
+        Share(
+            *(jobs, mine, boxes[mine], boxes[(mine + 1) % jobs]),
+            news=news[mine],
+            hearers=tuple(each for each in news if each is not news[mine]),
+        )
+        for mine in range(jobs)
+    ]
     processes = [
         context.Process(target=_work, args=(worker, share, text, results, fast.engaged()), daemon=True)
         for share, text in zip(shares[1:], texts, strict=True)
@@ -171,8 +231,9 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
     try:
         yield Crew(shares[0], texts, results, there)
     finally:
-        for queue in (*boxes, *texts):
+        for queue in (*boxes, *texts, *news):
             queue.cancel_join_thread()
+        texts.clear()
         for process in processes:
             process.terminate()
             process.join()
@@ -186,7 +247,7 @@ def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, resul
         fast.engage()
     share.others, number = parent.is_alive, share.mine
     try:
-        for number, result in worker(lambda size: waited_for(texts, parent.is_alive)).work(share):
+        for number, result in worker(Ahead(lambda size: waited_for(texts, parent.is_alive))).work(share):
             results.put((number, result))
             number += share.jobs
     except (KeyboardInterrupt, GoneError):
@@ -194,6 +255,7 @@ def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, resul
     except Exception as error:
         results.put((number, _portable(error)))
         share.leave(_portable(error))
+        share.fall_silent()
     wait([parent.sentinel])
 
 

@@ -7,7 +7,7 @@ is the same, byte for byte. A part begins with the last motion of the one before
 one part has to know of the earlier ones is what that motion left (`Before`). What cannot be done that way raises
 `NotInPartsError`, and the caller takes the program as a whole.
 
-Several processes can work on a program (see `crew`): each reads and follows all of it, and corrects parts in turn.
+Several processes can work on a program (see `crew`): each corrects parts in turn, and follows what it has to of others.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Stream:
             if error := own.units.missing():
                 raise error
             self._take(others.rest(own.units.count))
-        self._pass_on(own.units.rest)
+        self._pass_on(own.units.rest, own.units.read)
         self.tally.blocks += own.units.blocks
         self.tally.notes = own.units.notes
         messages = (*self.suspicion, *own.units.follower.messages)
@@ -94,7 +94,7 @@ class Stream:
             if self.task.options.allow_refused or not self.tally.refused:
                 self.write(done.text)
 
-    def _pass_on(self, text: bytes) -> None:
+    def _pass_on(self, text: bytes, read: Read) -> None:
         """What comes after the end of the program goes out as it came in."""
         while text:
             if stamp.SIGN.search(text.decode("latin-1")) and not self.task.options.force:
@@ -102,5 +102,5 @@ class Stream:
             ended = text.endswith(b"\n")
             self.tally.blocks += text.count(b"\n")
             self.write(text)
-            text = self.read(self.task.size)
+            text = read(self.task.size)
             self.tally.blocks += not text and not ended

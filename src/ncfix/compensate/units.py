@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from ncfix.compensate.crew import Share
 from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.fix import refuse_stamped
 from ncfix.compensate.following import with_tool_lengths
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.options import FixOptions
+from ncfix.compensate.passage import Passage
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves, Rule, Trace
@@ -26,11 +28,15 @@ MOST_PENDING = 64
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last."""
+    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last.
+
+    passage  what stands before it has been passed over, see there
+    """
 
     program: Program
     moves: Moves
     last: bool
+    passage: Passage | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,8 @@ class Units:
     notes     what there is to say about them
     lacking   what of them is not known
     led       the tip is under control (TCP), or may be
+    share     which parts this process corrects
+    found     parts that have been read so far, also those behind which something is lacking
     """
 
     machine: Machine
@@ -87,6 +95,8 @@ class Units:
     lacking: dict[str, Message] = field(default_factory=dict)
     units: set[float] = field(default_factory=set)
     led: bool = True
+    share: Share = field(default_factory=Share)
+    found: int = 0
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -97,7 +107,7 @@ class Units:
         """The parts; none any more once something is lacking. Raises what reading and following do."""
         head, direction = None, np.zeros(len(self.machine.axes), dtype=np.int8)
         for found in self._parts():
-            part = Part(found.program, self._known(found), found.last)
+            part = replace(found, moves=self._known(found))
             if self.follower.lacking or self.lacking:
                 continue
             unit = Unit(part, head, direction)
@@ -115,13 +125,18 @@ class Units:
     def _parts(self) -> Iterator[Part]:
         """The text in parts that end where they may."""
         pending: list[tuple[Program, Moves]] = []
-        for program, last in self._texts():
+        for program, last, passage in self._texts():
             refuse_stamped(program, self.options)
             self.reader.first_line += program.lines_ended
             self.blocks += len(program)
+            self.follower.watched = self.share.shares(self.found)
             pending.append((program, self.follower.follow(program, last)))
-            self.led = bool(pending[-1][1].tcp.any())
+            self.led = bool(pending[-1][1].tcp.any()) if passage is None else passage.led
             last |= self.follower.ended
+            if passage is not None:
+                self.found += 1
+                yield Part(*pending.pop(), last, passage)
+                continue
             if not last and not _ends_clean(*pending[-1]):
                 if len(pending) > MOST_PENDING:
                     raise NotInPartsError("there is no place at which the program could be parted")
@@ -130,10 +145,30 @@ class Units:
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
             if last:
                 self._check_rest()
+            if self.share.shares(self.found):
+                self.share.announce(self.found, None if last or len(pending) > 1 else self._passage(*pending[0]))
+            self.found += 1
             yield Part(joined(programs), moves, last)
             pending = []
             if last:
                 return
+
+    def _passage(self, program: Program, moves: Moves) -> Passage | None:
+        """What others have to know of a part; None if they have to follow it."""
+        remains = None if matters(self.machine) else self.follower.remains(moves)
+        if remains is None:
+            return None
+        begin = int(program.blocks[-1, 0])
+        lines = program.source.count(b"\n", 0, begin)
+        return Passage(len(program.source), begin, lines, len(program) - 1, self.led, remains)
+
+    def _passed(self, passage: Passage, text: bytes) -> Program:
+        """Pass over a part, which this text begins with, but for its last block."""
+        self.rest = text[passage.size :]
+        self.reader.first_line += passage.lines
+        self.blocks += passage.blocks
+        self.follower.resume(passage.remains)
+        return self.reader.read(text[passage.begin : passage.size])
 
     def _check_rest(self) -> None:
         """Raise `NotInPartsError` if text comes after the end of the program that might belong to it."""
@@ -147,8 +182,11 @@ class Units:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
         return self.size // 4 if self.led else self.size
 
-    def _texts(self) -> Iterator[tuple[Program, bool]]:
-        """The text in parts that end between two blocks of plain words; True with the last one."""
+    def _texts(self) -> Iterator[tuple[Program, bool, Passage | None]]:
+        """The text in parts that end between two blocks of plain words; True with the last one.
+
+        All processes read the same, so that their parts are the same.
+        """
         wanted = self._wanted
         while True:
             new = self.read(max(wanted - len(self.rest), self.size // 4))
@@ -156,10 +194,15 @@ class Units:
             if not new:
                 self.rest = b""
                 if text:
-                    yield self.reader.read(text), True
+                    yield self.reader.read(text), True, None
                 return
             if not text.strip():
                 self.rest = text
+                continue
+            passage = self.share.passage(self.found)
+            if passage is not None and passage.size <= len(text):
+                wanted = self._wanted
+                yield self._passed(passage, text), False, passage
                 continue
             stop = text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1
             program = self.reader.read(text[:stop]) if text[:stop].strip() else None
@@ -169,7 +212,7 @@ class Units:
                 continue
             wanted = self._wanted
             self.rest = text[int(program.blocks[cut, 0]) :]
-            yield stretch(program, 0, cut), False
+            yield stretch(program, 0, cut), False, None
 
     def _known(self, part: Part) -> Moves:
         """The motions of a part with every tool length known; notes what is lacking."""

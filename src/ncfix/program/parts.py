@@ -29,8 +29,30 @@ class NotInPartsError(Exception):
     """The program cannot be taken part by part: it has to be read as a whole."""
 
 
+@dataclass(frozen=True, slots=True)
+class Remains:
+    """What a part that changed nothing else for good leaves in a control, as it was before the last block of the part.
+
+    position    (n_axes,) the command, mm and rad
+    feed        the feed in force; `feed_given`: there is one
+    motion      the motion code in force, in tenths
+    parameters  those that the program may have set, as the language has them
+    """
+
+    position: list[float]
+    feed: float
+    feed_given: bool
+    motion: int
+    parameters: Any
+
+
 class Follower(Protocol):
-    """Follows a program part by part."""
+    """Follows a program part by part.
+
+    watched  it is to be found out what the next part leaves behind
+    """
+
+    watched: bool
 
     @property
     def ended(self) -> bool:
@@ -42,6 +64,12 @@ class Follower(Protocol):
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part; `last`: nothing comes after it."""
+
+    def remains(self, moves: Moves) -> Remains | None:
+        """What the part that was followed last left, given its motions; None if there is more to it than that."""
+
+    def resume(self, remains: Remains) -> None:
+        """Go on as if a part had been followed up to its last block, which comes next."""
 
     def stand(self, position: NDArray[np.float64]) -> None:
         """Take the axes to a command (n_axes,), mm and rad, where the corrected program has left them."""

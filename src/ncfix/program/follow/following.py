@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from ncfix.program.follow import rollover
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.finish import check_reach
 from ncfix.program.language import Run
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.parts import Remains
 from ncfix.program.tree import Program
 
 
@@ -40,6 +41,7 @@ class PartFollower(ABC):
         self.resolve = run.resolve
         self.budget = run.budget
         self.interpreter: Walk | None = None
+        self.watched = self.unchanged = False
 
     @abstractmethod
     def begin(self, program: Program) -> Walk:
@@ -57,6 +59,7 @@ class PartFollower(ABC):
 
     def follow(self, program: Program, last: bool) -> Moves:
         """The motions of the next part."""
+        begun = self.lasting() if self.watched and self.interpreter is not None else None
         if self.interpreter is None:
             self.interpreter = self.begin(program)
         else:
@@ -66,7 +69,35 @@ class PartFollower(ABC):
         moves = self.control.moves()
         check_reach(program, moves)
         rollover.say(self.control, program)
+        self.unchanged = begun is not None and begun == self.lasting()
         return moves
+
+    def lasting(self) -> str | None:
+        """All that the control keeps, but for what `Remains` says, so that it can be compared; None: not said."""
+        return None
+
+    def remains(self, moves: Moves) -> Remains | None:
+        """What the part left behind, if its last two blocks are straight motions, and no more than that has changed."""
+        control, modal = self.control, self.control.modal
+        if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
+            return None
+        straight = np.isin(moves.kind[-2:], (Kind.RAPID, Kind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
+        if not straight.all() or moves.block[-2] + 1 != moves.block[-1]:
+            return None
+        before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
+        return Remains(*before, self.parameters())
+
+    def resume(self, remains: Remains) -> None:
+        """Go on behind what has been followed elsewhere."""
+        modal = self.control.modal
+        self.stand(np.array(remains.position))
+        modal.feed, modal.feed_given = remains.feed, remains.feed_given
+        modal.motion = modal.straight = remains.motion
+        modal.cycle.initial = None
+
+    def parameters(self) -> Any:
+        """What the program may have set, to go from one process to another."""
+        return None
 
     def stand(self, position: NDArray[np.float64]) -> None:
         """Take the axes to a command (n_axes,), mm and rad."""

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow.following import PartFollower, Walk
 from ncfix.program.language import Run
+from ncfix.program.parts import Remains
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.interpreter import Interpreter
+from ncfix.program.rs274.parameters import Store
 from ncfix.program.tree import Program
 
 
@@ -51,6 +55,16 @@ class PartInterpreter(Interpreter):
         return True
 
 
+PASSING = frozenset(
+    {
+        *("setup", "kinematics", "dialect", "rules", "builder", "locate"),
+        *("knowledge", "modal", "parameters", "position"),
+        *("budget", "row_block", "numbers", "first"),
+    }
+)
+"""Of a control: what never changes, what `lasting` looks into or `Remains` says, and what each block sets anew."""
+
+
 class RS274Follower(PartFollower):
     """See `parts.Follower`."""
 
@@ -62,3 +76,22 @@ class RS274Follower(PartFollower):
     def begin(self, program: Program) -> Walk:
         """What goes through the program, of which this is the first part."""
         return PartInterpreter(self.control, program, self.resolve, self.budget(program))
+
+    def lasting(self) -> str:
+        """All that the control keeps."""
+        control = self.control
+        modal, parameters, knowledge = control.modal, control.parameters, control.knowledge
+        cycle = replace(modal.cycle, initial=None)
+        kept = [each for name, each in vars(control).items() if name not in PASSING]
+        kept.append(replace(modal, motion=0, straight=0, feed=0.0, feed_given=False, cycle=cycle))
+        kept += (parameters.scopes, parameters.returned, knowledge.missing, knowledge.assumed)
+        return repr(kept)
+
+    def parameters(self) -> Store:
+        """The numbered parameters."""
+        return self.control.parameters.numbers.copy()
+
+    def resume(self, remains: Remains) -> None:
+        """See `parts.Follower`."""
+        super().resume(remains)
+        self.control.parameters.numbers = remains.parameters.copy()

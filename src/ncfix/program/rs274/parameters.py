@@ -34,6 +34,10 @@ class Store:
     values: dict[Key, float] = field(default_factory=dict)
     runtime: set[Key] = field(default_factory=set)
 
+    def copy(self) -> Store:
+        """The same parameters in a store of its own."""
+        return Store(dict(self.values), set(self.runtime))
+
     def assign(self, key: Key, value: float, runtime: bool) -> None:
         """Set a parameter."""
         self.values[key] = value

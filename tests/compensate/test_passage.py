@@ -1,0 +1,122 @@
+"""Parts of other processes are passed over where little is to be known of them, and nothing is different for it."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from compensate.test_plain import AMONG, winding
+from compensate.test_stream import OPTIONS, SETUP, program, streamed
+from ncfix.compensate.corrector import Corrector
+from ncfix.compensate.crew import Ahead, Share
+from ncfix.compensate.passage import Passage
+from ncfix.compensate.task import Task
+from ncfix.compensate.units import Part, Units
+from ncfix.diagnostics import NcfixError
+from ncfix.machine import Machine, load
+from ncfix.program import dialects
+from ncfix.program.moves import Moves
+from ncfix.program.parts import TABLES
+
+SIZE = 1200
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(root / "benchmarks" / "five_axis.toml")
+
+
+class Telling(Share):
+    """Has all parts, and keeps what it would tell of them."""
+
+    def has(self, number: int) -> bool:
+        return True
+
+    def announce(self, number: int, passage: Passage | None) -> None:
+        self.heard[number] = passage
+
+    def passage(self, number: int) -> Passage | None:
+        return None
+
+
+class Hearing(Share):
+    """Has no part, and has heard of all."""
+
+    def has(self, number: int) -> bool:
+        return False
+
+    def passage(self, number: int) -> Passage | None:
+        return self.heard[number]
+
+
+def gone_through(source: bytes, machine: Machine, dialect: str, share: Share) -> tuple[Units, list[Part]]:
+    task = Task(machine, SETUP, OPTIONS, None, "p.nc", dialects.get(dialect), SIZE)
+    units = Corrector(task, Ahead(io.BytesIO(source).read)).units
+    units.share = share
+    return units, [unit.part for unit in units]
+
+
+def assert_same_motions(found: Moves, expected: Moves) -> None:
+    assert len(found) == len(expected)
+    for each in fields(Moves):
+        one, other = getattr(found, each.name), getattr(expected, each.name)
+        if each.name not in TABLES | {"frame", "reason"}:
+            assert (one is None) == (other is None), each.name
+            assert one is None or np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), each.name
+    assert [found.reasons[k] for k in found.reason] == [expected.reasons[k] for k in expected.reason]
+    for mine, theirs in zip(found.frame, expected.frame, strict=True):
+        assert np.array_equal(found.frames[mine].offset, expected.frames[theirs].offset)
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso"])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_control_goes_on_as_if_it_had_followed_what_was_passed_over(
+    seed: int, dialect: str, machine: Machine
+) -> None:
+    source = (
+        program(seed, 500, 0.02 * (seed % 3)) if seed % 2 else winding(seed, 500, 0.02, (*AMONG, "#100=7.5\nF650."))
+    )
+    telling = Telling(2, 0)
+    reference, expected = gone_through(source, machine, dialect, telling)
+    units, found = gone_through(source, machine, dialect, Hearing(2, 1, heard=telling.heard))
+    assert sum(each is not None for each in telling.heard.values()) >= 1
+    assert len(found) == len(expected)
+    for mine, theirs in zip(found, expected, strict=True):
+        place = theirs.program
+        if mine.passage is None:
+            assert mine.program.source == place.source
+            assert_same_motions(mine.moves, theirs.moves)
+        assert mine.program.line(len(mine.program) - 1) == place.line(len(place) - 1)
+        assert mine.moves.end[-1].tolist() == theirs.moves.end[-1].tolist()
+    for name in ("blocks", "count", "rest", "notes", "assumed"):
+        assert getattr(units, name) == getattr(reference, name), name
+    assert units.follower.messages == reference.follower.messages
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+def test_processes_pass_over_parts_of_each_other(jobs: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Counted in the first process."""
+    passed, resume = [], Units._passed
+
+    def counted(self: Units, passage: Passage, text: bytes) -> object:
+        passed.append(passage.blocks)
+        return resume(self, passage, text)
+
+    monkeypatch.setattr(Units, "_passed", counted)
+    for seed in range(3):
+        source = winding(seed, 400, 0.01, (*AMONG, "#100=1.5"))
+        expected = streamed(source, machine, 2000)
+        passed.clear()
+        assert streamed(source, machine, 2000, jobs=jobs) == expected
+        assert len(passed) >= 2
+
+
+def test_an_error_in_a_part_that_others_would_pass_over_is_told(machine: Machine) -> None:
+    source = winding(0, 300).replace(b"N2500 G1", b"N2500 G1 X1 X2")
+    for jobs in (1, 2, 3):
+        with pytest.raises(NcfixError, match="X"):
+            streamed(source, machine, 2000, jobs=jobs)
