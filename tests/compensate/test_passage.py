@@ -21,6 +21,7 @@ from ncfix.machine import Machine, load
 from ncfix.program import dialects
 from ncfix.program.moves import Moves
 from ncfix.program.parts import TABLES
+from ncfix.program.rs274.following import RS274Follower
 
 SIZE = 1200
 
@@ -95,6 +96,14 @@ def test_a_control_goes_on_as_if_it_had_followed_what_was_passed_over(
     for name in ("blocks", "count", "rest", "notes", "assumed"):
         assert getattr(units, name) == getattr(reference, name), name
     assert units.follower.messages == reference.follower.messages
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso"])
+def test_all_that_a_control_keeps_can_be_compared(dialect: str, machine: Machine) -> None:
+    follower = Task(machine, SETUP, OPTIONS, None, "p.nc", dialects.get(dialect), SIZE).follower()
+    assert isinstance(follower, RS274Follower)
+    assert " object at 0x" not in follower.lasting()
+    assert "lambda" not in follower.lasting()
 
 
 @pytest.mark.parametrize("jobs", [2, 3])
