@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnostics import ConfigError
+from ncfix.machine import Effect, Machine, State
 from ncfix.measure.reader import read, reads
 from ncfix.measure.synthetic import Faults, simulate
 from ncfix.measure.writer import dumps
@@ -221,7 +224,7 @@ def test_an_interferometers_file():
     assert found.kind == "axis"
     assert found.labels["component"] == ("EXX",) * 6
     assert found.columns["direction"].tolist() == [1, 1, 1, -1, -1, -1]
-    assert found.columns["value"][4] == pytest.approx(1.5e-3)
+    assert found.columns["value"][4] == pytest.approx(-1.5e-3)  # X is in the table: its body goes the other way
     assert found.columns["position"].tolist() == [0, 50, 100, 100, 50, 0]
 
 
@@ -266,6 +269,32 @@ def test_interferometers_files_that_cannot_be_taken_for_positioning(old: str, ne
     assert said in str(caught.value)
 
 
+def moving(direction: tuple[float, float, float]) -> Machine:
+    """The three-axis machine, whose X and Y are in the table, with X moving along this and Y along y."""
+    x, y, z = THREE.axes
+    return THREE.replace(axes=(replace(x, direction=direction), replace(y, direction=(0.0, 1.0, 0.0)), z), effects=())
+
+
+def test_deviations_of_a_table_axis_are_errors_of_its_body_with_the_other_sign():
+    """10 um too far towards plus: the body of X' stands 10 um too far towards minus x, and so the tip is off."""
+    found = reads(RTL.replace("1 3 2.1", "1 3 10.0").encode(), THREE)
+    assert found.columns["value"][2] == pytest.approx(-0.010)
+    assert reads(RTL.encode(), moving((1.0, 0.0, 0.0))).columns["value"][4] == pytest.approx(1.5e-3)
+    wrong = THREE.replace(effects=(Effect("EXX", (-0.010,)),))
+    q = np.zeros((1, 3))
+    q[0, THREE.axis_names.index("X")] = 0.010
+    meant, there = THREE.tip(q, 0.0), wrong.actual_tip(np.zeros((1, 3)), State(0.0))
+    assert there == pytest.approx(meant, abs=1e-12)
+    with pytest.raises(ConfigError, match="does not move along its error axis"):
+        reads(RTL.encode(), moving((-(0.5**0.5), 0.0, 0.5**0.5)))
+
+
+def test_tables_of_a_table_axis_are_remarked():
+    text = "X EXX EYX\n0.0 0.02 0.01\n100 0.03 0.02\n"
+    assert remarks(text) == {"NCF618"}
+    assert not remarks(text, moving((1.0, 0.0, 0.0)))
+
+
 def test_a_run_that_was_cut_off_is_remarked():
     assert remarks(RTL.replace("2 1 0.4\n", "")) == {"NCF618"}
 
@@ -276,7 +305,7 @@ def test_tables_of_controls_are_direct_readings():
     assert found.labels["component"] == ("EXX", "EYX", "EAX") * 2
     assert found.columns["position"].tolist() == [0, 0, 0, 100, 100, 100]
     etalon = "[C0Y]\nVALUE = 0.00002\n[EXY]\nGridpoints = {\n -10 -0.001\n 20 0.002\n}\n"
-    found = reads(etalon.encode(), THREE)
+    found = reads(etalon.encode(), moving((1.0, 0.0, 0.0)))
     assert found.columns["value"].tolist() == [-0.001, 0.002]
     assert [message.code for message in found.remarks] == ["NCF618"]
 

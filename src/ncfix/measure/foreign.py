@@ -1,26 +1,29 @@
 """Files of instruments and controls that hold error motions: Renishaw `.rtl`, ISG VOLCOMP CSV, Etalon exchange.
 
 Each becomes a measurement of kind `axis`; plugins add readers of other files, of any kind. Files are recognised by
-what they look like, not by their names. Values of `.rtl` are taken as micrometres of positioning of the axis that the
-file names; those of the others are mm and rad, and already relative to their zero, so nothing of a set-up is unknown.
+what they look like, not by their names. Values of `.rtl` are micrometres of positioning of the axis that the
+file names, in its own sense (actual minus target); those of the others are mm and rad, and already relative to their
+zero, so nothing of a set-up is unknown.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Message, Place
-from ncfix.machine import Machine
+from ncfix.machine import Axis, Machine
 from ncfix.measure import checks
 from ncfix.measure import renishaw as rtl
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.renishaw import number_of
 from ncfix.plugins import registry
 
+LINEAR = "XYZ"
+SLANTED = 1e-6
 GRID = re.compile(r"\[(\w+)\]")
 ERROR = re.compile(r"E[XYZABC][A-Z]")
 
@@ -66,7 +69,44 @@ def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
     """The measurement in an instrument's file, or None; raises `ConfigError` NCF609 ... NCF618."""
     reader = _reader(text)
     found = reader(text, path) if reader is not None else _by_plugin(text, path)
-    return None if found is None else checks.checked(found, machine)
+    if found is None:
+        return None
+    if reader is renishaw:
+        found = _of_bodies(found, machine)
+    elif reader is not None:
+        found = replace(found, remarks=(*found.remarks, *_backwards(found, machine)))
+    return checks.checked(found, machine)
+
+
+def _of_bodies(found: Measurement, machine: Machine) -> Measurement:
+    """Deviations count the way the number of the axis grows, errors along the base axes: a table axis goes against."""
+    factor = np.ones(len(found))
+    for axis in _measured(found, machine):
+        along = _along(axis)
+        if abs(along) < 1 - SLANTED:
+            text = f"{axis.name} does not move along its error axis: what it is off is no E{axis.name}{axis.name} alone"
+            raise ConfigError.of("NCF618", text, Place(found.path), "give the errors as kind axis")
+        factor[np.array(found.labels["axis"]) == axis.name] = np.sign(along)
+    return found.with_columns({"value": factor * found.columns["value"]})
+
+
+def _backwards(found: Measurement, machine: Machine) -> Iterator[Message]:
+    """A word on axes whose bodies go the other way than their numbers: of them nobody says how a table counts."""
+    for axis in _measured(found, machine):
+        if _along(axis) < 0:
+            text = f"errors of {axis.name} are taken along the base axes, against which it moves as its number grows"
+            yield Message("NCF618", text, Place(found.path), f"if they count as {axis.name} does, their sign is wrong")
+
+
+def _measured(found: Measurement, machine: Machine) -> list[Axis]:
+    """The linear axes of which there are readings."""
+    named = set(found.labels.get("axis", ()))
+    return [axis for axis in machine.axes if axis.name in named and axis.name in LINEAR and not axis.rotary]
+
+
+def _along(axis: Axis) -> float:
+    """The part of its motion that is along the error axis of its own positioning error."""
+    return float(np.asarray(axis.error_axes[LINEAR.index(axis.name)]) @ np.asarray(axis.direction))
 
 
 def _by_plugin(text: str, path: str) -> Measurement | None:
