@@ -69,6 +69,7 @@ HAAS = replace(
     FANUC,
     name="haas",
     title="Haas (mill)",
+    variant_of="fanuc",
     suffixes=(),
     signature=(
         rb"(?im)^[^(;\n]*(?<![A-Z])G[ \t]*(?:(?:187|150)(?!\d)|154[ \t]*P|47[ \t]*[PE]|103[ \t]*P)",
@@ -82,7 +83,13 @@ HAAS = replace(
 )
 
 MITSUBISHI = replace(
-    FANUC, name="mitsubishi", title="Mitsubishi (M700/M800, ISO)", suffixes=(), signature=(), semantics="mitsubishi"
+    FANUC,
+    name="mitsubishi",
+    title="Mitsubishi (M700/M800, ISO)",
+    variant_of="fanuc",
+    suffixes=(),
+    signature=(),
+    semantics="mitsubishi",
 )
 
 

@@ -39,6 +39,22 @@ def test_detection(source: bytes, path: str, expected: str) -> None:
     assert read(source, path).dialect.name == expected
 
 
+@pytest.mark.parametrize(
+    ("source", "control", "expected"),
+    [
+        (b"G65 P9832\n", "haas", "haas"),
+        (b"G65 P9832\n", "mitsubishi", "mitsubishi"),
+        (b"G65 P9832\n", "siemens", "fanuc"),
+        (b"G187 P3\n", "fanuc", "haas"),
+        (b"o<side> call\n", "iso", "linuxcnc"),
+    ],
+)
+def test_what_a_family_has_is_read_as_the_control_of_the_machine_has_it(
+    source: bytes, control: str, expected: str
+) -> None:
+    assert dialects.detect(source, "part.nc", control).name == expected
+
+
 def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:
     grammar = tmp_path / "upper.lark"
     grammar.write_text("%import common (word, ADDRESS)\nblock: word*\n%override ADDRESS: /[XY]/\n", encoding="utf-8")

@@ -30,6 +30,8 @@ class Dialect:
     grammar             file name under `grammars/`, or the path of a plugin's own
     suffixes            file extensions that suggest it, lower case with the point
     signature           regular expressions (bytes) in a file that suggest it, strongest first
+    variant_of          the dialect of which this is a variant: a text that shows that one is taken for this on a machine
+                        whose control this is
     foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
     line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
@@ -53,6 +55,7 @@ class Dialect:
     grammar: str
     suffixes: tuple[str, ...]
     signature: tuple[bytes, ...] = ()
+    variant_of: str = ""
     foreign: tuple[tuple[str, bytes], ...] = ()
     line_limit: int = 0
     comment: str = "({})"

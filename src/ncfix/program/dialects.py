@@ -35,7 +35,8 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
     head = source[:PROBE_BYTES]
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
     if ranks:
-        return known[min(ranks, key=lambda name: (ranks[name], name))]
+        shown = min(ranks, key=lambda name: (ranks[name], name))
+        return known[control if control in known and known[control].variant_of == shown else shown]
     if control in known:
         return known[control]
     suffix = PurePath(path).suffix.lower()
