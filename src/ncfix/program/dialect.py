@@ -30,8 +30,8 @@ class Dialect:
     grammar             file name under `grammars/`, or the path of a plugin's own
     suffixes            file extensions that suggest it, lower case with the point
     signature           regular expressions (bytes) in a file that suggest it, strongest first
-    variant_of          the dialect of which this is a variant: a text that shows that one is taken for this on a machine
-                        whose control this is
+    variant_of          the dialect of which this is a variant: a text that shows that one is read as this where the
+                        machine has this control
     foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
     line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
