@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 from dataclasses import fields
 from pathlib import Path
 
@@ -129,3 +130,10 @@ def test_an_error_in_a_part_that_others_would_pass_over_is_told(machine: Machine
     for jobs in (1, 2, 3):
         with pytest.raises(NcfixError, match="X"):
             streamed(source, machine, 2000, jobs=jobs)
+
+
+def test_a_share_can_be_handed_to_a_process_that_is_started_anew() -> None:
+    """As on Windows, where processes are not forked."""
+    share = pickle.loads(pickle.dumps(Share(2, 1)))
+    assert share.has(1)
+    assert share.others()

@@ -33,6 +33,11 @@ class GoneError(Exception):
     """A process that worked on the program has ended before its time."""
 
 
+def surely() -> bool:
+    """They are there: to be asked where it is not known yet how to find out."""
+    return True
+
+
 @dataclass(slots=True)
 class Share:
     """What of a program a process does: of every `jobs` parts the one with the number `mine`.
@@ -50,7 +55,7 @@ class Share:
     mine: int = 0
     inbox: Any = None
     outbox: Any = None
-    others: Callable[[], bool] = field(default=lambda: True)
+    others: Callable[[], bool] = surely
     last: Before | None = None
     news: Any = None
     hearers: tuple[Any, ...] = ()
@@ -139,7 +144,7 @@ class Crew(Generic[Result]):
     share: Share
     texts: list[Any] = field(default_factory=list)
     results: Any = None
-    there: Callable[[], bool] = field(default=lambda: True)
+    there: Callable[[], bool] = surely
     done: dict[int, Result | Exception] = field(default_factory=dict)
     given: int = 0
 
