@@ -155,6 +155,17 @@ def test_numbers_without_a_point(text: str, no_point: str, expected: list[float]
     assert last(found) == [pytest.approx(value, abs=1e-9) for value in expected]
 
 
+@pytest.mark.parametrize("block", ["G05.1 Q1 R3", "G90 G5.1 Q1 R5", "G332 R1", "G8 P1"])
+def test_levels_without_a_point_are_no_lengths(block: str) -> None:
+    assert last(follow(f"{block}\nG0 X1. Y0. Z0.", dialect="fanuc", no_point="")) == [1, 0, 0]
+
+
+@pytest.mark.parametrize("block", ["G81 R2 Z-5.", "G2 X1. R5 F100.", "G68 X0. Y0. R30"])
+def test_lengths_and_angles_of_r_without_a_point_are_asked_for(block: str) -> None:
+    with pytest.raises(UsageError, match="has no decimal point"):
+        follow(f"G0 X0. Y0. Z0.\n{block}", dialect="fanuc", no_point="")
+
+
 @pytest.mark.parametrize("no_point", ["IS-B", "calculator"])
 def test_many_blocks_mean_what_single_ones_do(no_point: str) -> None:
     """Stretches of plain motions are taken many at once; not where their numbers count increments."""

@@ -186,7 +186,7 @@ class MacroInterpreter(Interpreter):
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         self.at_once(codes)
         for letter in plan.pointless:
-            if self.is_scaled(letter, plan.codes):
+            if self.is_scaled(letter, plan.codes) and not (letter == "R" and self.is_level(plan)):
                 self.span = next(word.span for word in plan.template.words if word.address == letter)
                 angle = self.is_angle(letter, plan.codes)
                 block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
@@ -240,6 +240,12 @@ class MacroInterpreter(Interpreter):
             return False
         cycle = (self.control.modal.motion if codes.motion is None else codes.motion) in ALL_CYCLES
         return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
+
+    def is_level(self, plan: Plan) -> bool:
+        """Whether R of a block is no length: no axis, cycle, plane or setting takes it (G5.1 Q1 R3, G332 R1)."""
+        if plan.axes or plan.codes is None or not plan.codes.g.keys().isdisjoint((NON_MODAL, ROTATION)):
+            return False
+        return (self.control.modal.motion if plan.codes.motion is None else plan.codes.motion) not in ALL_CYCLES
 
     def assign(self, plan: Plan) -> None:
         """Set the variables that a block sets, one after the other."""
