@@ -8,11 +8,14 @@ import pytest
 from compensate.machines_at_random import perfect
 from compensate.motions import Arc, dense_errors, motions
 from ncfix.compensate.assembly import Plan
+from ncfix.compensate.intent import Intent
 from ncfix.compensate.limits import findings
 from ncfix.compensate.path import plan
+from ncfix.compensate.sampling import MOST_SHOWN
+from ncfix.compensate.simulation import samples
 from ncfix.compensate.split import STRETCH, Grid, fewest
 from ncfix.compensate.strategies import get_strategy
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Effect, Machine, State
 from ncfix.machine.piecewise import Table
 from ncfix.machine.smooth import Polynomial
 from ncfix.program.moves import Moves
@@ -54,6 +57,12 @@ def test_far_off_the_travel_is_said_to_be_that(way: float) -> None:
     result = planned(SCALED, moves)
     found = {each.code: each.moves.tolist() for each in findings(SCALED, moves, result.pieces, result.start)}
     assert 1 in found["NCF405"]
+
+
+def test_figures_of_a_program_in_the_wrong_unit_do_not_fill_the_memory() -> None:
+    moves = motions(SCALED, (0, 0, 0), [((-1) ** k * 1e6, 0, 0) for k in range(40)])
+    rows, _ = samples(Intent(SCALED, moves, State()))
+    assert len(rows) <= len(moves) * (MOST_SHOWN + 2)
 
 
 @pytest.mark.parametrize("turns", [3.0, 1e6, 1e12])

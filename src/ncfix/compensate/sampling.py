@@ -17,6 +17,8 @@ EIGHTH = TURN / 8
 """rad; whatever the errors do, turning an axis bends their effect in the workpiece over an eighth of a turn."""
 MOST = 1 << 19
 """Samples on one motion, so many that they take a second or two."""
+MOST_SHOWN = 1 << 14
+"""Samples on one motion for figures: of all motions of a program at once, and of programs that nobody checked."""
 MOST_TURNS = MOST / DENSITY * EIGHTH
 """rad; a motion that turns an axis by more cannot be looked at."""
 BISECTIONS = 40
@@ -81,15 +83,17 @@ def even(counts: Index) -> Array:
     return (places(counts) + 1) / np.repeat(counts + 1, counts)
 
 
-def interior(intent: Intent, real: Segments, rows: Index, per_bend: float, least: int) -> tuple[Index, Array]:
+def interior(
+    intent: Intent, real: Segments, rows: Index, per_bend: float, least: int, most: int = MOST
+) -> tuple[Index, Array]:
     """Fractions at which to look at motions, ends left out: counts (k,) and flat fractions, ascending.
 
-    `per_bend` samples for each time that the error may bend, at least `least`, and one wherever an axis passes a kink
-    or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
+    `per_bend` samples for each time that the error may bend, from `least` to `most`, and one wherever an axis passes a
+    kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
     """
     often = bends(intent, rows)
     often[DENSITY * often >= MOST] = 0.0
-    counts = np.maximum(np.ceil(per_bend * often), least).astype(np.intp)
+    counts = np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
     fraction = even(counts)
     if not intent.kinks:
         return counts, fraction

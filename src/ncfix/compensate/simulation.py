@@ -14,7 +14,7 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners
-from ncfix.compensate.sampling import interior, merged
+from ncfix.compensate.sampling import MOST_SHOWN, interior, merged
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 
@@ -96,7 +96,7 @@ def samples(intent: Intent) -> tuple[Index, Array]:
     hole = moves.kind == Kind.CYCLE
     along = np.flatnonzero(known & ~hole & np.isfinite(moves.start).all(axis=1))
     at_end = np.flatnonzero(known & hole)
-    counts, between = interior(intent, intent.segments, along, DENSITY, LEAST)
+    counts, between = interior(intent, intent.segments, along, DENSITY, LEAST, MOST_SHOWN)
     each, ends = np.arange(len(along)), np.ones(len(along))
     counts, fraction = merged(len(along), (owners(counts), between), (each, 0 * ends), (each, ends))
     rows = np.concatenate([along[owners(counts)], at_end])

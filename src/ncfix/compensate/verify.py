@@ -19,7 +19,7 @@ from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked
-from ncfix.compensate.sampling import MOST, bends, merged, passed
+from ncfix.compensate.sampling import MOST_SHOWN, bends, merged, passed
 from ncfix.compensate.steer import rows_of
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.compensate.written import Written
@@ -160,7 +160,7 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
     along &= written.intent.moving[move]
     for begins, rows in ((written.segments.start, which), (written.start, move), (written.intent.moves.start, move)):
         along &= finite(picked(begins, rows))
-    counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST)
+    counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST_SHOWN)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
