@@ -66,7 +66,7 @@ def aim(
         left = set_out(nominal, axes, hand, count, target, begin, flat, goal)
         for i in range(3, 8):
             for k in range(count):
-                out[i, begin + k] = 0.0
+                out[i, np.uint64(begin + k)] = 0.0
         number = 0
         while left and number < passes:
             work_out(functions, hand, count)
@@ -76,7 +76,7 @@ def aim(
             number += 1
         for i in range(3):
             for k in range(count):
-                out[i, begin + k] = hand.q[axes[i], k]
+                out[i, np.uint64(begin + k)] = hand.q[axes[i], k]
 
 
 def set_out(
@@ -86,7 +86,7 @@ def set_out(
     if target.shape[1]:
         for i in range(3):
             for k in range(count):
-                goal.point[i, k] = target[i, begin + k]
+                goal.point[i, k] = target[i, np.uint64(begin + k)]
     else:
         carry(perfect, hand, count, goal.point)
     for i in range(3):
@@ -122,14 +122,14 @@ def step_closer(
             gap[i, k] = gap[i, k] - goal.point[i, k]
         if begins:
             for k in range(count):
-                out[3 + i, begin + k] = gap[i, k] if goal.before[k] >= 0 else 0.0
+                out[3 + i, np.uint64(begin + k)] = gap[i, k] if goal.before[k] >= 0 else 0.0
     for i in range(3):
         q, row = hand.q[axes[i]], goal.back[3 * i : 3 * i + 3]
         for k in range(count):
             step = dot((row[0, k], row[1, k], row[2, k]), (gap[0, k], gap[1, k], gap[2, k]))
-            q[k] = q[k] - step if goal.before[k] >= 0 and out[7, begin + k] == 0 else q[k]
+            q[k] = q[k] - step if goal.before[k] >= 0 and out[7, np.uint64(begin + k)] == 0 else q[k]
     for k in range(count):
-        at, before = begin + k, goal.before[k]
+        at, before = np.uint64(begin + k), goal.before[k]
         size = np.sqrt(dot((gap[0, k], gap[1, k], gap[2, k]), (gap[0, k], gap[1, k], gap[2, k])))
         active = before >= 0 and out[7, at] == 0
         out[6, at] = max(out[6, at], gap[3, k]) if active else out[6, at]

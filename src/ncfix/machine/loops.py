@@ -147,7 +147,7 @@ def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) ->
         carry(steps, hand, count, hand.tip)
         for i in range(4):
             for k in range(count):
-                out[i, begin + k] = hand.tip[i, k]
+                out[i, np.uint64(begin + k)] = hand.tip[i, k]
 
 
 def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
@@ -224,14 +224,14 @@ def take_up(columns: Columns, begin: int, count: int, hand: Hand) -> None:
     copy(columns.versine, begin, count, hand.versine)
     copy(columns.others, begin, count, hand.others)
     for k in range(count):
-        hand.length[k] = columns.length[begin + k] if len(columns.length) > 1 else columns.length[0]
+        hand.length[k] = columns.length[np.uint64(begin + k)] if len(columns.length) > 1 else columns.length[0]
 
 
 def copy(rows: Array, begin: int, count: int, into: Array) -> None:
     """Part of some rows."""
     for i in range(len(rows)):
         for k in range(count):
-            into[i, k] = rows[i, begin + k]
+            into[i, k] = rows[i, np.uint64(begin + k)]
 
 
 def work_out(functions: Functions, hand: Hand, count: int) -> None:
