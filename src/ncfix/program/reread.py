@@ -11,6 +11,8 @@ Only compiled: by columns, it takes longer to look for what is new than to read 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,21 +101,27 @@ def _with_blocks(reader: PartReader, quick: Program, odd: IntArray) -> Program:
     begins = np.cumsum(np.append(0, edges[odd + 1] - edges[odd]))
     rows = np.searchsorted(own.blocks[:, 0], begins)
     rows[-1] = len(own)
-    parts: list[tuple[Program, int, int, int]] = []
-    done = 0
-    for k, block in enumerate(odd.tolist()):
-        parts.append((quick, done, block, 0))
-        parts.append((own, int(rows[k]), int(rows[k + 1]), int(edges[block] - begins[k])))
-        done = block + 1
-    parts.append((quick, done, len(quick), 0))
-    counts = np.concatenate([np.diff(part.first_number[a : b + 1]) for part, a, b, _ in parts])
-    numbers = [(part, slice(part.first_number[a], part.first_number[b]), at) for part, a, b, at in parts]
+    numbers, way = own.first_number[rows], edges[odd] - begins[:-1]
+    blocks = own.blocks + np.repeat(way, np.diff(rows))[:, None]
+    spans = own.number_spans + np.repeat(way, np.diff(numbers))[:, None]
+    of_blocks, of_numbers = (odd, odd + 1), (quick.first_number[odd], quick.first_number[odd + 1])
+    counts = _put_in(np.diff(quick.first_number), of_blocks, np.diff(own.first_number), rows)
     return replace(
         quick,
         templates=own.templates,
-        template=np.concatenate([part.template[a:b] for part, a, b, _ in parts]),
-        blocks=np.concatenate([part.blocks[a:b] + at for part, a, b, at in parts]),
+        template=_put_in(quick.template, of_blocks, own.template, rows),
+        blocks=_put_in(quick.blocks, of_blocks, blocks, rows),
         first_number=np.concatenate(([0], np.cumsum(counts))),
-        number_spans=np.concatenate([part.number_spans[rows] + at for part, rows, at in numbers]),
-        numbers=np.concatenate([part.numbers[rows] for part, rows, _ in numbers]),
+        number_spans=_put_in(quick.number_spans, of_numbers, spans, numbers),
+        numbers=_put_in(quick.numbers, of_numbers, own.numbers, numbers),
     )
+
+
+def _put_in(old: NDArray[Any], gaps: tuple[IntArray, IntArray], new: NDArray[Any], edges: IntArray) -> NDArray[Any]:
+    """A column with its rows from each start to its stop (k,) replaced by those of another between two of its edges."""
+    parts, done = [], 0
+    starts, stops = (each.tolist() for each in gaps)
+    for start, stop, (first, last) in zip(starts, stops, pairwise(edges.tolist()), strict=True):
+        parts += (old[done:start], new[first:last])
+        done = stop
+    return np.concatenate([*parts, old[done:]])

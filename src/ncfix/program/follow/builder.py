@@ -229,12 +229,11 @@ class Builder:
         self._flush()
         parts = self._stretches or [Buffer().stretch()]
         block, mask, adrift, style, feed = (
-            np.concatenate([getattr(part, name) for part in parts])
+            _joined([getattr(part, name) for part in parts])
             for name in ("block", "programmed", "adrift", "style", "feed")
         )
         start, end = (
-            np.concatenate([getattr(part, name).take(self.columns, axis=1) for part in parts])
-            for name in ("start", "end")
+            _joined([getattr(part, name).take(self.columns, axis=1) for part in parts]) for name in ("start", "end")
         )
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles = self._style_columns(style)
@@ -357,3 +356,8 @@ def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int |
     """The block of the first of these motions, if none is known from before."""
     found = np.flatnonzero(rows)
     return int(block[found[0]]) if known is None and found.size else known
+
+
+def _joined(columns: list[NDArray[Any]]) -> NDArray[Any]:
+    """Columns one behind the other; a single one as it is."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)
