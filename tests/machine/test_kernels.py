@@ -49,6 +49,21 @@ def test_shipped_machines(name: str, root: Path) -> None:
             assert np.array_equal(plain, compiled)
 
 
+@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_gaps_are_the_difference_of_tips(name: str, compiled: bool, root: Path) -> None:
+    fast.disengage()
+    assert not compiled or fast.engage()
+    machine, n = load(root / "examples" / "machines" / f"{name}.toml"), 5000
+    meant, state = poses(machine, n), State(np.linspace(20, 90, n), 1, dict.fromkeys(machine.inputs, 1.5))
+    turned = meant + 1e-5
+    shifted = np.where(machine.rotary, meant, turned)
+    for each in (machine, machine.replace(effects=())):
+        found = each.gaps(meant, (meant, shifted, turned), state)
+        for q, gap in zip((meant, shifted, turned), found, strict=True):
+            assert np.array_equal(gap, each.actual_tip(q, state) - each.tip(meant, state.tool_length))
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_random_chains(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -59,6 +59,19 @@ def test_generated_texts(lines: list[str], end: str, pointless: bool) -> None:
     assert_same(source, pointless)
 
 
+@settings(derandomize=True, deadline=None, max_examples=300)
+@given(
+    st.from_regex(r"\A(N[0-9]{1,3} )?G1( ?[XYZ] ?-?[0-9]{1,3}(\.[0-9]{0,5})?){1,3}( ?-5)?( ?\([A-Z 0-9]{0,5}\))?\Z"),
+    st.lists(st.tuples(st.integers(0, 40), st.integers(0, 2), st.sampled_from("GX0123456789..+-- ()[;\x01"))),
+    st.booleans(),
+)
+def test_blocks_like_the_ones_before(line: str, changes: list[tuple[int, int, str]], pointless: bool) -> None:
+    lines = [line]
+    for place, removed, added in changes:
+        lines += [line, line[:place] + added + line[place + removed :]]
+    assert_same("\n".join([*lines, line, "M2", ""]).encode("latin-1"), pointless)
+
+
 def test_the_corpus(shared: Callable[[str], Path]) -> None:
     texts = [path.read_bytes() for path in sorted(shared("corpus").glob("*/*"))[::3]]
     for source in texts:
