@@ -119,7 +119,8 @@ def _with_blocks(reader: PartReader, quick: Program, odd: IntArray) -> Program:
 
 def _put_in(old: NDArray[Any], gaps: tuple[IntArray, IntArray], new: NDArray[Any], edges: IntArray) -> NDArray[Any]:
     """A column with its rows from each start to its stop (k,) replaced by those of another between two of its edges."""
-    parts, done = [], 0
+    parts: list[NDArray[Any]] = []
+    done = 0
     starts, stops = (each.tolist() for each in gaps)
     for start, stop, (first, last) in zip(starts, stops, pairwise(edges.tolist()), strict=True):
         parts += (old[done:start], new[first:last])
