@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 AFTER_POSITIONING = "where the axis {} stands after it was positioned by itself is not followed"
 POLYNOMIAL, POLYNOMIALS = "po", UNFOLLOWED_MOTIONS[MOTIONS["poly"]]
 GO_SOMEWHERE = frozenset({"pos", "posa", "posp", "ax"})
+DESELECTED = frozenset({"tcarr", "cutmod"})
+"""Names of which zero takes out of force what is refused where another number brings it into force."""
+
 BY_THEMSELVES = frozenset(ASYNCHRONOUS) | GO_SOMEWHERE | {POLYNOMIAL}
 """What with an axis as index lets it move on its own, `POS[X]=100`, or says where it goes, `PO[X]=(10,2)`."""
 
@@ -60,6 +63,8 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
 
 def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:
     """A name that gets a value and is no variable, or one with which the control changes."""
+    if step.name in DESELECTED and step.value is not None and step.value(control) == 0.0:
+        return
     if OF_THE_CONTROL.match(step.name):
         why = f"the program sets {step.name.upper()}, which may change coordinates or tool lengths"
         control.refusal = control.refusal or why
