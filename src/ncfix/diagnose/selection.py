@@ -141,7 +141,7 @@ def likeliest(scale: Scale, offered: Sequence[str], members: Members) -> dict[st
 
 def judged(scale: Scale, members: Members) -> Selected:
     """What else could stand in each member's place."""
-    court = scale.court
+    court, members = scale.court, _formed(scale, members)
     odds: dict[str, float] = {}
     runners: dict[str, dict[str, float]] = {}
     twins: dict[str, frozenset[str]] = {}
@@ -161,6 +161,18 @@ def judged(scale: Scale, members: Members) -> Selected:
         twins[name] = frozenset(each for each in near if acts_alike(court, scale.all(members), members[name], each))
     ranked = {name: members[name] for name in sorted(members, key=lambda name: -odds[name])}
     return Selected(ranked, odds, runners, frozenset(court.rivals), twins)
+
+
+def _formed(scale: Scale, members: Members) -> dict[str, Member]:
+    """Each member in the heaviest of its likeliest forms, as others are weighed in its place.
+
+    It came in with the form that was likeliest while the background had to explain it, too.
+    """
+    found = dict(members)
+    for name in members:
+        forms = scale.heard(_less(found, name)).likeliest(scale.court.forms[name], FORMS)
+        found = max([found, *({**found, name: form} for form in forms)], key=scale.weight)
+    return found
 
 
 def _sort(court: Court, name: str) -> Sequence[str]:
