@@ -9,12 +9,12 @@ import pytest
 
 from measure.poses import machine, perfect, plan
 from ncfix.diagnose import result, words
-from ncfix.diagnose.background import background
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.checks import remarks
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
 from ncfix.diagnose.gapmap import patterns
 from ncfix.diagnose.view import view
+from ncfix.diagnose.wandering import background
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Backlash

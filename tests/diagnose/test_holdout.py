@@ -6,10 +6,11 @@ import numpy as np
 
 from diagnose.worlds import World
 from ncfix.diagnose.addition import WIDE
-from ncfix.diagnose.background import background, everything_of
+from ncfix.diagnose.background import everything_of
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.holdout import FOLDS, held_out
 from ncfix.diagnose.view import view
+from ncfix.diagnose.wandering import background
 from ncfix.measure.measurement import Array
 
 ROUNDING_UM = 1e-4

@@ -9,12 +9,13 @@ import pytest
 from scipy.special import logsumexp
 
 from diagnose.worlds import World
-from ncfix.diagnose.background import PRIOR, SHARES, background, everything_of, marginal
+from ncfix.diagnose.background import PRIOR, SHARES, everything_of, marginal
 from ncfix.diagnose.diagnosis import FOUND, UNKNOWN, diagnose
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.rivals import rivals
 from ncfix.diagnose.selection import judged, likeliest, select
 from ncfix.diagnose.view import view
+from ncfix.diagnose.wandering import background
 from ncfix.diagnose.weighing import FALSE_ALARM, FURTHER, SURE, UNNAMED, Scale, margin
 from ncfix.measure.measurement import Array
 

@@ -13,29 +13,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.linalg import eigh, lapack, qr, solve_triangular
+from scipy.linalg import lapack, qr
 
 from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal
 
-LASTING = 900.0
-"""s: how long an instrument's wandering lasts."""
-WANDER = (0.0, 0.15, 0.35, 0.7)
-"""Its size against the noise."""
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""
 PRIOR = (0.3, 0.3, 0.25, 0.12, 0.03)
 """How likely these are beforehand."""
-SOME = 0.35
-"""The same while it is asked how much the instrument wanders."""
 BLOCK = 64
 """Reflections that are carried out together."""
-WEAK = 1.0
-"""Degrees of freedom of what is known of the noise where nothing is."""
-KNOWN = 200.0
-"""The same where the header of a file states it."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,33 +80,6 @@ def in_noise(covariance: Array, relative: Array) -> Array:
     return scaled
 
 
-def background(view: View, everything: Array, relative: Array) -> Background:
-    """Estimate how much the instrument wanders and find the coordinates."""
-    sigma, freedom = _noise(view)
-    contrasts = _contrasts(view.base / relative[:, None])
-    left = contrasts.columns
-    slow, wander = _wandering(view, relative), 0.0
-    little = in_noise(everything, relative)
-    inner = contrasts.of(little)
-    if slow is not None:
-        seen, own = contrasts.of(slow), np.eye(left.shape[1]) + SOME**2 * inner
-        y = left.T @ (view.y / relative) / sigma
-        wander = max(WANDER, key=lambda size: _likelihood(y, own + size**2 * seen, freedom))
-    if wander and slow is not None:
-        factor = np.linalg.cholesky(np.eye(left.shape[1]) + wander**2 * seen)
-        left = solve_triangular(factor, left.T, lower=True).T
-        inner = solve_triangular(factor, solve_triangular(factor, inner, lower=True).T, lower=True)
-    spectrum, vectors = eigh(inner, driver="evd")
-    rotation = (left @ vectors) / relative[:, None]
-    return Background(view, relative, rotation, np.maximum(spectrum, 0.0), sigma, freedom, wander, everything, slow)
-
-
-def _noise(view: View) -> tuple[float, float]:
-    """Noise of a plain value, um, and how well it is known."""
-    given = all(each.noise[0] is not None for each in view.measurements)
-    return view.sigma, KNOWN if given else WEAK
-
-
 @dataclass(frozen=True, repr=False)
 class Contrasts:
     """An orthonormal basis of what is orthogonal to the base: `columns` (m, n), and as the reflections that make it."""
@@ -124,19 +87,20 @@ class Contrasts:
     columns: Array
     reflections: tuple[Array, Array]
 
+    def seen(self, values: Array) -> Array:
+        """Columns of values (m, p) as contrasts, (n, p); far quicker by a few reflections."""
+        columns = np.asfortranarray(values)
+        turned = lapack.dormqr("L", "T", *self.reflections, columns, BLOCK * columns.shape[1])[0]
+        last: Array = turned[len(values) - self.columns.shape[1] :]
+        return last
+
     def of(self, covariance: Array) -> Array:
-        """The covariance (m, m) of values as one of contrasts, (n, n); far quicker by a few reflections."""
-        once = self._reflected(np.asfortranarray(covariance))
-        last = len(covariance) - self.columns.shape[1]
-        turned: Array = self._reflected(np.asfortranarray(once.T))[last:, last:]
-        return turned
-
-    def _reflected(self, columns: Array) -> Array:
-        turned: Array = lapack.dormqr("L", "T", *self.reflections, columns, BLOCK * len(columns))[0]
-        return turned
+        """The covariance (m, m) of values as one of contrasts, (n, n)."""
+        return self.seen(self.seen(covariance).T)
 
 
-def _contrasts(base: Array) -> Contrasts:
+def contrasts(base: Array) -> Contrasts:
+    """Those of what is free."""
     size = np.linalg.norm(base, axis=0)
     scaled = base[:, size > 0] / size[size > 0]
     basis = orthonormal(scaled)
@@ -156,24 +120,6 @@ def everything_of(view: View, named: Sequence[Group]) -> Array:
     columns = apart(view, np.concatenate([np.zeros((len(view.y), 0)), *parts], axis=1), named)
     covariance: Array = columns @ columns.T
     return covariance
-
-
-def _wandering(view: View, relative: Array) -> Array | None:
-    """The correlation of values of one component by the time between them; None without a clock."""
-    time = view.column("time_s")
-    if np.ptp(time) == 0:
-        return None
-    own = time[np.maximum(view.row, 0)]
-    alike = (view.component[:, None] == view.component) & (view.row[:, None] >= 0)
-    lasting = np.where(alike, np.exp(-np.abs(own[:, None] - own) / LASTING), 0.0)
-    return in_noise(lasting, relative)
-
-
-def _likelihood(y: Array, covariance: Array, freedom: float) -> float:
-    """Log likelihood with the scale integrated out."""
-    factor = np.linalg.cholesky(covariance)
-    white = solve_triangular(factor, y, lower=True)
-    return marginal(float(white @ white), 2 * float(np.log(np.diag(factor)).sum()), len(y), freedom)
 
 
 def marginal(squares: float, log_determinant: float, count: int, freedom: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ncfix.diagnose import checks, constants, gates, mistakes, outliers
-from ncfix.diagnose.background import background, everything_of
+from ncfix.diagnose.background import everything_of
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.conclusion import concluded
 from ncfix.diagnose.evidence import Court
@@ -15,6 +15,7 @@ from ncfix.diagnose.rivals import rivals
 from ncfix.diagnose.selection import Selected, judged, select
 from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING, UNKNOWN
 from ncfix.diagnose.view import view
+from ncfix.diagnose.wandering import background
 from ncfix.diagnose.weighing import Scale
 from ncfix.machine import Machine
 from ncfix.measure.measurement import Measurement
@@ -40,7 +41,8 @@ def diagnose(measurements: Sequence[Measurement], machine: Machine, refused: Seq
     everything = everything_of(seen, gathered.groups)
     groups = (*gathered.groups, *rivals(seen, gathered.groups))
     relative, outlying = outliers.weighed(seen, everything, groups)
-    court = Court(background(seen, everything, relative), groups, len(gathered.groups))
+    ground = background(seen, everything, relative, gathered.groups)
+    court = Court(ground, groups, len(gathered.groups))
     case, scale = Case(seen, candidates, unheard_of, gathered, outlying, court), Scale(court)
     found = concluded(case, scale, _selected(scale))
     return mistakes.told(found, wrong) if wrong else found

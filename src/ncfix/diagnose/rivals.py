@@ -51,13 +51,7 @@ def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]
 
 def _errors(group: Group) -> set[str]:
     """The errors it consists of; and the course of time if it is nothing but one, wherever it acts."""
-    effects = group.owner.effects
-    slow = bool(effects) and all(_slow(effect.input or "") for effect in effects)
-    return {effect.name for effect in effects} | ({"slow"} if slow else set())
-
-
-def _slow(signal: str) -> bool:
-    return signal == "time_s" or signal.startswith("temp_")
+    return {effect.name for effect in group.owner.effects} | ({"slow"} if group.owner.slow else set())
 
 
 def _held(left: Array, group: Group, spans: Mapping[str, Sequence[Array]]) -> bool:

@@ -51,6 +51,12 @@ class Candidate:
     lead: int = 0
     constant: bool = False
 
+    @property
+    def slow(self) -> bool:
+        """Whether it is nothing but a course of time, wherever it acts."""
+        signals = [effect.input or "" for effect in self.effects]
+        return bool(signals) and all(signal == "time_s" or signal.startswith("temp_") for signal in signals)
+
 
 @dataclass(frozen=True)
 class Reach:
