@@ -2,7 +2,8 @@
 
 A drift of hours looks like an instrument that wanders, as long as nothing else may explain it, and a wandering of that
 size then hides the drift. So each size of the wandering is weighed together with the names that act in the course of
-time and nothing else: the likeliest one after another, at the price of a name, as long as they pay.
+time and nothing else: the likeliest one after another, at the price of a name, as long as they pay. The course of a
+real effect is never quite what the catalogue says (`MISSHAPEN`), and what a name misses of it wanders, too.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ncfix.diagnose.background import Background, Contrasts, contrasts, in_noise
 from ncfix.diagnose.evidence import SIZES, log_odds
 from ncfix.diagnose.groups import Group
 from ncfix.diagnose.view import View
-from ncfix.diagnose.weighing import margin
+from ncfix.diagnose.weighing import MISSHAPEN, margin
 from ncfix.measure.measurement import Array
 
 LASTING = 900.0
@@ -111,29 +112,33 @@ class Question:
 
 
 def _likeliest(asked: Question, named: Sequence[Group]) -> float:
-    """The size that explains most; with names no more of it than without."""
+    """The size that explains most; with names no more of it than without, and no less than what their courses miss."""
     plain = [asked.likelihood(size) for size in WANDER]
-    most = int(np.argmax(plain))
-    added = [_added(asked, size, named) for size in WANDER[: most + 1] if most]
-    return WANDER[int(np.add(plain[: most + 1], added or [0.0]).argmax())]
+    most = int(np.argmax(plain)) + 1
+    beside = [_beside_names(asked, size, named) for size in WANDER[:most] if most > 1] or [(0.0, 0.0)]
+    best = int(np.argmax([own + gained for own, (gained, _) in zip(plain, beside, strict=False)]))
+    missed = MISSHAPEN * beside[best][1] / float(np.median(asked.scale))
+    return max(size for size in WANDER[:most] if size <= max(WANDER[best], missed))
 
 
-def _added(asked: Question, size: float, named: Sequence[Group]) -> float:
-    """How much log likelihood names that act by time alone add to a wandering of this size, less what they pay."""
+def _beside_names(asked: Question, size: float, named: Sequence[Group]) -> tuple[float, float]:
+    """How much log likelihood names that act by time alone add to a wandering of this size, less what they pay; and
+    how much they show, um rms.
+    """
     courses = [group for group in named if group.owner.slow]
     forms = Counter(group.owner.name for group in named)
     prices = np.log([len(forms) * forms[group.owner.name] * len(SIZES) for group in courses])
     ends = np.cumsum([1, *(group.columns.shape[1] for group in courses)])
-    white, weight = asked.white(size, [asked.y, *(group.columns for group in courses)]), 0.0
+    white, gained, shown = asked.white(size, [asked.y, *(group.columns for group in courses)]), 0.0, 0.0
     for count in range(1, MOST + 1 if courses else 1):
         odds = _odds(white, ends, asked.freedom) - prices[:, None]
         best, large = np.unravel_index(int(odds.argmax()), odds.shape)
         helped = float(odds[best, large]) - margin(count) + margin(count - 1)
         if helped <= 0:
             break
-        weight += helped
+        gained, shown = gained + helped, float(np.hypot(shown, SIZES[large]))
         white = _beside(white, SIZES[large] * white[:, ends[best] : ends[best + 1]])
-    return weight
+    return gained, shown
 
 
 def _odds(white: Array, ends: Array, freedom: float) -> Array:
