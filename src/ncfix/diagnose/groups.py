@@ -6,8 +6,9 @@ effects compete on one scale, that of the tool tip.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -22,6 +23,10 @@ VISIBLE = 0.05
 NEGLIGIBLE = 3e-3
 """Share of a form's squares that may be dropped."""
 UNSEEN_UM = 1e-9
+HOLDS = tuple(product((-0.5, 0.5), repeat=3))
+"""Where what grows is held, in times `view.FAR` its size: in the middle of each eighth of it."""
+ABOUT = 0.5 / np.sqrt(3)
+"""How far from there it may be, rms, in each direction."""
 LED = 0.5
 """Share of a tilt's squares that must be the tilt, not the shifts of a pivot elsewhere: else it has no lever here."""
 
@@ -58,7 +63,7 @@ def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
     for candidate, start, stop in zip(candidates, ends[:-1], ends[1:], strict=True):
         design, loadings = every[:, start:stop], candidate.loadings
         if candidate.grows:
-            design, loadings = view.expansion(candidate.effects), tuple(stacked(*[each] * 4) for each in loadings)
+            design, loadings = view.expansion(candidate.effects), tuple(held(loadings))
         forms = [form for loading in loadings if (form := _form(view, candidate, loading, design)) is not None]
         shares = [_left(basis, form.columns / view.relative[:, None]) for form in forms]
         seen = [form for form, share in zip(forms, shares, strict=True) if share >= VISIBLE]
@@ -66,6 +71,17 @@ def gather(view: View, candidates: Sequence[Candidate]) -> Gathered:
         if not seen:
             invisible.append((candidate, max(shares, default=0.0)))
     return Gathered(tuple(groups), tuple(invisible))
+
+
+def held(loadings: Sequence[Array]) -> Iterator[Array]:
+    """Loadings of what grows from where it is held: there it stays, so all of it moves by one course.
+
+    One of `HOLDS` in turn; the true place is somewhere about it.
+    """
+    for course in loadings:
+        about = stacked(np.zeros((len(course), 0)), *[ABOUT * course] * 3)
+        for place in HOLDS:
+            yield np.hstack([np.kron(np.array([[1.0], *([x] for x in place)]), course), about])
 
 
 def apart(view: View, columns: Array, named: Sequence[Group]) -> Array:
