@@ -123,7 +123,7 @@ def _likeliest(asked: Question, named: Sequence[Group]) -> float:
 
 def _beside_names(asked: Question, size: float, named: Sequence[Group]) -> tuple[float, float]:
     """How much log likelihood names that act by time alone add to a wandering of this size, less what they pay; and
-    how much they show, um rms.
+    how much the largest shows, um rms.
     """
     courses = [group for group in named if group.owner.slow]
     forms = Counter(group.owner.name for group in named)
@@ -136,7 +136,7 @@ def _beside_names(asked: Question, size: float, named: Sequence[Group]) -> tuple
         helped = float(odds[best, large]) - margin(count) + margin(count - 1)
         if helped <= 0:
             break
-        gained, shown = gained + helped, float(np.hypot(shown, SIZES[large]))
+        gained, shown = gained + helped, max(shown, SIZES[large])
         white = _beside(white, SIZES[large] * white[:, ends[best] : ends[best + 1]])
     return gained, shown
 
