@@ -191,13 +191,13 @@ class Control(Standing):
 
     def _dragged(self, motion: Motion, adrift: int) -> Motion:
         """The motion, left as it is or refused if it moves an axis that has no word and must get none."""
-        if motion.passing or motion.refusal or motion.unknown:
+        wordless = adrift & self.places.adrift & ~motion.axes
+        if not wordless or motion.passing or motion.refusal or motion.unknown:
             return motion
         moved = mask_of(i for i in self.machine if motion.target[i] != self.position[i])
         if self.is_rotated and motion.axes & self._turned():
             moved |= self._turned()
-        dragged = adrift & moved & ~motion.axes & self.places.adrift
-        index = next((i for i in self.machine if dragged >> i & 1), None)
+        index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
         if index is None:
             return motion
         why = ADRIFT.format(LETTERS[index])

@@ -231,9 +231,12 @@ class Interpreter:
 
     def evaluated(self, words: Mapping[str, Evaluate]) -> Words:
         """The words of a block as numbers."""
-        found = {address: self.control.scope.value_of(value) for address, value in words.items()}
-        runtime = frozenset(address for address, (_, at_runtime) in found.items() if at_runtime)
-        return Words({address: value for address, (value, _) in found.items()}, runtime)
+        scope, values, runtime = self.control.scope, {}, []
+        for address, value in words.items():
+            values[address], at_runtime = scope.value_of(value)
+            if at_runtime:
+                runtime.append(address)
+        return Words(values, frozenset(runtime))
 
     def tool_of(self, plan: Plan) -> str | float | None:
         """The number or name of a tool; a name for a number that is known only at run time."""
