@@ -46,6 +46,16 @@ COUNTING = {
     "siemens, sections": ("siemens", "AA: G0 X1\nBB: G0 X2\nREPEAT AA BB P=99\nM30", 200),
     "siemens, calls": ("siemens", "SUB P50\nSUB\nM30\n%_N_SUB_SPF\nGOTOF BB\nAA: G0 X1\nM17\nBB: GOTOB AA", 51),
     "linuxcnc": ("linuxcnc", "o1 repeat [70]\nG0 X1\no1 endrepeat\nM2", 70),
+    "linuxcnc, a loop in which the program ends": (
+        "linuxcnc",
+        "#1=0\no1 repeat [99999999]\nG0 X1\n#1=[#1+1]\no2 if [#1 GE 9]\nM2\no2 endif\no1 endrepeat",
+        9,
+    ),
+    "siemens, left by a jump": (
+        "siemens",
+        "R1=0\nAA: G0 X1\nG0 Y1\nG0 Z1\nR1=R1+1\nIF R1>8 GOTOF CC\nBB: G0 X2\nREPEAT AA BB P9999\nCC: M30",
+        35,
+    ),
     "linuxcnc, where the axes stand": ("linuxcnc", "G91\no1 while [#5420 LT 40]\nG0 X1\no1 endwhile\nM2", 40),
     "fanuc": ("fanuc", "%\nO1\n#1=0\nWHILE[#1 LT 300]DO1\nG0 X1.\n#1=#1+1\nEND1\nM30\n%", 300),
     "fanuc, calls": ("fanuc", "%\nO1\nM98 P2 L30\nM98 P2\nM30\nO2\nGOTO 3\nN2 G0 X1.\nM99\nN3 GOTO 2\n%", 31),

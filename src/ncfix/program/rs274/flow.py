@@ -359,7 +359,6 @@ class FlowControl:
         self.skipping = None
         if label.repeats < 0:
             label.repeats = round(self.argument(flow))
-            self.control.budget.foresee(label.repeats)
         if label.repeats > 0:
             label.repeats -= 1
             self.control.parameters.changes += 1

@@ -93,7 +93,7 @@ class Course:
         else:
             ends = [block for block in self.unit.blocks_of("ENDLABEL") if block > start]
             stop = ends[0] if ends else here
-        self.control.budget.foresee(times * (stop - start))
+        self.control.budget.foresee(times)
         if times > 0 and stop > start:
             self.sections.append(Section(start, stop, self.block, times))
             self.block = start
