@@ -144,6 +144,16 @@ def test_a_pattern_of_no_columns_is_none() -> None:
     assert moves_of("heidenhain", f"0 BEGIN PGM T MM\n{DRILL}{lines}4 END PGM T MM").rule.tolist() == [Rule.REFUSE]
 
 
+def test_a_large_array_is_not_filled() -> None:
+    text = "DEF REAL AR[9999,9999]=REP(5)\nG0 X=AR[1,1]\nM30"
+    assert moves_of("siemens", text).rule.tolist() == [Rule.REFUSE]
+
+
+def test_a_scale_of_zero_is_refused() -> None:
+    text = "0 BEGIN PGM T MM\n1 CYCL DEF 11.0 SCALING\n2 CYCL DEF 11.1 SCL 0\n3 L X+1 F9\n4 END PGM T MM"
+    assert moves_of("heidenhain", text).rule.tolist() == [Rule.REFUSE]
+
+
 def test_a_jump_is_another_when_something_has_changed() -> None:
     recurrence = Recurrence()
     assert not recurrence.seen("jump", 1)

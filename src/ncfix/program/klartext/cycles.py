@@ -106,7 +106,10 @@ def define_at_once(control: Control, cycle: int, part: str, words: Words, text: 
         trans.rotate(rotation or 0.0, incremental="IROT" in words.values)
     elif cycle == 11 and part == "1":
         suspend(control, words, "scale")
-        trans.scale_by(words.values.get("SCL", 1.0))
+        factor = words.values.get("SCL", 1.0)
+        if factor <= 0.0:
+            control.suspended["scale"] = "a scale that is not above zero (cycle 11)"
+        trans.scale_by(factor if factor > 0.0 else 1.0)
     elif cycle == 26 and part not in ("", "0"):
         factors = {key: value for key, value in words.values.items() if key in "XYZ"}
         control.suspended.pop("scales", None)

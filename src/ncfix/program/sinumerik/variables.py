@@ -14,6 +14,10 @@ INITIAL: dict[str, Value] = {"real": 0.0, "int": 0.0, "bool": 0.0, "string": "",
 WHOLE = frozenset({"int", "char"})
 
 
+MOST_CELLS = 100_000
+"""Elements of an array that is filled; those of a larger one count as known only at run time."""
+
+
 @dataclass(slots=True)
 class Local:
     """The variables that one program has defined.
@@ -85,7 +89,8 @@ class Variables:
         """`NAME[index]=SET(values)` from an element on; repeated: `REP(value)` or `REP(value, count)`."""
         scope = self.scope_of(name)
         sizes = () if scope is None else scope.sizes.get(name, ())
-        cells = list(product(*(map(float, range(size)) for size in sizes)))
+        small = sizes if math.prod(sizes) <= MOST_CELLS else ()
+        cells = list(product(*(map(float, range(size)) for size in small)))
         if scope is None or not sizes or index not in cells:
             self.forget(name)
             return
