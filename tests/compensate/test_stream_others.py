@@ -237,7 +237,7 @@ def test_compiled_kernels_give_the_same_bytes(siemens: bool, machine: Machine, m
         ("%_N_SUB_SPF", "several programs"),
         ("PROC OTHER(REAL A)", "several programs"),
         ("G1 AP=30", ELSEWHERE),
-        ("L77", "further down"),
+        ("L77\n%_N_L77_SPF", "several programs"),
         ("BRANCHES", "at run time"),
         ("M30\n\nSUB: X1", ELSEWHERE),
     ],
