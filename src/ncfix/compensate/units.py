@@ -77,6 +77,7 @@ class Units:
     led       the tip is under control (TCP), or may be
     share     which parts this process corrects
     found     parts that have been read so far, also those behind which something is lacking
+    told      the last one that others have been told of
     """
 
     machine: Machine
@@ -97,6 +98,7 @@ class Units:
     led: bool = True
     share: Share = field(default_factory=Share)
     found: int = 0
+    told: int = -1
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -138,20 +140,26 @@ class Units:
                 yield Part(*pending.pop(), last, passage)
                 continue
             if not last and not _ends_clean(*pending[-1]):
+                self._tell(None)
                 if len(pending) > MOST_PENDING:
                     raise NotInPartsError("there is no place at which the program could be parted")
                 continue
             programs = [each for each, _ in pending]
             moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
+            self._tell(None if last or len(pending) > 1 else self._passage(*pending[0]))
             if last:
                 self._check_rest()
-            if self.share.shares(self.found):
-                self.share.announce(self.found, None if last or len(pending) > 1 else self._passage(*pending[0]))
             self.found += 1
             yield Part(joined(programs), moves, last)
             pending = []
             if last:
                 return
+
+    def _tell(self, passage: Passage | None) -> None:
+        """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""
+        if self.share.shares(self.found) and self.told < self.found:
+            self.told = self.found
+            self.share.announce(self.found, passage)
 
     def _passage(self, program: Program, moves: Moves) -> Passage | None:
         """What others have to know of a part; None if they have to follow it."""
@@ -208,6 +216,7 @@ class Units:
             program = self.reader.read(text[:stop]) if text[:stop].strip() else None
             cut = self.reader.last_cut(program) if program is not None else 0
             if program is None or not cut:
+                self._tell(None)
                 self.rest, wanted = text, 2 * max(wanted, len(text))
                 continue
             wanted = self._wanted
