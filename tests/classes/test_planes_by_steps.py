@@ -131,3 +131,49 @@ def test_the_end_of_a_tilt_that_has_not_begun_asks_for_nothing(machine: Machine)
     setup = Setup(work_offsets={"PRESET1": dict.fromkeys("XYZAC", 0.0)}, tools={1: Tool(60.0, 3.0)})
     moves = follow(read(KLARTEXT.encode(), "a.h", "heidenhain"), machine, setup).trace.moves
     assert moves.rule.tolist() == [Rule.PASS] * 2 + [Rule.CORRECT] * 4
+
+
+SQUARE = FANUC.format(approach="G43 H1 Z40.\nG0 X10. Y5.")
+
+
+def rule_of(text: str, line: str, machine: Machine) -> int:
+    """The rule of the one block that reads so."""
+    program = read(text.encode(), "o1.nc", "fanuc")
+    moves = follow(program, machine, SETUP).trace.moves
+    number = text.split("\n").index(line) + 1
+    (rule,) = [rule for block, rule in zip(moves.block, moves.rule, strict=True) if program.line(int(block)) == number]
+    return int(rule)
+
+
+@pytest.mark.parametrize("angle", ["30.", "90."])
+@pytest.mark.parametrize("leads_off", ["G91 G28 Z0.\nG90", "G31 Z-5. F100."])
+def test_what_leads_the_tool_off_in_a_plane_leaves_its_height_unknown(
+    leads_off: str, angle: str, machine: Machine
+) -> None:
+    text = SQUARE.replace("J30.", f"J{angle}").replace("\nG69\nG49", f"\n{leads_off}\nG0 X12.\nG1 X30.\nG69\nG49")
+    assert rule_of(text, "G0 X12.", machine) == Rule.PASS
+    assert rule_of(text, "G1 X30.", machine) == Rule.REFUSE
+
+
+@pytest.mark.parametrize("between", ["G4 P1.", "G0 C0."])
+def test_what_moves_no_axis_of_the_plane_leaves_known_what_was(between: str, machine: Machine) -> None:
+    """By 90 degrees the plane's Z is the machine's Y: a word of the plane's Y must not pass for it."""
+    text = FANUC.format(approach=f"G0 X10. Y5.\n{between}\nG43 H1\nG0 Y6.\nG1 X12. F200.\nG0 Z40.")
+    text = text.replace("J30.", "J90.")
+    assert rule_of(text, "G0 Y6.", machine) == Rule.PASS
+    assert rule_of(text, "G1 X12. F200.", machine) == Rule.REFUSE
+    assert rule_of(text, "G0 Z40.", machine) == Rule.CORRECT
+
+
+def test_a_hole_above_which_the_height_is_not_known_leaves_it_so_in_a_plane(machine: Machine) -> None:
+    text = FANUC.format(approach="G43 H1\nG98 G81 X10. Y5. Z-5. R2. F100.\nG80\nG0 X5. Y6.\nG1 X12. F200.")
+    assert rule_of(text.replace("J30.", "J90."), "G1 X12. F200.", machine) == Rule.REFUSE
+
+
+def test_an_axis_of_which_two_turned_ones_are_made_leaves_both_unknown(machine: Machine) -> None:
+    text = (
+        "O1\nG21 G90 G17 G54 G69\nT1 M6\nG0 X0. Y0. Z10. A0. C0.\nG68 X0. Y0. R30.\nG0 X10. Y10.\nG91 G28 X0.\nG90\n"
+        "G0 X12.\nG1 X20. F100.\nG0 X5. Y5.\nG1 X7.\nG69\nM30\n"
+    )
+    assert rule_of(text, "G1 X20. F100.", machine) == Rule.REFUSE
+    assert rule_of(text, "G1 X7.", machine) == Rule.CORRECT

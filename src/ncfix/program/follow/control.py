@@ -155,7 +155,9 @@ class Control(Standing):
         if motion.passing and motion.kind != Kind.DWELL:
             target, here = motion.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
-        self.said, self.saying = self.saying, None
+        if motion.kind != Kind.DWELL:
+            self.said = self.saying[1] if self.saying is not None and self.saying[0] is motion.unknown else None
+        self.saying = None
         self.places.settle(settles)
         self.places.lose(mask_of(motion.unknown if self.said is None else self.said))
         self.places.begun = True

@@ -40,7 +40,8 @@ class Standing(ABC):
     unknown    letter index -> why the position is not known
     shaky      letter index -> why the offset of the letter is not known
     said       what is not known along the axes of a tilted plane, where its words have said more than the machine's
-               axes alone tell; None: they tell all. `saying`: the same at the end of the motion of this block
+               axes alone tell; None: they tell all. `saying`: what of the machine's axes is not known where the words
+               of this block lead, and with it the same along those of the plane
     places     which axes the program itself has brought to where they stand
     knowledge  what was asked of the setup, and what it does not give
     offset_checked  it has been asked for the work offset in force
@@ -67,7 +68,7 @@ class Standing(ABC):
         self.tilted = False
         self.tcp = run.setup.tcp
         self.said: Unknown | None = None
-        self.saying: Unknown | None = None
+        self.saying: tuple[Unknown, Unknown] | None = None
         self.shaky: Unknown = {}
         self.locate: Callable[[], Place] = lambda: Place("")
         self.offset_checked = False
@@ -112,7 +113,9 @@ class Standing(ABC):
         outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
         tool = zeros() if self.tcp else offsets.tool
         self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
-        self.rotation = product(offsets.turn, offsets.rotation)
+        before, self.rotation = self.rotation, product(offsets.turn, offsets.rotation)
+        if self.rotation != before:
+            self.said = None
         self.is_rotated = self.rotation != IDENTITY
         self.inverse = transposed(self.rotation)
         self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.follow.coordinates import Vector, X, Y, Z
+from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import Pointing
 
@@ -52,8 +52,25 @@ def converted(control: Control, position: Vector, unknown: Unknown, before: TcpS
 
 
 def lost_in_frame(control: Control) -> Unknown:
-    """What is not known along the axes of the program's frame."""
-    return control.said if control.said is not None and control.unknown else control.unknown
+    """What is not known along the axes of the program's frame: those that have a part in an axis that is not known."""
+    if control.said is not None and control.unknown:
+        return control.said
+    return mixed_into(control.unknown, control.inverse) if control.is_rotated else control.unknown
+
+
+def lost_of_axes(control: Control, lost: Unknown) -> Unknown:
+    """Which axes of the machine are not known where this is not known along those of the program's frame."""
+    return {index: why for index, why in mixed_into(lost, control.rotation).items() if index in control.machine}
+
+
+def mixed_into(unknown: Unknown, rotation: Rotation) -> Unknown:
+    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
+    mixed = {index: why for index, why in unknown.items() if index > Z}
+    for index in (X, Y, Z):
+        why = next((unknown[k] for k in (X, Y, Z) if rotation[index][k] != 0.0 and k in unknown), None)
+        if why is not None:
+            mixed[index] = why
+    return mixed
 
 
 def switch(control: Control, tool: Vector, on: bool) -> None:

@@ -123,7 +123,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     across = control.modal.plane.across
     unknown = hole_unknown(control, block)
     refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
-    height = control.unknown.get(across)
+    height = tcp.lost_in_frame(control).get(across)
     if not control.modal.incremental and not unknown and not control.modal.diameter:
         program[across] = r
         control.builder.approach(command(control, block, program))
@@ -136,7 +136,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     program[across] = clear
     control.position = command(control, block, program)
     if height is not None and not control.modal.retract_to_r:
-        control.unknown = {**unknown, across: height}
+        control.unknown = tcp.lost_of_axes(control, {**unknown, across: height})
 
 
 def hole_unknown(control: Control, block: Block) -> Unknown:

@@ -57,6 +57,8 @@ def words_destination(control: Control, block: Block) -> tuple[Vector, Unknown]:
             index = INDEX[letter]
             origin = target[index] if incremental else control.offset[index]
             target[index] = origin + control.scale[index] * value
+    if control.said is not None:
+        return target, rotated_unknown(control, block, incremental)
     return target, unknown_after(control, block, incremental, control.unknown)
 
 
@@ -96,14 +98,8 @@ def rotated_destination(control: Control, block: Block, incremental: bool) -> tu
 def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknown:
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, tcp.lost_in_frame(control))
-    control.saying = own if control.tilted else None
-    if not own:
-        return own
-    unknown = {index: why for index, why in own.items() if index > Z}
-    for index in (X, Y, Z):
-        mixed = [k for k in (X, Y, Z) if control.rotation[index][k] != 0.0 and k in own]
-        if mixed and index in control.machine:
-            unknown[index] = own[mixed[0]]
+    unknown = tcp.lost_of_axes(control, own) if own else {}
+    control.saying = (unknown, own) if control.tilted else None
     return unknown
 
 
