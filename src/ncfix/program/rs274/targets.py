@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from ncfix.program.follow import tcp
-from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, X, Y, Z, rotated
+from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, X, Y, rotated
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Unknown
 from ncfix.program.rs274.control import Block, Control
