@@ -55,7 +55,8 @@ def _with_cells(
 ) -> Pitch | None:
     """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said.
 
-    Points are numbered so that the reference position has a number of zero or more, wherever it lies.
+    Points are numbered so that the reference position has a number of zero or more, wherever it lies. The first and the
+    last point of a turn are one place, and have the same value (B-63980EN, p. 100).
     """
     column = request.machine.axis_names.index(axis)
     described = request.machine.axes[column]
@@ -76,6 +77,8 @@ def _with_cells(
     increments, magnification = diffused(sense * curve / units[int(described.rotary)])
     if not increments.any() or np.mean((mean - curve) ** 2) > np.mean(mean**2):
         return None
+    if turn:
+        increments[0] = increments[-1]
     number = max(number, first)
     return Pitch(axis, number, increments, number - first, magnification, interval, turn)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.tables.axes import TURNING, unit_of
 from ncfix.tables.control import Files
@@ -56,12 +57,22 @@ def _pitch(remarks: Remarks, axis: str, axes: str, values: Mapping[int, Mapping[
         return None
     last = first + len(increments) - 1
     _check(remarks, found, first, last)
-    if found["turn"] and increments.sum() != 0:
-        remarks.refuse(0, f"the increments of a turn add up to {increments.sum()}, not to zero")
+    if found["turn"] and len(increments):
+        _check_turn(remarks, first, increments)
     if remarks.wrong:
         return None
     reference, magnification = int(found["reference"]), int(found["magnification"])
     return Pitch(axis, first, increments, reference, magnification, found["interval"], found["turn"])
+
+
+def _check_turn(remarks: Remarks, first: int, increments: NDArray[np.int64]) -> None:
+    """The first point of a turn is the last one again: B-63980EN, p. 100."""
+    total = increments[1:].sum()
+    if total != 0:
+        remarks.refuse(0, f"the increments of a turn behind its first point add up to {total}, not to zero")
+    if increments[0] != increments[-1]:
+        text = f"point {first} has {increments[0]}, and point {first + len(increments) - 1}, the same place, "
+        remarks.doubt(0, f"{text}has {increments[-1]}", "the same value for both")
 
 
 def _check(remarks: Remarks, found: Mapping[str, float], first: int, last: int) -> None:

@@ -32,7 +32,8 @@ class Pitch:
 
     axis           its letter
     first          number of the first point
-    increments     (n,) times magnification times detection unit: what is added on the way from the point before
+    increments     (n,) times magnification times detection unit: what is added on the way from the point before; of a
+                   turn the first is the last one again
     reference      number of the point at machine zero
     magnification  factor
     interval       mm or degree

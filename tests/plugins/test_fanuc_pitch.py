@@ -86,10 +86,17 @@ def test_a_rotary_axis_closes_over_a_turn(root: Path) -> None:
     machine = load(root / "examples" / "machines" / "dmu50.toml")
     made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 200)
     first, increments = read_increments(Remarks.of("pitch_C.csv", made.native["pitch_C.csv"]))
-    assert increments.sum() == 0
+    assert increments[1:].sum() == 0
+    assert increments[0] == increments[-1] != 0
     assert first > 1
-    broken = {**made.native, "pitch_C.csv": made.native["pitch_C.csv"].replace(b",0\n", b",1\n", 1)}
-    assert any("add up to 1, not to zero" in message.text for message in CONTROL.lint(broken))
+
+    def lint(point: int, value: int) -> list[str]:
+        old, new = (b"\n%d,%d\n" % (point, each) for each in (increments[point - first], value))
+        broken = {**made.native, "pitch_C.csv": made.native["pitch_C.csv"].replace(old, new)}
+        return [message.text for message in CONTROL.lint(broken)]
+
+    assert "behind its first point add up to" in lint(first + 3, 7)[0]
+    assert "the same place, has" in lint(first, 0)[0]
 
 
 def test_the_sample_is_read_and_its_numbers_written_again(shared: Callable[[str], Path]) -> None:
