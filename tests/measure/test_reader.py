@@ -238,6 +238,7 @@ AS_SAVED = RTL.replace("Targets:\n0.000 50.000 100.000\n", "Targets :\n0.000  50
         AS_SAVED,
         AS_SAVED.replace("\n", "\r\n"),
         AS_SAVED.replace("Axis: X", "Axis:X-axis"),
+        AS_SAVED.replace("TITLE: spring", "TITLE: Carroll, new controller"),
         AS_SAVED.replace("ENVIRONMENT::", "\nEQUIPMENT::\nSerial: 1 2 3\nEOF::\n"),
         "\n" + AS_SAVED.replace(" 2 1.2", "\t2\t1.2"),
     ],

@@ -18,7 +18,7 @@ from ncfix.diagnostics import ConfigError, Place
 SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 KEY = re.compile(r"([A-Za-z][\w -]*?)\s*:(.*)")
 LETTER = re.compile(r"(?:axis\b\s*)?([a-z])(?:[\s_-]*(?:axis|achse)?)", re.IGNORECASE)
-OTHER = re.compile(r"straight|squareness|angular|pitch|yaw|roll|flatness|diagonal", re.IGNORECASE)
+OTHER = re.compile(r"straight|square|angular|flatness|diagonal|(?<![a-z])(?:pitch|yaw|roll)(?![a-z])", re.IGNORECASE)
 """Words of a title that speak of another error than positioning."""
 ROTARY = "ABC"
 MICROMETRE = 1e-3
