@@ -255,3 +255,34 @@ def test_corpus(shared: Callable[[str], Path], machine: Machine, figures: Callab
         done += assert_same(source, machine, 500)
     figures(f"{done} of {tried} programs of the corpus corrected in parts, with the same bytes")
     assert tried
+
+
+def test_new_lines_end_as_the_first_of_the_file(machine: Machine) -> None:
+    """Whatever the lines of a part end with."""
+    lines = program(5, 80, 0.0).replace(b"\r\n", b"\n").splitlines()
+    for first, rest in ((b"\r\n", b"\n"), (b"\n", b"\r\n")):
+        ends = [first] * 20 + [rest] * len(lines)
+        source = b"".join(line + end for line, end in zip(lines, ends, strict=False))
+        source = source.replace(b"M30", b"X90. Y60. Z40. B60. C90." + rest + b"M30")
+        assert assert_same(source, machine, 500)
+        text, report = streamed(source, machine, 500, jobs=2)
+        assert (text, report) == streamed(source, machine, 500)
+        assert report["inserted_blocks"] > 0
+
+
+def test_arcs_that_just_reach_in_parts_of_other_processes(machine: Machine) -> None:
+    """These are followed as programmed, and so from where they begin as programmed: X and Y are not named there."""
+    turn = b"G1 X30. Y20.\n" + b"Z1.\nZ2.\n" * 6 + b"G2 X%d. Y20. R5.\nG1 X30. Y40.\n"
+    turns = b"".join(turn % x for x in (20, 40) * 6)
+    source = b"G21 G90 G94 F800 G17\nG1 X30. Y20. Z5. B0. C0.\n" + turns + b"M2\n"
+    for size in (200, 230, 260):
+        assert assert_same(source, machine, size)
+        assert streamed(source, machine, size, jobs=2) == streamed(source, machine, size)
+
+
+def test_what_is_said_of_motions_beyond_a_range_does_not_depend_on_parts(machine: Machine) -> None:
+    """Those that begin beyond one and end beyond another: their blocks are more or fewer in different parts."""
+    turn = b"X%d. Y-900. Z5.\nX%d. Y10. Z-300.\nX%d. Y0. Z5.\nX%d. Y1.\n"
+    turns = b"".join(turn % (k, k + 1, k + 2, k + 3) for k in range(20))
+    source = b"G21 G90 G94 F800 G17\nG1 X0 Y0 Z5 B0 C0\n" + turns + b"M2\n"
+    assert all(assert_same(source, machine, size) for size in (90, 100, 110, 120, 130))

@@ -75,14 +75,17 @@ class Corrector:
         foreign, self.units.share = False, share
         for number, unit in enumerate(self.units):
             if not share.has(number):
+                self._follow_on(unit, foreign)
                 foreign = True
-                self._follow_on(unit.part)
                 continue
             yield number, self._corrected(unit, number, share, foreign)
             foreign = False
 
-    def _follow_on(self, part: Part) -> None:
-        """Take the proof past a part of another process."""
+    def _follow_on(self, unit: Unit, foreign: bool) -> None:
+        """Take the proof past a part of another process, as programmed; `foreign`: so was the one before."""
+        part = unit.part
+        if unit.head is not None and not foreign:
+            self.proof.stand(unit.head.moves.end[-1])
         if part.passage is not None:
             self.again.first_line += part.passage.lines
             self.proof.resume(part.passage.remains)

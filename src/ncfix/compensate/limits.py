@@ -10,7 +10,7 @@ from ncfix.compensate.excursion import surely_within
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import distinct
-from ncfix.compensate.rows import finite, greatest, lengths
+from ncfix.compensate.rows import finite, greatest, lengths, some
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
@@ -66,12 +66,14 @@ def beyond_ranges(written: Written) -> tuple[Finding, Finding]:
     """NCF405: motions that leave the range of an axis as programmed, or come back from beyond it in several blocks.
 
     NCF404: motions that stay within the range of every axis as programmed, and leave one when corrected. On the limit
-    is within.
+    is within. Of a motion that both leaves a range and comes back from beyond one the first is said: how many blocks it
+    has depends on what has been refused by then.
     """
     programmed, corrected = programmed_excess(written), _corrected_excess(written)
     if (corrected > FUZZ).any():
-        programmed = np.fmax(programmed, _begun_beyond(written, corrected))
-        corrected[programmed > FUZZ] = -np.inf
+        either = np.fmax(programmed, _begun_beyond(written, corrected))
+        corrected[either > FUZZ] = -np.inf
+        programmed = np.where(some(programmed > FUZZ)[:, None], programmed, either)
     outside = "axis {axis} goes {value:.4g} {unit} beyond the range over which its errors are known"
     over = "the correction takes axis {axis} {value:.4g} {unit} beyond its range"
     return _of_axes(written, "NCF405", outside, programmed), _of_axes(written, "NCF404", over, corrected)

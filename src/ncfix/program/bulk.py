@@ -23,7 +23,7 @@ from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
 from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
-from ncfix.program.writer import Splices, line_end
+from ncfix.program.writer import Splices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -144,7 +144,7 @@ class Bulk:
         if stop == row:
             return None
         program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
-        ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), line_end(program.source)
+        ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), program.line_end
         axes, edits = len(here), (stop - row) * (len(here) + 1)
         blocks = self.moves.block[row:stop]
         commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * ROOM), dtype=np.uint8)
@@ -349,13 +349,13 @@ class Stretch:
         heads[:, 2:] = layouts.heads[program.template[blocks], columns]
         begins = further & (np.diff(rows, prepend=-1) != 0)
         if not manner.lined:
-            heads[begins, :3] = np.frombuffer(line_end(program.source).rjust(2, b"\0") + b"\0", dtype=np.uint8)
+            heads[begins, :3] = np.frombuffer(program.line_end.rjust(2, b"\0") + b"\0", dtype=np.uint8)
         texts = plain(self.wanted[rows, columns], self.decimals[columns], heads, signed=manner.signed)
         words = Splices(at, at, texts.length, texts.data)
         if not (manner.lined and begins.any()):
             return words
         first, last = np.flatnonzero(begins), np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
-        return with_lines(words, *lines_of(program, layouts, blocks[first], line_end(program.source)), (first, last))
+        return with_lines(words, *lines_of(program, layouts, blocks[first], program.line_end), (first, last))
 
 
 def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:

@@ -23,7 +23,7 @@ from ncfix.program.standstill import passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
-from ncfix.program.writer import Edit, Splices, line_end
+from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ class _Emitter:
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
-        self.eol = line_end(program.source).decode()
+        self.eol = program.line_end.decode()
         self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None

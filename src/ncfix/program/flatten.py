@@ -19,7 +19,6 @@ from ncfix.program.moves import Kind, Kinematics, Moves, Rule
 from ncfix.program.reader import read
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.program.writer import line_end
 
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup
@@ -94,7 +93,7 @@ def flatten(
         if error.messages[0].code in (RUNTIME, TOO_LONG):
             raise RefusedError.collected(error.messages) from None
         raise
-    end = line_end(program.source).decode()
+    end = program.line_end.decode()
     text = "".join(line.text + end for line in found).encode("latin-1")
     flat = read(text, program.path, program.dialect)
     before = trace(program, setup, axes, rotary, resolve, kinematics=kinematics).moves

@@ -92,12 +92,14 @@ class PartReader:
     """Reads parts of one program.
 
     first_line  the line on which the next part begins
+    line_end    the first line end of the first part
     plain       shape -> whether a part may end before or after a block of it
     """
 
     path: str
     dialect: Dialect
     first_line: int = 1
+    line_end: bytes = b""
     language: Language = field(init=False)
     templates: list[Template] = field(default_factory=list)
     index: dict[bytes | None, int] = field(default_factory=dict)
@@ -118,9 +120,10 @@ class PartReader:
             blocks[0, 0] = header_length(source)
         end = self._end_later(source, blocks) if begun else self.language.end(source, blocks)
         reading = Reading(source, self.path, self.dialect, self.language, blocks, end, self.templates, self.index)
-        reading.first_line = self.first_line
+        reading.first_line, reading.line_end = self.first_line, self.line_end
         before = len(self.templates)
         program = reading.program()
+        self.line_end = program.line_end
         if not all(map(self.language.straight, self.templates[before:])):
             raise NotInPartsError("the program does not run straight from its first line to its last")
         return program
@@ -166,6 +169,7 @@ def stretch(program: Program, start: int, stop: int) -> Program:
         number_spans=program.number_spans[numbers] - ends[0],
         numbers=program.numbers[numbers],
         first_line=program.first_line + program.source.count(b"\n", 0, ends[0]),
+        line_end=program.line_end,
     )
 
 
@@ -187,6 +191,7 @@ def joined(parts: list[Program]) -> Program:
         number_spans=np.concatenate([part.number_spans + at for part, at, _ in shifted]),
         numbers=np.concatenate([part.numbers for part in parts]),
         first_line=parts[0].first_line,
+        line_end=parts[0].line_end,
     )
 
 

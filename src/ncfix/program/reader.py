@@ -27,6 +27,7 @@ from ncfix.program.reach import UNREAD, Reach
 from ncfix.program.shapes import Scan
 from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
+from ncfix.program.writer import line_end
 
 PART_BYTES = 1 << 19
 """How much text is scanned at once: the columns of a scan take about a hundred times as much."""
@@ -105,6 +106,7 @@ class Reading:
     rows       the template of each block, as far as blocks are read: `done` of them
     reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
     first_line the line of the file on which the text begins
+    line_end   the line end that the file uses first; if not given, that of the text
     """
 
     source: bytes
@@ -120,6 +122,7 @@ class Reading:
     reach: Reach = field(default_factory=Reach)
     followed: int = 0
     first_line: int = 1
+    line_end: bytes = b""
 
     def __post_init__(self) -> None:
         self.rows = np.empty(len(self.blocks), dtype=np.int32)
@@ -141,6 +144,7 @@ class Reading:
             number_spans=spans,
             numbers=values,
             first_line=self.first_line,
+            line_end=self.line_end or line_end(self.source),
         )
 
     def parts(self) -> Iterator[tuple[int, int]]:

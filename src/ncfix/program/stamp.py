@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ncfix.program.tree import Comment, Flow, Opaque, Program, Tape, Word
-from ncfix.program.writer import Edit, line_end
+from ncfix.program.writer import Edit
 
 #: How every stamp begins; what follows it is for people.
 SIGN = re.compile(r"\bncfix \d+\.\d+\S* machine ", re.IGNORECASE)
@@ -39,7 +39,7 @@ def insertion(program: Program, text: str) -> Edit:
             before = block + 1
         elif not _is_blank(program, block):
             break
-    eol = line_end(program.source)
+    eol = program.line_end
     line = comment.encode("latin-1", "replace")
     if before == 0:
         start = int(program.blocks[0, 0])

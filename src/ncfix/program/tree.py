@@ -268,6 +268,7 @@ class Program:
     number_spans  (m, 2) start and stop byte of each number in the source, sign included
     numbers       (m,) their values as written (in the program's units)
     first_line    the line of the file on which `source` begins, where that is a part of it
+    line_end      the line end that the file uses first, which that of new lines is, too
     """
 
     source: bytes
@@ -280,6 +281,7 @@ class Program:
     number_spans: NDArray[np.int64]
     numbers: NDArray[np.float64]
     first_line: int = 1
+    line_end: bytes = b"\n"
 
     def __len__(self) -> int:
         return len(self.template)

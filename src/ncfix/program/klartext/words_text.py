@@ -15,7 +15,6 @@ from ncfix.program.klartext.turns import UNCORRECTED, on_its_side
 from ncfix.program.number_text import ROUNDED
 from ncfix.program.target import Target
 from ncfix.program.tree import Literal, Program, Span, Word
-from ncfix.program.writer import line_end
 
 FloatArray = NDArray[np.float64]
 
@@ -188,7 +187,7 @@ class WordWriter(BlockWriter[Layout]):
         self.out.lines.append(self._prefix() + self.layout.blank.join(words))
 
     def _line_end(self) -> str:
-        return line_end(self.program.source).decode()
+        return self.program.line_end.decode()
 
     def _prefix(self) -> str:
         """What stands before the function: the block number, which inserted blocks repeat, and its blanks."""
