@@ -342,3 +342,20 @@ def test_a_program_named_by_a_text_is_executed_as_often_as_it_says() -> None:
 def test_texts_and_arrays(value: str, meant: float) -> None:
     arrays = "DEF REAL ROW[2,2]=(1,2,3,4)\nROW[0,1]=9\nDEF INT ALL[3]=REP(7)\nDEF REAL FEW[4]\nFEW[0]=REP(5,2)\n"
     assert follow(f"{arrays}G0 X={value}").moves.end[0, 0] == meant
+
+
+# -- tools ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("call", ["T1\nL6", "T1 L6", "T1\nG0 SUPA Z300\nL6"])
+def test_a_number_that_is_not_at_hand_may_be_what_changes_the_tool(call: str) -> None:
+    """Then a T that follows may only make the next tool ready, and which length counts is not certain."""
+    followed = follow(f"{call}\nD1\nG0 X0 Y0 Z50\nG1 X5 F100\nT2\nX9\nG0 SUPA Z300\nL6\nD1\nG0 X0 Y0 Z50\nX1")
+    known = [(rule, row[0]) for rule, row in zip(followed.moves.rule, ends(followed), strict=True) if rule != Rule.PASS]
+    assert known == [(Rule.CORRECT, x) for x in (0, 5)] + [(Rule.REFUSE, 9)] + [(Rule.CORRECT, x) for x in (0, 1)]
+    assert any("T by itself" in reason for reason in reasons(followed))
+
+
+def test_a_number_that_is_not_at_hand_is_called_after_its_block() -> None:
+    followed = follow("T1 D1\nG0 X0 Y0 Z50\nX5 Y5 Z5 L900\nG1 X6 F100")
+    assert followed.moves.rule.tolist() == [Rule.CORRECT, Rule.CORRECT, Rule.REFUSE]

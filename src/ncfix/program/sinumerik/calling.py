@@ -42,15 +42,15 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
             f"the transformation {step.name.upper()} is in force, which ncfix does not follow"
         )
         return
-    ran_elsewhere(control, step.name.upper())
+    ran_elsewhere(control, step.name.upper(), changes_tool=control.fresh_tool)
 
 
-def ran_elsewhere(control: Sinumerik, name: str) -> None:
+def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
     """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
     text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
     control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
     control.lose_all(AFTER_CYCLE)
-    control.changed_by_cycle |= control.fresh_tool
+    control.changed_by_cycle |= changes_tool
     if "tool" in control.suspended:
         into_spindle(control)
         set_length(control)
@@ -79,6 +79,6 @@ def call_word(control: Sinumerik, turn: Turn, find: Find) -> None:
         return
     unit = find(f"L{value:g}")
     if unit is None:
-        ran_elsewhere(control, f"L{value:g}")
+        turn.elsewhere = f"L{value:g}"
         return
     turn.subprogram, turn.times = unit, round(turn.words.get("P", 1.0))

@@ -18,7 +18,7 @@ from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.program.sinumerik.bypass import bypassed
-from ncfix.program.sinumerik.calling import call_word
+from ncfix.program.sinumerik.calling import call_word, ran_elsewhere
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import stand
@@ -210,6 +210,8 @@ class Interpreter:
             main, line = not course.calls, self.place().line
             self.recorder.record(control, unit, index, turn, main=main, line=line)
         finish_block(control, turn)
+        if turn.elsewhere:
+            ran_elsewhere(control, turn.elsewhere, changes_tool=control.tools.selected != 0)
         return self.go_on(plan, turn)
 
     def go_on(self, plan: Plan, turn: Turn) -> bool:

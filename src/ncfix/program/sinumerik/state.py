@@ -58,7 +58,8 @@ class Sinumerik(Control):
     pattern  the places to which the last pattern of holes has led
     solitary  blocks after which no line may be put, since REPEAT would leave it out
     fresh_tool  a tool has been called since the last motion
-    changed_by_cycle  a name that is not known has followed a call of a tool at once: it may be what changes it
+    changed_by_cycle  a name that is not known has followed a call of a tool at once, or a number (L6) one at any time:
+                      it may be what changes it
     counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
     stated   the motion code is what the program has said itself, not what something that is not followed may have left
     heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known

@@ -81,6 +81,7 @@ class Turn:
     special     what applies to this block only: `supa`, `g53`, `meas`, `soft`
     frame       the name of a frame instruction, which takes the axis words
     subprogram  what is called after the block, with its arguments, so many times; `called` is the name that does it
+    elsewhere   the number that is called after the block, and is no subprogram at hand
     modal       MCALL stands in the block
     ends        RET stands in the block
     used        something takes the axis words for itself
@@ -96,6 +97,7 @@ class Turn:
     arguments: tuple[Evaluate, ...] = ()
     written: tuple[Expression | None, ...] = ()
     times: int = 1
+    elsewhere: str = ""
     modal: bool = False
     ends: bool = False
     used: bool = False
