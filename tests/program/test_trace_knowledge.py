@@ -273,3 +273,9 @@ def test_a_code_of_the_builder_that_the_setup_declares_changes_nothing() -> None
 def test_machine_coordinates_need_no_motion_code_on_iso_controls() -> None:
     followed = follow("G53 Z0\nX1\nG0 X1", dialect="iso")
     assert rules(followed) == [Rule.PASS, Rule.REFUSE, Rule.CORRECT]
+
+
+def test_a_rapid_behind_what_is_not_followed_is_refused_and_does_not_pass() -> None:
+    setup = Setup(work_offsets=G54, initial=ZERO)
+    assert rules(follow("G131\nG28 Z5\nG0 X1 Y1", "XYZ", setup, dialect="iso"))[-1] == Rule.REFUSE
+    assert rules(follow("G28 Z5\nG51 X0 Y0 P2\nG0 X1 Y1\nG50", "XYZ", setup, dialect="iso"))[-1] == Rule.REFUSE

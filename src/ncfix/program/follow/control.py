@@ -112,7 +112,7 @@ class Control(Standing):
         if not motion.passing:
             self._ask_for_start(motion)
         settles = self._settles(motion)
-        if motion.kind == Kind.RAPID and not (motion.passing or motion.refusal) and self._leaves_unknown(motion):
+        if not motion.passing and self._leaves_unknown(motion):
             motion = motion._replace(passing=first_reason(motion.unknown))
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)
@@ -163,7 +163,9 @@ class Control(Standing):
         self.places.begun = True
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
-        """Whether a rapid passes, see `motion.leaves_unknown`."""
+        """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
+        if rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
+            return False
         before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
         return leaves_unknown(rapid, before, turned=self.is_rotated and not self.modal.incremental)
 
