@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ncfix.diagnostics import UsageError
 from ncfix.program.moves import Rule, Trace
-from ncfix.program.setup import Setup
-from program.tracing import NOTHING, ZERO, ends, follow, reasons
+from ncfix.program.setup import Setup, Tool
+from program.tracing import KNOWN, NOTHING, ZERO, ends, follow, reasons
 
 G54 = {"G54": ZERO}
 
@@ -268,6 +270,15 @@ def test_a_code_of_the_builder_that_the_setup_declares_changes_nothing() -> None
     assert rules(declared)[:2] == [Rule.CORRECT, Rule.CORRECT]
     assert rules(declared)[2:] == [Rule.REFUSE, Rule.REFUSE]
     assert rules(follow(text, dialect="iso"))[1] == Rule.REFUSE
+    hints = [message.hint for message in declared.messages if message.code == "NCF228"]
+    assert len(hints) == 1
+    assert "a block of their own" in hints[0]
+
+
+def test_a_length_in_the_block_of_such_a_code_may_be_its_own() -> None:
+    setup = replace(KNOWN, tools={1: Tool(50.0), 2: Tool(70.0)}, passed_codes=frozenset({1310}))
+    text = "G43 H1 G0 X1. Y1. Z1.\nG131 H2\nG0 Z2."
+    assert rules(follow(text, "XYZ", setup, dialect="fanuc")) == [Rule.CORRECT, Rule.REFUSE]
 
 
 def test_machine_coordinates_need_no_motion_code_on_iso_controls() -> None:

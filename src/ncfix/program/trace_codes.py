@@ -155,7 +155,7 @@ TRACE_CODES: dict[str, Code] = {
         "after it is corrected.",
         "Name the dialect with --dialect, if there is one for the control. Of a code of the machine's builder that "
         'neither moves nor changes coordinates, the setup file can say so: `passed_codes = ["G131"]`; in a block with '
-        "words of axes it is refused all the same.",
+        "words of axes or of a length (H) it is refused all the same.",
     ),
     "NCF229": Code(
         "Unknown M code",

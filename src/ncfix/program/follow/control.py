@@ -21,6 +21,9 @@ from ncfix.program.recurrence import Budget
 
 UNKNOWN_AXIS = "NCF206"
 NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'
+TAKEN = (
+    "it is among passed_codes, but its block has words of axes or H, which it may take: give them a block of their own"
+)
 
 ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion is left as it is, or refused, that moves an axis without naming it."""
@@ -74,13 +77,17 @@ class Control(Standing):
         moves = self.builder.moves()
         return replace(moves, pointing=self.pointing) if self.points else moves
 
-    def refuse_after(self, code: int, *, with_axes: bool) -> None:
-        """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not."""
-        if self.refusal or (code in self.setup.passed_codes and not with_axes):
+    def refuse_after(self, code: int, *, moving: bool) -> None:
+        """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not.
+
+        moving  its block has words of axes or of a length: whether the code takes them, nobody has said
+        """
+        passed = code in self.setup.passed_codes
+        if self.refusal or (passed and not moving):
             return
         name = f"G{code / 10:g}"
         self.refusal = f"{name} is not known, and may move axes or change coordinates"
-        self.warn("NCF228", self.refusal, NEITHER.format(name))
+        self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
 
     @property
     def frame(self) -> int:

@@ -285,7 +285,7 @@ class Interpreter:
         }
         for code in codes.unknown:
             self.span = spans.get(code / 10)
-            unknown_code(self.control, code, with_axes=bool(plan.axes))
+            unknown_code(self.control, code, moving=bool(plan.axes) or "H" in plan.letters)
         self.span = None
 
     def note_foreign(self, plan: Plan) -> None:

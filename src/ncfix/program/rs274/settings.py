@@ -91,12 +91,12 @@ def unfollowed(control: Control, block: Block, code: int) -> None:
         control.lose(control.machine, AFTER_UNFOLLOWED)
 
 
-def unknown_code(control: Control, code: int, *, with_axes: bool) -> None:
+def unknown_code(control: Control, code: int, *, moving: bool) -> None:
     """A G code that is not known: it may change coordinates, or move."""
     name = f"G{code / 10:g}"
     if control.rules.strict:
         raise Fault("NCF227", f"{name} is not a code of LinuxCNC", "if the machine remaps it, ncfix cannot follow it")
-    control.refuse_after(code, with_axes=with_axes)
+    control.refuse_after(code, moving=moving)
 
 
 # -- saved states -----------------------------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ from ncfix.program.sinumerik.vocabulary import (
     HARMLESS,
     MADE_BY_THE_CONTROL,
     MOTIONS,
+    POLAR,
     TURNS_OF_THE_TOOL,
     UNFOLLOWED,
     UNFOLLOWED_MOTIONS,
@@ -309,7 +310,7 @@ def codes(control: Sinumerik, turn: Turn) -> None:
         elif code in TAKES_WORDS:
             takes_words(control, turn, code)
         elif code not in PASSED:
-            control.refuse_after(code, with_axes=bool(turn.words.axes))
+            control.refuse_after(code, moving=bool(turn.words.axes or POLAR & turn.words.values.keys()))
 
 
 def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
