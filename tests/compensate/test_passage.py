@@ -136,4 +136,3 @@ def test_a_share_can_be_handed_to_a_process_that_is_started_anew() -> None:
     """As on Windows, where processes are not forked."""
     share = pickle.loads(pickle.dumps(Share(2, 1)))
     assert share.has(1)
-    assert share.others()

@@ -81,7 +81,8 @@ CODES = {
     "NCF017": Code(
         "a process was killed",
         "With `--jobs`, a program was given to a process of its own, which was killed from outside (mostly because "
-        "memory ran out), and so was the one that tried again. The other programs are not concerned.",
+        "memory ran out), and so was the one that tried again; or one of those that worked on it together was. The "
+        "other programs are not concerned.",
         "Fix the program alone, with `--jobs 1`, on a computer with more memory.",
     ),
     "NCF018": Code(

@@ -16,7 +16,7 @@ from ncfix.cli.faults import owned
 from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Fixed, Outlet, Source, compiled_from, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
-from ncfix.diagnostics import ExitCode, Message, NcfixError, Place
+from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place
 
 if TYPE_CHECKING:
     from ncfix.compensate.options import FixOptions
@@ -115,6 +115,7 @@ class Job:
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:
+        from ncfix.compensate.crew import GoneError
         from ncfix.program.parts import NotInPartsError
 
         _let_stay()
@@ -124,6 +125,9 @@ class Job:
             fixed = self._whole(source, source.everything(), find)
             assert isinstance(fixed.text, bytes)
             return Fixed(outlet.after(fixed.text, source.path), fixed.changed, fixed.report)
+        except GoneError:
+            text = "one of the processes that worked on it was killed"
+            raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
         return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
 
 

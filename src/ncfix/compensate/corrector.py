@@ -71,7 +71,10 @@ class Corrector:
         self.stamped = b""
 
     def work(self, share: Share) -> Iterator[tuple[int, Done]]:
-        """The number of each part of the share, and what it has become; the others are followed, or passed over."""
+        """The number of each part of the share, and what it has become; the others are followed, or passed over.
+
+        Raises what reading, following and correcting do, and at last UsageError for what the setup does not give.
+        """
         foreign, self.units.share = False, share
         for number, unit in enumerate(self.units):
             if not share.has(number):
@@ -80,6 +83,8 @@ class Corrector:
                 continue
             yield number, self._corrected(unit, number, share, foreign)
             foreign = False
+        if error := self.units.missing():
+            raise error
 
     def _follow_on(self, unit: Unit, foreign: bool) -> None:
         """Take the proof past a part of another process, as programmed; `foreign`: so was the one before."""

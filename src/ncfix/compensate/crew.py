@@ -4,17 +4,22 @@ Parts are taken in turn. What a part leaves in the control (`Passage`) is told t
 only where that is more than can be told, the others read and follow it, too. What it leaves to the motions behind it
 (`Before`) is handed on as soon as it is written, so that the next one can be written, too, while it is still being
 proved. The text comes to the others from the first process, and what they have done goes back to it.
+
+Nobody waits for a process that is gone: when one ends before its time, whatever kept it, all others are ended, too, and
+the first process, when it next waits for something, finds that nothing more can come and raises `GoneError`.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from queue import Empty
+from threading import Thread
 from typing import Any, Generic, Protocol, TypeVar
 
 from ncfix import fast
@@ -25,17 +30,10 @@ Result = TypeVar("Result")
 Done = TypeVar("Done", covariant=True)
 Read = Callable[[int], bytes]
 """Gives the next so many bytes of a text; none at its end."""
-PATIENCE = 1.0
-"""Seconds after which it is looked whether those who are waited for are still there."""
 
 
 class GoneError(Exception):
     """A process that worked on the program has ended before its time."""
-
-
-def surely() -> bool:
-    """They are there: to be asked where it is not known yet how to find out."""
-    return True
 
 
 @dataclass(slots=True)
@@ -44,7 +42,6 @@ class Share:
 
     inbox    what the part before has left, if another process has corrected it
     outbox   where the process hears of it that has the next part
-    others   whether the others are still there
     last     what the last part has left, where there are no others
     news     where this process hears what parts of others leave in the control, `hearers` where each of the others does
     heard    what it has heard of parts, by their numbers
@@ -55,7 +52,6 @@ class Share:
     mine: int = 0
     inbox: Any = None
     outbox: Any = None
-    others: Callable[[], bool] = surely
     last: Before | None = None
     news: Any = None
     hearers: tuple[Any, ...] = ()
@@ -73,7 +69,7 @@ class Share:
     def announce(self, number: int, passage: Passage | None) -> None:
         """Tell the others what an own part leaves in the control; None: they have to follow it themselves."""
         for each in self.hearers:
-            each.put((number, passage))
+            tell(each, (number, passage))
 
     def fall_silent(self) -> None:
         """Let the others know that nothing more will be told."""
@@ -83,7 +79,7 @@ class Share:
         """What a part of another process leaves in the control; None: it has to be followed. Waits for it."""
         owner = number % self.jobs
         while not self.has(number) and number not in self.heard and owner not in self.silent:
-            which, found = waited_for(self.news, self.others)
+            which, found = waited_for(self.news)
             if which < 0:
                 self.silent.add(-1 - which)
             else:
@@ -98,7 +94,7 @@ class Share:
         """
         if number == 0 or self.jobs == 1:
             return self.last
-        found: Before | Exception = waited_for(self.inbox, self.others)
+        found: Before | Exception = waited_for(self.inbox)
         if isinstance(found, Exception):
             raise found
         return found
@@ -106,7 +102,7 @@ class Share:
     def leave(self, before: Before | Exception) -> None:
         """Hand on what an own part leaves, or why that will not be known."""
         if self.jobs > 1:
-            self.outbox.put(before)
+            tell(self.outbox, before)
         elif isinstance(before, Before):
             self.last = before
 
@@ -144,7 +140,6 @@ class Crew(Generic[Result]):
     share: Share
     texts: list[Any] = field(default_factory=list)
     results: Any = None
-    there: Callable[[], bool] = surely
     done: dict[int, Result | Exception] = field(default_factory=dict)
     given: int = 0
 
@@ -154,7 +149,7 @@ class Crew(Generic[Result]):
         def spreading(size: int) -> bytes:
             text = read(size)
             for each in self.texts:
-                each.put(text)
+                tell(each, text)
             return text
 
         return Ahead(spreading, len(self.texts)) if self.texts else read
@@ -168,7 +163,7 @@ class Crew(Generic[Result]):
         if self.results is not None:
             while True:
                 try:
-                    number, result = self.results.get_nowait()
+                    number, result = waited_for(self.results, wait=False)
                 except Empty:
                     break
                 self.done[number] = result
@@ -179,7 +174,7 @@ class Crew(Generic[Result]):
         """What is left of so many parts, in order; waits for it."""
         while self.given < count:
             while self.given not in self.done:
-                number, result = waited_for(self.results, self.there)
+                number, result = waited_for(self.results)
                 self.done[number] = result
             yield self._next()
 
@@ -191,14 +186,17 @@ class Crew(Generic[Result]):
         return result
 
 
-def waited_for(queue: Any, there: Callable[[], bool]) -> Any:
-    """What comes out of a queue; raises `GoneError` if those who might put something in are gone."""
-    while True:
-        try:
-            return queue.get(timeout=PATIENCE)
-        except Empty:
-            if not there():
-                raise GoneError("a process that worked on the program has ended") from None
+def tell(queue: Any, what: Any) -> None:
+    """Put something into a queue; what cannot go from one process to another raises here, and is not lost later."""
+    queue.put(pickle.dumps(what))
+
+
+def waited_for(queue: Any, wait: bool = True) -> Any:
+    """What comes out of a queue; raises `GoneError` if those who put something in are gone, and `Empty`."""
+    try:
+        return pickle.loads(queue.get(wait))
+    except (EOFError, OSError):
+        raise GoneError("a process that worked on the program has ended") from None
 
 
 @contextmanager
@@ -227,21 +225,35 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
         for share, text in zip(shares[1:], texts, strict=True)
     ]
 
-    def there() -> bool:
-        return all(process.is_alive() for process in processes)
-
-    for process in processes:
-        process.start()
-    shares[0].others = there
     try:
-        yield Crew(shares[0], texts, results, there)
+        for process in processes:
+            process.start()
+        for queue in (results, boxes[0], news[0]):
+            queue._writer.close()
+        Thread(target=_end_together, args=(processes,), daemon=True).start()
+        yield Crew(shares[0], texts, results)
     finally:
         for queue in (*boxes, *texts, *news):
             queue.cancel_join_thread()
         texts.clear()
-        for process in processes:
+        started = [process for process in processes if process.pid is not None]
+        for process in started:
             process.terminate()
+        for process in started:
             process.join()
+
+
+def _end_together(processes: Sequence[Any]) -> None:
+    """End all as soon as one has ended: then what they write into ends, too, also in the middle of a message."""
+    wait([process.sentinel for process in processes])
+    for process in processes:
+        process.terminate()
+
+
+def _end_with(parent: int) -> None:
+    """End this process with its parent, whatever it is doing or waiting for."""
+    wait([parent])
+    os._exit(1)
 
 
 def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, results: Any, compiled: bool) -> None:
@@ -250,18 +262,19 @@ def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, resul
     assert parent is not None
     if compiled:
         fast.engage()
-    share.others, number = parent.is_alive, share.mine
+    number, end = share.mine, Thread(target=_end_with, args=(parent.sentinel,), daemon=True)
+    end.start()
     try:
-        for number, result in worker(Ahead(lambda size: waited_for(texts, parent.is_alive))).work(share):
-            results.put((number, result))
+        for number, result in worker(Ahead(lambda size: waited_for(texts))).work(share):
+            tell(results, (number, result))
             number += share.jobs
-    except (KeyboardInterrupt, GoneError):
+    except KeyboardInterrupt:
         return
     except Exception as error:
-        results.put((number, _portable(error)))
+        tell(results, (number, _portable(error)))
         share.leave(_portable(error))
         share.fall_silent()
-    wait([parent.sentinel])
+    end.join()
 
 
 def _portable(error: Exception) -> Exception:

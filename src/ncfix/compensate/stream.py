@@ -76,8 +76,6 @@ class Stream:
             for number, done in own.work(others.share):
                 others.put(number, done)
                 self._take(others.ready())
-            if error := own.units.missing():
-                raise error
             self._take(others.rest(own.units.count))
         self._pass_on(own.units.rest, own.units.read)
         self.tally.blocks += own.units.blocks

@@ -82,7 +82,7 @@ class PartFollower(ABC):
         if not self.unchanged or control.unknown or control.builder.winding is not None or len(moves) < 2:
             return None
         straight = np.isin(moves.kind[-2:], (Kind.RAPID, Kind.FEED)) & np.isin(moves.modal[-2:], (0, 10))
-        if not straight.all() or moves.block[-2] + 1 != moves.block[-1]:
+        if not straight.all() or moves.block[-2] + 1 != moves.block[-1] or _changes_tools(moves):
             return None
         before = moves.start[-1].tolist(), float(moves.feed[-2]), modal.feed_given, int(moves.modal[-2])
         return Remains(*before, self.parameters())
@@ -119,3 +119,10 @@ class PartFollower(ABC):
     def assumed(self) -> tuple[str, ...]:
         """What was taken as zero so far."""
         return tuple(self.control.knowledge.assumed)
+
+
+def _changes_tools(moves: Moves) -> bool:
+    """Whether motions are made with more than one tool, or length of it: what is lacking is said of each of them."""
+    tool, length = moves.tool, moves.tool_length
+    same = (length == length[-1]) | (np.isnan(length) & np.isnan(length[-1]))
+    return bool((tool != tool[-1]).any() or not same.all())

@@ -1,0 +1,138 @@
+"""Several processes at one program: whatever happens to one of them, the run ends, and soon."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from compensate.test_stream import OPTIONS, program, streamed
+from ncfix.cli import console
+from ncfix.cli.job import Job
+from ncfix.cli.targets import Target
+from ncfix.compensate import crew, fix
+from ncfix.compensate.corrector import Corrector, Done
+from ncfix.compensate.stream import Stream
+from ncfix.compensate.task import Task
+from ncfix.diagnostics import NcfixError, UsageError
+from ncfix.machine import Machine, load
+from ncfix.program import dialects
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup, Tool
+
+SECONDS = 20
+"""Far more than any of these takes on a computer that does much else, and far less than for ever."""
+
+pytestmark = [
+    pytest.mark.skipif(
+        "fork" not in multiprocessing.get_all_start_methods(), reason="what is patched is not inherited"
+    ),
+    pytest.mark.usefixtures("soon"),
+]
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(root / "benchmarks" / "five_axis.toml")
+
+
+@pytest.fixture
+def soon() -> Iterator[None]:
+    """Ends a test that hangs."""
+
+    def late(*_: object) -> None:
+        raise AssertionError(f"not done within {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(SECONDS)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+def killed(*_: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def killed_in_a_message(queue: Any, _: object) -> None:
+    """After the size of a message, and a little of it."""
+    os.write(queue._writer.fileno(), (1 << 20).to_bytes(4, "big") + b"some")
+    killed()
+
+
+def in_another_process(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, instead: Callable[..., Any]) -> None:
+    """Have something else done there."""
+    own, original = os.getpid(), getattr(owner, name)
+    monkeypatch.setattr(owner, name, lambda *given: (original if os.getpid() == own else instead)(*given))
+
+
+@pytest.mark.parametrize("jobs", [2, 3])
+@pytest.mark.parametrize(
+    ("owner", "name", "instead"),
+    [
+        (Corrector, "_corrected", killed),
+        (Corrector, "_follow_on", killed),
+        (crew, "tell", killed_in_a_message),
+        (crew, "_work", lambda *_: None),
+    ],
+)
+def test_a_process_that_is_gone(
+    owner: Any, name: str, instead: Callable[..., Any], jobs: int, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_another_process(monkeypatch, owner, name, instead)
+    with pytest.raises(crew.GoneError):
+        streamed(program(5, 400, 0.0), machine, 1000, jobs=jobs)
+    assert not multiprocessing.active_children()
+
+
+def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_another_process(monkeypatch, Corrector, "_corrected", lambda *_: Done(b"", lambda: None))  # type: ignore[arg-type]
+    with pytest.raises(Exception, match="pickle"):
+        streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
+
+
+def test_what_is_said_of_it(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_another_process(monkeypatch, Corrector, "_corrected", killed)
+    monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
+    source, output = tmp_path / "p.ngc", tmp_path / "out.ngc"
+    source.write_bytes(program(5, 400, 0.0))
+    with console.keeping() as said:
+        outcome = Job(machine, Setup(assume_zero=True), "linuxcnc", OPTIONS).outcome(
+            Target(str(source), str(output)), 2
+        )
+    assert outcome.code != 0
+    assert "NCF017" in "".join(said)
+    assert not output.exists()
+
+
+CHANGES = (
+    (b"T2 M6", b"T0 M6"),
+    (b"G43 H2", b"G49"),
+    (b"T2 M6\nG43", b"T0 M6\nG49"),
+)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("at", [60, 100, 140, 150])
+def test_a_tool_that_is_used_within_one_part(change: tuple[bytes, bytes], at: int, machine: Machine) -> None:
+    """What is not known of it is told, whichever process has that part."""
+    lines = program(5, 200, 0.0).splitlines()
+    source = b"\n".join([*lines[:at], change[0], *lines[at : at + 4], change[1], *lines[at + 4 :], b""])
+    assert streamed(source, machine, 2000, jobs=2) == streamed(source, machine, 2000)
+    zero = dict.fromkeys("XYZBC", 0.0)
+    setup = Setup(work_offsets={"G54": zero}, initial=zero, tools={0: Tool(length=50.0)})
+    told = []
+    for jobs in (1, 2, 3):
+        task = Task(machine, setup, OPTIONS, None, "p.ngc", dialects.get("linuxcnc"), 2000)
+        with pytest.raises(UsageError) as caught:
+            Stream(task, io.BytesIO(source).read, lambda _: None, jobs).run()
+        told.append([str(message) for message in caught.value.messages])
+    with pytest.raises(NcfixError) as expected:
+        fix.fix_program(read(source, "p.ngc", "linuxcnc"), machine, setup, OPTIONS)
+    assert told == [[str(message) for message in expected.value.messages]] * 3
