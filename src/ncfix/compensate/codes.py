@@ -102,8 +102,8 @@ CODES = {
     ),
     "NCF417": Code(
         "a motion is too long to be looked at",
-        "The tip is followed along each motion, as closely as the errors of the machine may bend. A motion of thousands "
-        "of turns, or of many times the travel, would take more looks at it than ncfix has; it is refused.",
+        "The tip is followed along each motion, as closely as the errors of the machine may bend. A motion of "
+        "thousands of turns, or of many times the travel, would take more looks at it than ncfix has; it is refused.",
         "Make several motions of it, or check its number of turns.",
     ),
     "NCF420": Code(

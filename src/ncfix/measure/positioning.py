@@ -24,6 +24,9 @@ class Positioning:
     R  repeatability: the largest band at one place, both sides; NaN with less than two runs
     E  systematic deviation: the range of all means; M the range of the means of both sides
     B  largest reversal; mean_reversal: over all places; NaN if one side only was measured
+
+    Values are errors of the body along the base axes: of a table axis, whose body goes towards minus as its number
+    grows, the mean reversal has another sign than that of its deviations.
     """
 
     component: str
