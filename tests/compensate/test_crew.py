@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import multiprocessing
+import multiprocessing.queues
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -94,6 +95,22 @@ def test_a_process_that_is_gone(
 def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     in_another_process(monkeypatch, Corrector, "_corrected", lambda *_: Done(b"", lambda: None))  # type: ignore[arg-type]
     with pytest.raises(Exception, match="pickle"):
+        streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
+
+
+@pytest.mark.parametrize("here", [False, True])
+def test_what_does_not_arrive(here: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What packs messages on their way, in this process or in the others, has no memory."""
+    own, queues = os.getpid(), multiprocessing.queues
+    packs = queues._ForkingPickler.dumps
+
+    def full(what: object) -> object:
+        if (os.getpid() == own) == here:
+            raise MemoryError
+        return packs(what)
+
+    monkeypatch.setattr(queues, "_ForkingPickler", type("Packing", (), {"dumps": staticmethod(full)}))
+    with pytest.raises(crew.GoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 
 

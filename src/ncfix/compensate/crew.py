@@ -224,12 +224,12 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
         context.Process(target=_work, args=(worker, share, text, results, fast.engaged()), daemon=True)
         for share, text in zip(shares[1:], texts, strict=True)
     ]
-
     try:
         for process in processes:
             process.start()
         for queue in (results, boxes[0], news[0]):
             queue._writer.close()
+        _must_arrive((*boxes, *texts, *news), lambda: _end(processes))
         Thread(target=_end_together, args=(processes,), daemon=True).start()
         yield Crew(shares[0], texts, results)
     finally:
@@ -237,8 +237,7 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
             queue.cancel_join_thread()
         texts.clear()
         started = [process for process in processes if process.pid is not None]
-        for process in started:
-            process.terminate()
+        _end(started)
         for process in started:
             process.join()
 
@@ -246,8 +245,18 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Result]]) -> Iterator[Crew[R
 def _end_together(processes: Sequence[Any]) -> None:
     """End all as soon as one has ended: then what they write into ends, too, also in the middle of a message."""
     wait([process.sentinel for process in processes])
+    _end(processes)
+
+
+def _end(processes: Sequence[Any]) -> None:
     for process in processes:
         process.terminate()
+
+
+def _must_arrive(queues: Sequence[Any], otherwise: Callable[[], object]) -> None:
+    """Do something where what was put into queues cannot be sent, as for want of memory: it would just be missing."""
+    for queue in queues:
+        queue._on_queue_feeder_error = lambda *_: otherwise()
 
 
 def _end_with(parent: int) -> None:
@@ -264,6 +273,7 @@ def _work(worker: Callable[[Read], Worker[Any]], share: Share, texts: Any, resul
         fast.engage()
     number, end = share.mine, Thread(target=_end_with, args=(parent.sentinel,), daemon=True)
     end.start()
+    _must_arrive((results, share.outbox, *share.hearers), lambda: os._exit(1))
     try:
         for number, result in worker(Ahead(lambda size: waited_for(texts))).work(share):
             tell(results, (number, result))
