@@ -177,3 +177,18 @@ def test_an_axis_of_which_two_turned_ones_are_made_leaves_both_unknown(machine: 
     )
     assert rule_of(text, "G1 X20. F100.", machine) == Rule.REFUSE
     assert rule_of(text, "G1 X7.", machine) == Rule.CORRECT
+
+
+OBLIQUE = {
+    "fanuc": FANUC.format(approach="G0 X10.\nG4 P1.\nY5.\nG43 H1 Z40.").replace("I0. J30.", "I20. J30."),
+    "siemens": SIEMENS.replace(",57,0,0,0,30,0,0,", ",27,0,0,0,0,25,30,").replace("G0 X10 Y5 M8", "G0 X10\nG4 F1\nY5"),
+}
+
+
+@pytest.mark.parametrize("dialect", OBLIQUE)
+def test_a_plane_that_is_turned_about_two_axes_may_be_approached_axis_by_axis(dialect: str, machine: Machine) -> None:
+    """Then every axis of the machine is made of all of the plane, and none is known before the last of them."""
+    program = read(OBLIQUE[dialect].encode(), "o1.nc", dialect)
+    moves = follow(program, machine, SETUP).trace.moves
+    assert np.array(moves.rule)[moves.cuts].tolist() == [Rule.CORRECT] * int(moves.cuts.sum())
+    assert not lacking(moves).any()

@@ -119,11 +119,10 @@ class Control(Standing):
         if not motion.passing:
             self._ask_for_start(motion)
         settles = self._settles(motion)
-        if not motion.passing and self._leaves_unknown(motion):
-            motion = motion._replace(passing=first_reason(motion.unknown))
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)
-        fate = self._dragged(motion, adrift)
+        leaving = not motion.passing and self._leaves_unknown(motion)
+        fate = motion._replace(passing=first_reason(motion.unknown)) if leaving else self._dragged(motion, adrift)
         self._keep_places(motion, settles)
         style = self._style_of(fate)
         self.beside &= ~fate.axes
@@ -166,8 +165,12 @@ class Control(Standing):
             self.said = self.saying[1] if self.saying is not None and self.saying[0] is motion.unknown else None
         self.saying = None
         self.places.settle(settles)
-        self.places.lose(mask_of(motion.unknown if self.said is None else self.said))
+        self.places.lose(mask_of(self._lost_behind(motion)))
         self.places.begun = True
+
+    def _lost_behind(self, motion: Motion) -> Unknown:
+        """What is not known behind a motion, along the axes of the program's frame as far as its words have told."""
+        return motion.unknown if self.said is None else self.said
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""

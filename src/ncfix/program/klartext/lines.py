@@ -142,6 +142,7 @@ def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unkno
     linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
     tcp.switch(control, control.offsets.tool, False)
     control.refresh()
+    control.path.said = None
     for index in control.machine:
         if not control.rotary[index]:
             target[index] = control.position[index]

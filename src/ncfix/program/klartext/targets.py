@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
+from ncfix.program.follow import tcp
 from ncfix.program.follow.control import ADRIFT
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.program.follow.faults import Fault
@@ -103,17 +104,7 @@ def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
     """What is not known along the axes of the frame."""
     if not unknown or not control.is_rotated:
         return dict(unknown)
-    return mixed(control.inverse, unknown)
-
-
-def mixed(rotation: tuple[tuple[float, float, float], ...], unknown: Unknown) -> Unknown:
-    """What is not known of turned X Y Z: an axis is not if anything that it is made of is not."""
-    found = {index: why for index, why in unknown.items() if index > Z}
-    for index in (X, Y, Z):
-        parts = [k for k in (X, Y, Z) if k in unknown and rotation[index][k] != 0.0]
-        if parts:
-            found[index] = unknown[parts[0]]
-    return found
+    return tcp.mixed_into(unknown, control.inverse)
 
 
 def destination(control: Control, words: Words) -> tuple[Vector, Unknown]:
@@ -184,7 +175,7 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
             target[index] = position
     unknown = where.unknown
     if control.is_rotated and unknown:
-        unknown = mixed(control.rotation, unknown)
+        unknown = tcp.mixed_into(unknown, control.rotation)
         control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
     return target, {index: why for index, why in unknown.items() if index in control.machine}
 

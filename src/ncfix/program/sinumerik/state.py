@@ -266,11 +266,13 @@ class Sinumerik(Control):
             self.ask_for_length()
         self._note_heading(kind, end, arc, follows=not passing and not refusal)
         self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
-        if self.is_rotated:
-            self.places.settle(settles & ~mask_of(self.lost))
         self.whole = False
         stand(self, axes, by_machine=by_machine)
         self.forget_settled()
+
+    def _lost_behind(self, motion: Motion) -> Unknown:
+        """As for all controls; the book of turned coordinates is `lost`."""
+        return self.lost if self.is_rotated else motion.unknown
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """As for all controls; whether it is a rapid, the program has to have said."""
