@@ -170,7 +170,7 @@ class Control(Standing):
 
     def _lost_behind(self, motion: Motion) -> Unknown:
         """What is not known behind a motion, along the axes of the program's frame as far as its words have told."""
-        return motion.unknown if self.said is None else self.said
+        return tcp.along_frame(self, motion.unknown) if self.said is None else self.said
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""

@@ -52,10 +52,15 @@ def converted(control: Control, position: Vector, unknown: Unknown, before: TcpS
 
 
 def lost_in_frame(control: Control) -> Unknown:
-    """What is not known along the axes of the program's frame: those that have a part in an axis that is not known."""
+    """What is not known along the axes of the program's frame."""
     if control.said is not None and control.unknown:
         return control.said
-    return mixed_into(control.unknown, control.inverse) if control.is_rotated else control.unknown
+    return along_frame(control, control.unknown)
+
+
+def along_frame(control: Control, unknown: Unknown) -> Unknown:
+    """The axes of the program's frame that have a part in one of these of the machine."""
+    return mixed_into(unknown, control.inverse) if unknown and control.is_rotated else unknown
 
 
 def lost_of_axes(control: Control, lost: Unknown) -> Unknown:

@@ -102,9 +102,7 @@ def frame(control: Control) -> tuple[object, ...]:
 
 def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
     """What is not known along the axes of the frame."""
-    if not unknown or not control.is_rotated:
-        return dict(unknown)
-    return tcp.mixed_into(unknown, control.inverse)
+    return dict(tcp.along_frame(control, unknown))
 
 
 def destination(control: Control, words: Words) -> tuple[Vector, Unknown]:
