@@ -157,19 +157,19 @@ def _table(remarks: Remarks, number: int, axis: str, measured: bool, scale: floa
     if (steps <= 0).any():
         return None
     nodes, trims = rows[:, 0], rows[:, :1] - rows[:, 1:] if measured else rows[:, 1:]
-    if not _too_large(remarks, trims * scale, measured):
+    if not _too_large(remarks, trims * scale, measured, "degree" if axis in TURNING else "mm"):
         _look_for_jumps(remarks, steps, trims)
     stored: NDArray[np.float64] = trims.astype(np.float32).astype(np.float64) * scale
     return Joint(number, axis, nodes * scale, stored[:, 0], stored[:, 1])
 
 
-def _too_large(remarks: Remarks, trims: Array, measured: bool) -> bool:
+def _too_large(remarks: Remarks, trims: Array, measured: bool, unit: str) -> bool:
     """Whether the first correction that no machine needs is refused: most likely the file is of the other type."""
     rows = np.flatnonzero(np.abs(trims).max(axis=1) > LARGE)
     if rows.size:
         size = trims[rows[0]][np.abs(trims[rows[0]]).argmax()]
         other = "1, corrections" if measured else "0, actual positions"
-        text = f"a correction of {size:g}, which no machine needs: LinuxCNC would move there"
+        text = f"a correction of {size:g} {unit}, which no machine needs: LinuxCNC would move there"
         remarks.refuse(int(rows[0]) + 1, text, f"is it a file of COMP_FILE_TYPE {other}?")
     return bool(rows.size)
 
