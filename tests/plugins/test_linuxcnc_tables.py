@@ -78,7 +78,7 @@ BROKEN = {
     "a word": (GOOD.replace(b"0.001", b"nan"), "not three numbers"),
 }
 BROKEN |= {
-    "actual positions as corrections": (b"-10 -10.001 -9.999\n10 9.999 10.000\n", "no machine needs"),
+    "actual positions as corrections": (b"-10 -10.001 -9.999\n10 9.999 10.000\n", "-10.001 mm, which no machine needs"),
     "a blank line before more": (GOOD + b"\n\n30.0 0 0\n", "a blank line"),
     "a comment at the end": (GOOD + b"# 30.0 0 0\n", "not three numbers"),
 }
