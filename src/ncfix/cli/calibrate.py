@@ -153,7 +153,9 @@ def _print(found: Calibration, over: Prediction) -> None:
     held = "; what is held counts as known" if any(sigma != sigma for sigma in found.sigma.tolist()) else ""
     figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
     console.say(f"sigma of the tip error over the travels: {figures}{held}")
-    console.say(f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after; {_noise(found)}")
+    lengths = found.before_um == found.before_um
+    rms = f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after" if lengths else "only angles"
+    console.say(f"{rms}; {_noise(found)}")
 
 
 def _rows(found: Calibration) -> Iterator[tuple[str, str, str, str]]:

@@ -112,7 +112,8 @@ class Calibration:
     estimate    where it ended
     scale       factor on the standard deviations: 1 if the noise was known and explains the residuals
     remarks     what the user should know: what could not be told, outliers, noise
-    before_um   rms of the values about the machine as it was, set-up fitted; after_um the same about the result
+    before_um   rms of the lengths about the machine as it was, set-up fitted; after_um the same about the result; NaN
+                if only angles were measured
     """
 
     machine: Machine

@@ -22,7 +22,7 @@ from ncfix.machine.signals import with_lags
 from ncfix.machine.state import State, flatten
 from ncfix.measure.checks import component_of
 from ncfix.measure.measurement import Array, Index, Measurement, groups
-from ncfix.measure.observation import LEVER, Observation, Unknowns
+from ncfix.measure.observation import DEFAULT_NOISE, LEVER, Mask, Observation, Unknowns, repeatability
 
 ANGLE = 1e-4
 """rad: how far an angle instrument's zero may be off, in simulations."""
@@ -60,10 +60,30 @@ class DirectReading(Observation):
 
     @cached_property
     def sigma(self) -> Array:
-        """As for others, but that each row says for itself whether it is an angle."""
-        lengths = super().sigma
-        angles = self.measurement.noise[1]
-        return np.where(self.rotational, lengths / LEVER if angles is None else angles, lengths)
+        """As for others, but that each row says for itself whether it is an angle, and angles have repeats, too."""
+        lengths, angles = self.measurement.noise
+        if angles is None and lengths is None:
+            angles = self._repeats(self.turns)
+        if lengths is None:
+            lengths = self._repeats(~self.turns) or DEFAULT_NOISE
+        return np.where(self.turns, lengths / LEVER if angles is None else angles, lengths)
+
+    @property
+    def noise_known(self) -> bool:
+        """See `Observation`; where there are only angles, theirs will do."""
+        lengths, angles = self.measurement.noise
+        if self.turns.all():
+            return not (lengths is None and angles is None and self._repeats(self.turns) is None)
+        return lengths is not None or self._repeats(~self.turns) is not None
+
+    def _repeats(self, rows: Mask) -> float | None:
+        """The standard deviation over repeats among these rows (n,), mm or rad."""
+        return repeatability(self.measurement, self.components, self.angular, rows)
+
+    @property
+    def turns(self) -> Mask:
+        """See `Observation`: each row says for itself."""
+        return self.rotational
 
     @cached_property
     def unknowns(self) -> Unknowns:

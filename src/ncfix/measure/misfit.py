@@ -23,7 +23,7 @@ def misfit(found: Calibration) -> Message | None:
     factor = float(np.sqrt(found.chi_square)) if found.problem.noise_known else 0.0
     most_um = UM * float(found.machine.max_correction[0])
     beyond = factor > BEYOND and found.after_um > MUCH_UM
-    if not beyond and found.after_um <= most_um:
+    if not beyond and not found.after_um > most_um:
         return None
     times = f", {factor:.0f} times the noise" if factor > 1 else ""
     rms = f" ({found.after_um:.4g} um rms of {found.before_um:.4g} um before)"

@@ -14,9 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Index, Measurement, groups
+
+Mask = NDArray[np.bool_]
 
 LEVER = 100.0
 """mm: noise of an angle, where only that of a length is given, is that of a length at this distance."""
@@ -115,6 +118,11 @@ class Observation(ABC):
         """Which components are angles."""
         return tuple(name in ("rx", "ry", "rz") for name in self.components)
 
+    @property
+    def turns(self) -> Mask:
+        """Which values of the rows are angles, one after another."""
+        return np.tile(np.array(self.angular, dtype=np.bool_), len(self.measurement))
+
     @cached_property
     def sigma(self) -> Array:
         """The standard deviation of each value, mm or rad: from the header, else from repeats, else 1 um."""
@@ -127,10 +135,10 @@ class Observation(ABC):
     @property
     def noise_known(self) -> bool:
         """Whether the noise was given or can be told from repeats."""
-        return (
-            self.measurement.noise[0] is not None
-            or repeatability(self.measurement, self.components, self.angular) is not None
-        )
+        lengths, angles = self.measurement.noise
+        if lengths is not None or (angles is not None and all(self.angular)):
+            return True
+        return repeatability(self.measurement, self.components, self.angular) is not None
 
     def with_values(self, values: Array) -> Measurement:
         """The measurement with these values read."""
@@ -138,10 +146,12 @@ class Observation(ABC):
         return self.measurement.with_columns(dict(zip(self.components, rows.T, strict=True)))
 
 
-def repeatability(measurement: Measurement, components: tuple[str, ...], angular: tuple[bool, ...]) -> float | None:
-    """The pooled standard deviation of lengths over repeats of a state, mm; None with fewer than 10 degrees of freedom.
+def repeatability(
+    measurement: Measurement, components: tuple[str, ...], angular: tuple[bool, ...], rows: Mask | None = None
+) -> float | None:
+    """The pooled standard deviation over repeats of a state of what is not `angular`; None below 10 degrees of freedom.
 
-    Repeats are rows of one set, pose, direction and tool; time and temperatures may differ.
+    Repeats are rows of one set, pose, direction and tool, among `rows` (n,) if given; time and temperatures may differ.
     """
     names = [name for name in measurement.columns if not _varies(name) and name not in measurement.measured]
     found = [name for name, turn in zip(components, angular, strict=True) if name in measurement.columns and not turn]
@@ -150,17 +160,19 @@ def repeatability(measurement: Measurement, components: tuple[str, ...], angular
     labels = [value for name, value in measurement.labels.items() if name != "repeat"]
     numbers = [tuple(measurement.columns[name].tolist()) for name in names]
     keys = [str(key) for key in zip(*labels, *numbers, strict=True)] if labels or numbers else []
-    if not keys:
+    among = np.arange(len(keys)) if rows is None else np.flatnonzero(rows)
+    if not keys or not among.size:
         return None
-    _, group = groups(keys)
+    _, group = groups([keys[row] for row in among])
     counts = np.bincount(group)
     freedom = (counts - 1).clip(0).sum() * len(found)
     if freedom < 10:
         return None
     squares = 0.0
     for name in found:
-        mean = np.bincount(group, measurement.columns[name]) / counts
-        squares += float(((measurement.columns[name] - mean[group]) ** 2).sum())
+        values = measurement.columns[name][among]
+        mean = np.bincount(group, values) / counts
+        squares += float(((values - mean[group]) ** 2).sum())
     return float(np.sqrt(squares / freedom)) or None
 
 

@@ -46,7 +46,7 @@ def over_the_travels(found: Calibration) -> Prediction:
 
 def guesses(found: Calibration, over: Prediction) -> tuple[Message, ...]:
     """A warning (NCF641) if somewhere in the travels the tip error is known to less than what was to be corrected."""
-    if over.worst_um <= found.before_um:
+    if not over.worst_um > found.before_um:
         return ()
     at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
     text = (

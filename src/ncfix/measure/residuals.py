@@ -60,11 +60,10 @@ def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:
     """The rms of lengths in um, per file and set."""
     sizes: dict[str, float] = {}
     for index, each in enumerate(problem.observations):
-        mine = (found.observation == index) & (found.row >= 0)
-        lengths = np.array([name[0] != "r" for name in found.component])
+        mine = np.flatnonzero((found.observation == index) & (found.row >= 0))[~each.turns]
         for name in dict.fromkeys(each.measurement.sets):
             rows = np.flatnonzero(np.array(each.measurement.sets) == name)
-            chosen = found.value[mine & lengths & np.isin(found.row, rows)]
+            chosen = found.value[mine[np.isin(found.row[mine], rows)]]
             if chosen.size:
                 sizes[f"{each.measurement.path} set {name}"] = float(1e3 * np.sqrt((chosen**2).mean()))
     return sizes

@@ -59,7 +59,8 @@ def _machine(problem: Problem, estimate: Estimate, scale: float, figures: dict[s
     sources = ", ".join(dict.fromkeys(each.measurement.path for each in problem.observations))
     notes = {"date": datetime.date.today(), "source": sources, "calibrated_from": problem.machine.hash}
     notes["calibrated_by"] = f"ncfix {__version__}"
-    rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in figures.items()}
+    told = {key: value for key, value in figures.items() if value == value}
+    rounded = {key: round(value, 3) if isinstance(value, float) else value for key, value in told.items()}
     return machine.replace(effects=tuple(effects), provenance={**problem.machine.provenance, **notes, **rounded})
 
 
@@ -94,13 +95,13 @@ def _noise(problem: Problem, chi_square: float, freedom: int) -> Iterator[Messag
 
 
 def _rms(problem: Problem, values: Array, keep: NDArray[np.bool_]) -> float:
-    """The rms of lengths, um."""
-    turns = np.concatenate([np.tile(each.angular, len(each.measurement)) for each in problem.observations])
+    """The rms of lengths, um; NaN if there are none."""
+    turns = np.concatenate([each.turns for each in problem.observations])
     rows = np.concatenate([each.rows for each in problem.observations]) >= 0
     lengths = np.zeros(len(values), dtype=bool)
-    lengths[np.flatnonzero(rows)] = ~turns.astype(bool)
+    lengths[np.flatnonzero(rows)] = ~turns
     chosen = values[lengths & keep]
-    return float(1e3 * np.sqrt((chosen**2).mean())) if chosen.size else 0.0
+    return float(1e3 * np.sqrt((chosen**2).mean())) if chosen.size else np.nan
 
 
 def _rms_before(problem: Problem) -> float:
