@@ -174,7 +174,7 @@ class Control(Standing):
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
-        if rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
+        if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
         return leaves_unknown(rapid, before, turned=self.is_rotated and not self.modal.incremental)

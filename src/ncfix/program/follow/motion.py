@@ -52,11 +52,11 @@ def first_reason(unknown: Unknown) -> str:
 
 
 def leaves_unknown(rapid: Motion, before: set[str], *, turned: bool) -> bool:
-    """Whether a rapid says nothing of the axes whose place is not known at its end, and was not `before`.
+    """Whether a rapid says nothing of the axes whose place is not known at its end, and was not for reasons `before`.
 
     Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as
     soon as the program has named the others: it passes. In a `turned` frame no word is that of one axis alone.
     """
-    if not rapid.unknown or not before.issuperset(rapid.unknown.values()):
+    if not before.issuperset(rapid.unknown.values()):
         return False
     return turned or not any(rapid.axes >> index & 1 for index in rapid.unknown)
