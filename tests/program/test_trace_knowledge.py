@@ -290,3 +290,8 @@ def test_a_rapid_behind_what_is_not_followed_is_refused_and_does_not_pass() -> N
     setup = Setup(work_offsets=G54, initial=ZERO)
     assert rules(follow("G131\nG28 Z5\nG0 X1 Y1", "XYZ", setup, dialect="iso"))[-1] == Rule.REFUSE
     assert rules(follow("G28 Z5\nG51 X0 Y0 P2\nG0 X1 Y1\nG50", "XYZ", setup, dialect="iso"))[-1] == Rule.REFUSE
+
+
+def test_a_word_known_only_at_run_time_never_passes_in_a_turned_frame() -> None:
+    text = "G31 Z50. F100.\nG68 X0. Y0. R30.\nG0 X#5061 Y1.\nX#5061 Y5.\nZ50.\nG1 X3. F100."
+    assert rules(follow(text, dialect="fanuc")) == [Rule.PASS, Rule.REFUSE, Rule.REFUSE, Rule.PASS, Rule.REFUSE]

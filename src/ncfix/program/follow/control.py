@@ -161,23 +161,27 @@ class Control(Standing):
         if motion.passing and motion.kind != Kind.DWELL:
             target, here = motion.target, self.position
             self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
+        lost = self._lost_at_end(motion)
+        told = self.saying is not None and self.saying[0] is motion.unknown
         if motion.kind != Kind.DWELL:
-            self.said = self.saying[1] if self.saying is not None and self.saying[0] is motion.unknown else None
+            self.said = lost if told else None
         self.saying = None
         self.places.settle(settles)
-        self.places.lose(mask_of(self._lost_behind(motion)))
+        self.places.lose(mask_of(lost))
         self.places.begun = True
 
-    def _lost_behind(self, motion: Motion) -> Unknown:
-        """What is not known behind a motion, along the axes of the program's frame as far as its words have told."""
-        return tcp.along_frame(self, motion.unknown) if self.said is None else self.said
+    def _lost_at_end(self, motion: Motion) -> Unknown:
+        """What is not known at the end of a motion, along the axes of the program's frame."""
+        if self.saying is not None and self.saying[0] is motion.unknown:
+            return self.saying[1]
+        return tcp.lost_in_frame(self) if motion.kind == Kind.DWELL else tcp.along_frame(self, motion.unknown)
 
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
         if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
             return False
         before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
-        return leaves_unknown(rapid, before, turned=self.is_rotated and not self.modal.incremental)
+        return leaves_unknown(rapid, before, self._lost_at_end(rapid))
 
     def _adrift(self, settled: int) -> int:
         """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""

@@ -51,12 +51,10 @@ def first_reason(unknown: Unknown) -> str:
     return unknown[index].format(LETTERS[index])
 
 
-def leaves_unknown(rapid: Motion, before: set[str], *, turned: bool) -> bool:
-    """Whether a rapid says nothing of the axes whose place is not known at its end, and was not for reasons `before`.
+def leaves_unknown(rapid: Motion, before: set[str], lost: Unknown) -> bool:
+    """Whether a rapid says nothing of the axes of the program's frame that are `lost` at its end, and were `before`.
 
     Where they stand, its correction would depend on. It cuts nothing, and the axes that it names can be corrected as
-    soon as the program has named the others: it passes. In a `turned` frame no word is that of one axis alone.
+    soon as the program has named the others: it passes. `before` are the reasons why something was not known.
     """
-    if not before.issuperset(rapid.unknown.values()):
-        return False
-    return turned or not any(rapid.axes >> index & 1 for index in rapid.unknown)
+    return before.issuperset(rapid.unknown.values()) and not any(rapid.axes >> index & 1 for index in lost)

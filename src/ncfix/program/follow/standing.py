@@ -39,9 +39,9 @@ class Standing(ABC):
     position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
     unknown    letter index -> why the position is not known
     shaky      letter index -> why the offset of the letter is not known
-    said       what is not known along the axes of a tilted plane, where its words have said more than the machine's
+    said       what is not known along the axes of a turned frame, where its words have said more than the machine's
                axes alone tell; None: they tell all. `saying`: what of the machine's axes is not known where the words
-               of this block lead, and with it the same along those of the plane
+               of this block lead, and with it the same along those of the frame
     places     which axes the program itself has brought to where they stand
     knowledge  what was asked of the setup, and what it does not give
     offset_checked  it has been asked for the work offset in force

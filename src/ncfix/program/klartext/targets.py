@@ -175,7 +175,9 @@ def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unkno
     if control.is_rotated and unknown:
         unknown = tcp.mixed_into(unknown, control.rotation)
         control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
-    return target, {index: why for index, why in unknown.items() if index in control.machine}
+    found = {index: why for index, why in unknown.items() if index in control.machine}
+    control.saying = found, where.unknown
+    return target, found
 
 
 def in_machine(control: Control, words: Words) -> tuple[Vector, Unknown]:

@@ -176,7 +176,7 @@ def refused(control: Control, block: Block, code: int) -> None:
     before, known = control.position, control.unknown
     control.move(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code])
     if code == 331:
-        control.position, control.unknown = before, known
+        control.position, control.unknown, control.said = before, known, None
 
 
 def end_spline(control: Control, block: Block, code: int) -> None:

@@ -99,7 +99,7 @@ def rotated_unknown(control: Control, block: Block, incremental: bool) -> Unknow
     """`unknown_after` in a rotated frame: an axis is known if all that it is made of is."""
     own = unknown_after(control, block, incremental, tcp.lost_in_frame(control))
     unknown = tcp.lost_of_axes(control, own) if own else {}
-    control.saying = (unknown, own) if control.tilted else None
+    control.saying = unknown, own
     return unknown
 
 

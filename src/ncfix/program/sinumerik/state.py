@@ -270,7 +270,7 @@ class Sinumerik(Control):
         stand(self, axes, by_machine=by_machine)
         self.forget_settled()
 
-    def _lost_behind(self, motion: Motion) -> Unknown:
+    def _lost_at_end(self, motion: Motion) -> Unknown:
         """As for all controls; the book of turned coordinates is `lost`."""
         return self.lost if self.is_rotated else motion.unknown
 
