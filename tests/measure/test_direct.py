@@ -70,3 +70,14 @@ def test_angles_are_no_lengths_in_figures() -> None:
     assert not guesses(angles, over_the_travels(angles))
     assert misfit(angles) is None
     assert "rms_after_um" not in angles.machine.provenance
+
+
+def test_an_angle_that_is_far_off_is_named_with_its_unit() -> None:
+    seen = read("EAX", head="# noise_urad: 2\n")
+    values = seen.columns["value"].copy()
+    values[57] += 3e-4
+    result = calibrate([seen.with_columns({"value": values})], MACHINE, "EAX")
+    (said,) = (message.text for message in result.remarks if message.code == "NCF633")
+    name, _, size, unit = said.split()[:4]
+    assert (name, unit) == ("EAX", "urad")
+    assert float(size) == pytest.approx(300, abs=15)

@@ -81,6 +81,11 @@ class DirectReading(Observation):
         return repeatability(self.measurement, self.components, self.angular, rows)
 
     @property
+    def value_names(self) -> tuple[str, ...]:
+        """See `Observation`: the error motion of each row."""
+        return self.names
+
+    @property
     def turns(self) -> Mask:
         """See `Observation`: each row says for itself."""
         return self.rotational

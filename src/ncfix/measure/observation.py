@@ -119,6 +119,11 @@ class Observation(ABC):
         return tuple(name in ("rx", "ry", "rz") for name in self.components)
 
     @property
+    def value_names(self) -> tuple[str, ...]:
+        """What each value of the rows is, one after another."""
+        return self.components * len(self.measurement)
+
+    @property
     def turns(self) -> Mask:
         """Which values of the rows are angles, one after another."""
         return np.tile(np.array(self.angular, dtype=np.bool_), len(self.measurement))

@@ -9,6 +9,7 @@ import numpy as np
 
 from ncfix.diagnostics import Place
 from ncfix.measure.measurement import Array, Index
+from ncfix.measure.observation import Mask
 
 if TYPE_CHECKING:
     from ncfix.measure.calibrate import Estimate, Problem
@@ -19,6 +20,7 @@ class Residuals:
     """One entry per value, (m,).
 
     observation   which of the measurements, row of it (-1: a calibrated distance), and component
+    turns         whether it is an angle
     value         mm or rad, actual minus predicted
     studentised   divided by its own standard deviation
     cook          Cook's distance: how far all estimates move if this value is left out
@@ -27,6 +29,7 @@ class Residuals:
     observation: Index
     row: Index
     component: tuple[str, ...]
+    turns: Mask
     value: Array
     studentised: Array
     cook: Array
@@ -44,9 +47,11 @@ def residuals(problem: Problem, estimate: Estimate) -> Residuals:
     which = np.repeat(np.arange(len(problem.observations)), [len(each.values) for each in problem.observations])
     rows = np.concatenate([each.rows for each in problem.observations])
     names: list[str] = []
+    turns: list[bool] = []
     for each in problem.observations:
-        names += [*each.components * len(each.measurement), *["distance"] * len(each.extra_values)]
-    return Residuals(which, rows, tuple(names), estimate.residual, studentised, cook)
+        names += [*each.value_names, *["distance"] * len(each.extra_values)]
+        turns += [*each.turns.tolist(), *[False] * len(each.extra_values)]
+    return Residuals(which, rows, tuple(names), np.array(turns, dtype=np.bool_), estimate.residual, studentised, cook)
 
 
 def place(problem: Problem, found: Residuals, index: int) -> Place:
@@ -60,7 +65,7 @@ def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:
     """The rms of lengths in um, per file and set."""
     sizes: dict[str, float] = {}
     for index, each in enumerate(problem.observations):
-        mine = np.flatnonzero((found.observation == index) & (found.row >= 0))[~each.turns]
+        mine = np.flatnonzero((found.observation == index) & (found.row >= 0) & ~found.turns)
         for name in dict.fromkeys(each.measurement.sets):
             rows = np.flatnonzero(np.array(each.measurement.sets) == name)
             chosen = found.value[mine[np.isin(found.row[mine], rows)]]

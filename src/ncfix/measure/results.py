@@ -82,7 +82,7 @@ def _outliers(problem: Problem, estimate: Estimate, found: Residuals) -> Iterato
 
 
 def _size(found: Residuals, index: int) -> str:
-    angle = found.component[index][0] == "r"
+    angle = found.turns[index]
     return f"{found.value[index] * (1e6 if angle else 1e3):+.1f} {'urad' if angle else 'um'}"
 
 
