@@ -151,7 +151,7 @@ def pool_of(
     In units of the noise: 1 um of a length, 10 urad of an angle.
     """
     rows = len(seen.measurement) * len(seen.components)
-    noise = np.where(np.tile(seen.angular, len(seen.measurement)), 1e-5, 1e-3)[:, None]
+    noise = np.where(seen.turns, 1e-5, 1e-3)[:, None]
     design = seen.design(selection.estimated)[:rows] / noise
     design[:, np.abs(design).max(axis=0, initial=0.0) < 1e-6] = 0.0
     nuisance = seen.unknown_design(seen.unknowns.start)[:rows] / noise
