@@ -27,6 +27,10 @@ PROBES = (0.0, 0.7, 1.3, -0.9)
 LEAST = 1e-3
 """A smaller circle, relative to the tool's length, says nothing about its axis."""
 
+SQUARE = 2e-4
+"""A tool closer to a direction than this, rad, is taken to lie along it: rotary words have three decimals of a degree,
+9e-6 rad each."""
+
 SAME = 1e-9
 TURNS = 2
 AT_END = 1e-6

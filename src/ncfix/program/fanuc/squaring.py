@@ -12,13 +12,12 @@ import numpy as np
 
 from ncfix.program.follow.coordinates import DEGREE, Vector, X, Y, Z
 from ncfix.program.moves import TcpState
+from ncfix.program.pointing import SQUARE
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
 
 SQUARED = "the control's parameters decide; state the rotary axes in the program if they are others"
-SAME = 2e-4
-"""Directions closer than this, rad, are one: rotary words have three decimals of a degree, 9e-6 rad each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,4 +66,4 @@ def stands_square(control: MacroControl) -> bool:
     if control.pointing is None or any(control.rotary[index] for index in control.unknown):
         return False
     tool = control.pointing.direction(np.array([control.position[index] for index in control.machine]))
-    return bool(np.linalg.norm(tool - [row[2] for row in control.rotation]) < SAME)
+    return bool(np.linalg.norm(tool - [row[2] for row in control.rotation]) < SQUARE)

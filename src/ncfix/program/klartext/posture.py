@@ -13,18 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z, as_rotation
+from ncfix.program.follow.tcp import PROBE
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
-from ncfix.program.pointing import within
+from ncfix.program.pointing import SQUARE, within
 
 FloatArray = NDArray[np.float64]
-
-PROBE = 128.0
-"""mm; a power of two, so that dividing by it rounds nothing."""
-
-SAME = 2e-4
-"""Directions closer than this, rad, are one: rotary words have three decimals of a degree, 9e-6 rad each."""
 
 NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
 
@@ -108,4 +103,4 @@ def stands_normal(control: Control, tilt: Rotation) -> bool | None:
     if any(control.rotary[index] and index in control.unknown for index in control.machine):
         return None
     found = posture(control, control.position)
-    return None if found is None else apart(found.tool, normal_of(tilt)) < SAME
+    return None if found is None else apart(found.tool, normal_of(tilt)) < SQUARE
