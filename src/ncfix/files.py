@@ -1,6 +1,7 @@
 """Files read and written with care: what is written is whole or not there.
 
 A new file is written beside its target under another name, forced to the disk, and then given its name in one step.
+What stands in a file without a name already (`unnamed`) is given one, and not copied, where the system can do that.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from ncfix.diagnostics import Place, SourceError, UsageError
 
@@ -22,6 +25,20 @@ WRITING = {
     errno.ENOTDIR: "another -o: a part of this path is a file",
 }
 """What to do about what the system says."""
+COPIED = 1 << 20
+"""Bytes that are copied at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """All that stands in an open file."""
+
+    handle: IO[bytes]
+
+    def __iter__(self) -> Iterator[bytes]:
+        self.handle.seek(0)
+        while part := self.handle.read(COPIED):
+            yield part
 
 
 def read_bytes(path: str) -> bytes:
@@ -48,6 +65,17 @@ def unwritable(path: str, error: OSError) -> UsageError:
 def exists_already(path: str) -> UsageError:
     """The error NCF004."""
     return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
+
+
+def unnamed(folder: str | None) -> IO[bytes]:
+    """A new file without a name, in a folder if that is there: gone with this process unless it is given one."""
+    folder = folder if folder and os.path.isdir(folder) else None
+    if folder and hasattr(os, "O_TMPFILE"):
+        with suppress(OSError):
+            return os.fdopen(os.open(folder, os.O_RDWR | os.O_TMPFILE, 0o666), "w+b")
+    from tempfile import TemporaryFile
+
+    return TemporaryFile(dir=folder)
 
 
 def holds(path: str, data: bytes | Iterable[bytes]) -> bool:
@@ -100,10 +128,10 @@ def _coded(path: str) -> Iterator[None]:
 def _written_beside(path: str, data: bytes | Iterable[bytes], like: str | None) -> Iterator[str]:
     """A file with this content, on the disk, in the same folder; gone afterwards if it still has its own name."""
     temporary = os.path.join(os.path.dirname(path), f".ncfix-{os.urandom(8).hex()}.tmp")
-    handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
+        handle = _filled(temporary, data, like)
         try:
-            _fill(handle, data, like)
+            os.fsync(handle)
         finally:
             os.close(handle)
         yield temporary
@@ -112,18 +140,46 @@ def _written_beside(path: str, data: bytes | Iterable[bytes], like: str | None) 
             os.unlink(temporary)
 
 
-def _fill(handle: int, data: bytes | Iterable[bytes], like: str | None) -> None:
+def _filled(path: str, data: bytes | Iterable[bytes], like: str | None) -> int:
+    """A new file with this content, still open."""
+    if isinstance(data, Whole):
+        data.handle.flush()
+        _like(data.handle.fileno(), like)
+        if _named(data.handle.fileno(), path):
+            return os.dup(data.handle.fileno())
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        _like(handle, like)
+        for part in (data,) if isinstance(data, bytes) else data:
+            rest = memoryview(part)
+            while rest:
+                rest = rest[os.write(handle, rest) :]
+    except BaseException:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _named(handle: int, path: str) -> bool:
+    """Give a file without a name this one; False where the system cannot do that."""
+    with suppress(OSError):
+        folder = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
+        try:
+            os.link(f"/proc/self/fd/{handle}", path, src_dir_fd=folder)  # without a folder it would not be followed
+            return True
+        finally:
+            os.close(folder)
+    return False
+
+
+def _like(handle: int, like: str | None) -> None:
+    """Give a new file the owner and the mode of another."""
     if like is not None:
         before = os.stat(like)
         if (before.st_uid, before.st_gid) != (os.fstat(handle).st_uid, os.fstat(handle).st_gid):
             with suppress(PermissionError):
                 os.chown(handle, before.st_uid, before.st_gid)
         os.chmod(handle, stat.S_IMODE(before.st_mode))
-    for part in (data,) if isinstance(data, bytes) else data:
-        rest = memoryview(part)
-        while rest:
-            rest = rest[os.write(handle, rest) :]
-    os.fsync(handle)
 
 
 def _link(old: str, new: str) -> bool:

@@ -83,6 +83,48 @@ def test_a_full_disk_leaves_no_torn_output(monkeypatch: pytest.MonkeyPatch, tmp_
     assert target.read_bytes() == NEW
 
 
+def test_a_file_without_a_name_is_given_one_and_not_copied(tmp_path: Path) -> None:
+    target, usual = tmp_path / "out.ngc", tmp_path / "usual.ngc"
+    usual.touch()
+    with files.unnamed(str(tmp_path)) as kept:
+        kept.write(NEW)
+        files.write_whole(str(target), files.Whole(kept))
+        assert os.fstat(kept.fileno()).st_ino == target.stat().st_ino
+        assert target.stat().st_mode == usual.stat().st_mode
+    assert target.read_bytes() == NEW
+    assert {path.name for path in tmp_path.iterdir()} == {"out.ngc", "usual.ngc"}
+
+
+@pytest.mark.parametrize("folder", [None, "other"])
+def test_a_file_that_cannot_be_given_a_name_is_copied(
+    folder: str | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """One of another disk, or on a system that knows nothing of the kind; owner and mode are those of the old file."""
+    target = tmp_path / "out.ngc"
+    target.write_bytes(OLD)
+    target.chmod(0o640)
+    monkeypatch.setattr(files, "_named", lambda *_: False)
+    with files.unnamed(folder) as kept:
+        kept.write(NEW)
+        files.write_whole(str(target), files.Whole(kept), replace=True)
+    assert target.read_bytes() == NEW
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+
+
+def test_a_full_disk_leaves_no_torn_copy_of_a_file_without_a_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    target = tmp_path / "out.ngc"
+    monkeypatch.setattr(files, "_named", lambda *_: False)
+    with files.unnamed(str(tmp_path)) as kept:
+        kept.write(NEW)
+        write = lambda: files.write_whole(str(target), files.Whole(kept), replace=True)  # noqa: E731
+        for _ in fail_at_every_call(monkeypatch, lambda: target.write_bytes(OLD) and None, write):
+            assert target.read_bytes() in (OLD, NEW)
+            assert [path.name for path in tmp_path.iterdir()] == ["out.ngc"]
+    assert target.read_bytes() == NEW
+
+
 def test_a_full_disk_leaves_the_replaced_output_old_or_new(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     target = tmp_path / "out.ngc"
     replace = lambda: files.write_whole(str(target), NEW, replace=True)  # noqa: E731

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
@@ -23,8 +23,6 @@ LONG = 2
 """Parts from which on a program is long; a shorter one is read as a whole."""
 COMPILED = 2
 """Parts from which on compiled kernels save more time than it takes to load them."""
-COPIED = 1 << 20
-"""Bytes that are copied at once."""
 
 
 def part_bytes() -> int:
@@ -51,7 +49,7 @@ def compiled_from() -> int:
 class Fixed:
     """A corrected program: what of it is not written yet, whether it differs from the original, and the report."""
 
-    text: bytes | Iterator[bytes]
+    text: bytes | Iterable[bytes]
     changed: bool
     report: FixReport
 
@@ -111,7 +109,7 @@ class Source:
         """The whole text."""
         if self.kept is None:
             return files.read_bytes(self.path)
-        while self._read(COPIED):
+        while self._read(files.COPIED):
             pass
         self.kept.seek(0)
         return self.kept.read()
@@ -135,8 +133,7 @@ class Outlet:
         if not (self.direct and self.stamped()):
             self.kept.write(data)
             return
-        for part in self._emptied():
-            self._send(part)
+        self._empty()
         self._send(data)
 
     def _send(self, data: bytes) -> None:
@@ -144,22 +141,16 @@ class Outlet:
         self.sent += len(data)
         self.digest.update(data)
 
-    def _emptied(self) -> Iterator[bytes]:
-        self.kept.seek(0)
-        while part := self.kept.read(COPIED):
-            yield part
+    def _empty(self) -> None:
+        for part in files.Whole(self.kept):
+            self._send(part)
         self.kept.seek(0)
         self.kept.truncate()
 
-    def remaining(self, stamp: Stamp) -> Iterator[bytes]:
+    def remaining(self, stamp: Stamp) -> Iterable[bytes]:
         """What was not sent, with the stamp as it has to be."""
-        parts = self._emptied()
-        if self.sent or stamp.written == stamp.wanted:
-            yield from parts
-            return
-        first = next(parts, b"")
-        yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
-        yield from parts
+        kept = files.Whole(self.kept)
+        return kept if self.sent or stamp.written == stamp.wanted else _stamped(kept, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
         """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""
@@ -171,10 +162,17 @@ class Outlet:
         return text[self.sent :]
 
 
+def _stamped(kept: Iterable[bytes], stamp: Stamp) -> Iterator[bytes]:
+    parts = iter(kept)
+    first = next(parts, b"")
+    yield first[: stamp.at] + stamp.wanted + first[stamp.at + len(stamp.written) :]
+    yield from parts
+
+
 @contextmanager
 def outlet_for(target: Target, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
     """An outlet; `sure`: everything that the stamp says is known from the beginning."""
     direct = target.path == STREAM
     folder = None if direct else os.path.dirname(target.path) or "."
-    with tempfile.TemporaryFile(dir=folder if folder and os.path.isdir(folder) else None) as kept:
+    with files.unnamed(folder) as kept:
         yield Outlet(kept, direct and sure, stamped)
