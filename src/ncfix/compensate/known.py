@@ -8,6 +8,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import greatest, picked
+from ncfix.compensate.wordless import lacking
 from ncfix.compensate.written import Written
 
 TURNED = 1e-12
@@ -43,5 +44,6 @@ class Known:
         off = picked(pieces.end, piece) - picked(self.end, move)
         turned = greatest(np.abs(off[:, machine.rotary]))
         here = np.isfinite(before) & (pieces.fraction[piece] == 1) & ~intent.curved[move] & (turned <= TURNED)
+        here[lacking(intent, move)] = False
         shift = off[:, intent.columns] @ ways.T
         return here, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))

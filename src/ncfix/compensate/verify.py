@@ -20,7 +20,6 @@ from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked
 from ncfix.compensate.sampling import MOST_SHOWN, bends, merged, passed
-from ncfix.compensate.steer import rows_of
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
@@ -94,7 +93,6 @@ def path_error(
     state: State = State(),  # noqa: B008
     rows: Mask | None = None,
     density: float = DENSITY,
-    least: int = 2,
     tilts: bool = True,
     known: Known | None = None,
 ) -> PathError:
@@ -104,7 +102,6 @@ def path_error(
     start    (n, n_axes) where motions really start, as in `Plan` or `Emission`; those of the program if not given
     rows     (n,) motions to look at; all that are not kept if not given
     density  samples for each time that the error model may bend
-    least    fewest samples inside a piece over which the error may bend at all
     tilts    find the tilts of the tool, too; else they are 0
     known    what has been found out of the ends of motions; they are not looked at again then
     """
@@ -112,7 +109,7 @@ def path_error(
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
     tally = FigureTally(len(moves))
     which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
-    for part in samples(written, which, density, least, tilts, known):
+    for part in samples(written, which, density, tilts, known):
         tally.add(part)
     return tally.result()
 
@@ -121,7 +118,6 @@ def samples(
     written: Written,
     which: Index,
     density: float = DENSITY,
-    least: int = 2,
     tilts: bool = True,
     known: Known | None = None,
     uneasy: Mask | None = None,
@@ -130,24 +126,15 @@ def samples(
 
     uneasy  (n,) motions that may not begin where they should, if that is known
     """
-    counts, along = _counts(written, which, density, least)
+    counts, along = _counts(written, which, density)
     if uneasy is None:
         uneasy = uneasy_starts(written.intent, _kept_motions(written))
-    if known is not None and not tilts:
-        here, before, after = known.at(written, which)
-        here[lacking(written.intent, written.pieces.move[which])] = False
-        here &= (counts == 0) & ~(_begins_uneasily(written, which, uneasy) & along) & ~_kinked(written, which, along)
-        on = which[here]
-        move, ones = written.pieces.move[on], np.ones(len(on))
-        if on.size:
-            yield Samples(move, ones, before[here], after[here], _way(written, on), 0.0, 0.0)
-        which, counts, along = which[~here], counts[~here], along[~here]
     for batch in batches(counts + 1, BATCH):
         piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
-        yield _looked_at(written, piece, fraction, tilts)
+        yield _errors(written, piece, fraction, known, tilts)
 
 
-def _counts(written: Written, which: Index, density: float, least: int) -> tuple[Index, Mask]:
+def _counts(written: Written, which: Index, density: float) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     move = written.pieces.move[which]
     if (np.diff(move) > 0).all():
@@ -160,7 +147,7 @@ def _counts(written: Written, which: Index, density: float, least: int) -> tuple
     along &= written.intent.moving[move]
     for begins, rows in ((written.segments.start, which), (written.start, move), (written.intent.moves.start, move)):
         along &= finite(picked(begins, rows))
-    counts = np.clip(np.nan_to_num(np.ceil(density * wished)), least, MOST_SHOWN)
+    counts = np.minimum(np.nan_to_num(np.ceil(density * wished)), MOST_SHOWN)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 
 
@@ -190,29 +177,39 @@ def _passed(written: Written, which: Index, along: Mask) -> tuple[Index, Array]:
     return long[on], share
 
 
-def _kinked(written: Written, which: Index, along: Mask) -> Mask:
-    """Pieces that pass a kink or a jump, (k,)."""
-    found = np.zeros(len(which), dtype=bool)
-    if written.intent.kinks:
-        found[_passed(written, which, along)[0]] = True
-    return found
-
-
-def _looked_at(written: Written, piece: Index, fraction: Array, tilts: bool) -> Samples:
-    intent = written.intent
+def _errors(written: Written, piece: Index, fraction: Array, known: Known | None, tilts: bool) -> Samples:
+    """The errors at fractions of pieces (k,); those at ends where they are known are taken from there."""
     move, at = written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
-    tools, states = intent.lengths(move), intent.states(move, at)
-    commands = written.segments.at(piece, fraction)
-    programmed = intent.segments.at(move, at)
-    intended, done = intent.joints(move, programmed), intent.joints(move, commands)
-    gaps = intent.gaps(move, programmed, (intended, done), states)
-    before, after = (lengths(correctable(intent, move, commands, gap)) for gap in gaps)
-    if not tilts:
-        return Samples(move, at, before, after, _way(written, piece), 0.0, 0.0)
+    before, after = np.empty(len(piece)), np.empty(len(piece))
+    unknown = np.ones(len(piece), dtype=bool)
     ends = np.flatnonzero(fraction == 1.0)
-    meant = intent.machine.nominal(intended[ends], tools if np.ndim(tools) == 0 else tools[ends])
-    found = [_tilt(intent.machine, q[ends], rows_of(states, ends), meant) for q in (intended, done)]
-    return Samples(move, at, before, after, _way(written, piece), *found)
+    if known is not None:
+        here, *found = known.at(written, piece[ends])
+        before[ends], after[ends] = found
+        unknown[ends[here]] = False
+    rows = np.flatnonzero(unknown)
+    if rows.size:
+        before[rows], after[rows] = _looked_at(written, piece[rows], fraction[rows])
+    tilted = _tilts(written, piece[ends]) if tilts else (0.0, 0.0)
+    return Samples(move, at, before, after, _way(written, piece), *tilted)
+
+
+def _looked_at(written: Written, piece: Index, fraction: Array) -> list[Array]:
+    """The errors before and after at fractions of pieces, (k,) mm each."""
+    intent, move, at = written.intent, written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
+    commands, programmed = written.segments.at(piece, fraction), intent.segments.at(move, at)
+    done = [intent.joints(move, each) for each in (programmed, commands)]
+    gaps = intent.gaps(move, programmed, done, intent.states(move, at))
+    return [lengths(correctable(intent, move, commands, gap)) for gap in gaps]
+
+
+def _tilts(written: Written, piece: Index) -> tuple[float, float]:
+    """The largest angles between the actual tool direction and the meant one at ends of pieces, before and after."""
+    intent, move = written.intent, written.pieces.move[piece]
+    intended, done = written.programmed[piece], written.done[piece]
+    states = intent.states(move, written.pieces.fraction[piece])
+    meant = intent.machine.nominal(intended, states.tool_length)
+    return _tilt(intent.machine, intended, states, meant), _tilt(intent.machine, done, states, meant)
 
 
 def _tilt(machine: Machine, q: Array, state: State, meant: Array) -> float:
