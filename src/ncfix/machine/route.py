@@ -22,7 +22,7 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Steps
 from ncfix.machine.terms import Place, Terms, terms_of
-from ncfix.machine.transport import SmallMotion, columns, versine
+from ncfix.machine.transport import SmallMotion, columns, turn
 
 Turns = tuple[Array, Array]
 """Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""
@@ -103,14 +103,13 @@ class Route:
         q, held = poses.positions, self.terms.held
         sine, versed = (np.empty((len(q) + len(held), q.shape[1])) for _ in range(2))
         for axis in self.rotary:
-            np.sin(q[axis], out=sine[axis])
-            versed[axis] = versine(q[axis])
+            sine[axis], versed[axis] = turn(q[axis])
         for row, (axis, low, high) in enumerate(held, start=len(q)):
             angle = np.minimum(np.maximum(q[axis], low), high)
             if (angle == q[axis]).all():
                 sine[row], versed[row] = sine[axis], versed[axis]
             else:
-                sine[row], versed[row] = np.sin(angle), versine(angle)
+                sine[row], versed[row] = turn(angle)
         return sine, versed
 
 
