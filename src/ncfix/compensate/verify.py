@@ -20,7 +20,7 @@ from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked
 from ncfix.compensate.sampling import MOST_SHOWN, bends, merged, passed
-from ncfix.compensate.wordless import correctable, lacking
+from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
