@@ -167,7 +167,7 @@ class Units:
         if remains is None:
             return None
         begin = int(program.blocks[-1, 0])
-        lines = program.source.count(b"\n", 0, begin)
+        lines = program.lines_ended_before(begin)
         return Passage(len(program.source), begin, lines, len(program) - 1, self.led, remains)
 
     def _passed(self, passage: Passage, text: bytes) -> Program:
@@ -204,7 +204,7 @@ class Units:
                 if text:
                     yield self.reader.read(text), True, None
                 return
-            if not text.strip():
+            if text.isspace():
                 self.rest = text
                 continue
             passage = self.share.passage(self.found)
@@ -212,8 +212,8 @@ class Units:
                 wanted = self._wanted
                 yield self._passed(passage, text), False, passage
                 continue
-            stop = text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1
-            program = self.reader.read(text[:stop]) if text[:stop].strip() else None
+            begun = text[: text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1]
+            program = None if not begun or begun.isspace() else self.reader.read(begun)
             cut = self.reader.last_cut(program) if program is not None else 0
             if program is None or not cut:
                 self._tell(None)

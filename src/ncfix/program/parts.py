@@ -168,7 +168,7 @@ def stretch(program: Program, start: int, stop: int) -> Program:
         first_number=program.first_number[start : stop + 1] - program.first_number[start],
         number_spans=program.number_spans[numbers] - ends[0],
         numbers=program.numbers[numbers],
-        first_line=program.first_line + program.source.count(b"\n", 0, ends[0]),
+        first_line=program.first_line + program.lines_ended_before(ends[0]),
         line_end=program.line_end,
     )
 

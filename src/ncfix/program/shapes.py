@@ -87,7 +87,7 @@ def split_blocks(source: bytes) -> NDArray[np.int64]:
     stops = np.concatenate((ends, [len(text)]))
     if starts[-1] == len(text):
         starts, stops = starts[:-1], stops[:-1]
-    for _ in range(MAX_RETURNS):
+    for _ in range(MAX_RETURNS if b"\r" in source else 0):
         stops = stops - ((stops > starts) & (text[np.maximum(stops - 1, 0)] == ord("\r")))
     return np.stack((starts, stops), axis=1)
 

@@ -325,13 +325,14 @@ class Program:
     @property
     def lines_ended(self) -> int:
         """How many lines of the text have an end; blocks may go over several."""
-        return self._ends("\n", len(self.source))
+        return self.lines_ended_before(len(self.source))
 
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
-        return self.first_line + self._ends("\n" if b"\n" in self.source else "\r", int(self.blocks[block, 0]))
+        character = "\n" if b"\n" in self.source else "\r"
+        return self.first_line + self.lines_ended_before(int(self.blocks[block, 0]), character)
 
-    def _ends(self, character: str, stop: int) -> int:
+    def lines_ended_before(self, stop: int, character: str = "\n") -> int:
         """How many lines end before a byte; `bytes.count` takes several times as long where there are many."""
         return int(np.count_nonzero(np.frombuffer(self.source, dtype=np.uint8, count=stop) == ord(character)))
 

@@ -273,8 +273,12 @@ class Builder:
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
         rows = list(self._styles)
+        types = {name: DTYPES.get(name, np.bool_) for name in Style._fields}
+        if len(style) and (style == style[0]).all():
+            only = rows[style[0]]
+            return {name: np.full(len(style), value, types[name]) for name, value in only._asdict().items()}
         return {
-            name: np.array([row[index] for row in rows], dtype=DTYPES.get(name, np.bool_))[style]
+            name: np.array([row[index] for row in rows], dtype=types[name])[style]
             for index, name in enumerate(Style._fields)
         }
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.program import stamp
 from ncfix.program.follow import rollover
 from ncfix.program.follow.control import Control
-from ncfix.program.moves import Moves, Rule, Trace
+from ncfix.program.moves import Kind, Moves, Rule, Trace
 from ncfix.program.tree import Program
 
 FAR = 1e9
@@ -18,11 +19,18 @@ TOO_FAR = "NCF248"
 
 def check_reach(program: Program, moves: Moves) -> None:
     """Raise SourceError at the first motion that leads farther away than any machine goes."""
-    far = (np.abs(moves.end) > FAR).any(axis=1) | (np.abs(moves.centre) > FAR).any(axis=1)
+    far, arcs = _are_far(moves.end), np.flatnonzero(moves.kind == Kind.ARC)
+    far[arcs] |= _are_far(moves.centre[arcs])
     rows = np.flatnonzero(far & (moves.rule != Rule.REFUSE))
     if rows.size:
         text = "this leads farther away than any machine goes (1e9 mm or radians)"
         raise SourceError.of(TOO_FAR, text, program.place(int(moves.block[rows[0]])), "check the numbers of the block")
+
+
+def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n,) which of (n, k) places are too far away."""
+    far = np.abs(places) > FAR
+    return far.any(axis=1) if far.any() else np.zeros(len(places), dtype=np.bool_)
 
 
 def finished(control: Control, program: Program, moves: Moves) -> Trace:
