@@ -29,8 +29,7 @@ SHOWN = 16
 """Functions of the profile that are shown."""
 
 STAGES: tuple[tuple[str, Any, str], ...] = (
-    ("read the text (by columns twice)", parts.PartReader, "read"),
-    ("read again what was written", corrector, "reread"),
+    ("read the text (twice)", parts.PartReader, "read"),
     ("follow it (twice)", RS274Follower, "follow"),
     ("plan: correct ends, judge the path between them, split", plain.Planner, "plan"),
     ("plan, the long way", corrector, "agree"),

@@ -1,6 +1,7 @@
 """The scan of a text, compiled: numbers, comments and shapes of its blocks in one pass over the bytes.
 
-It finds what `shapes.scan` finds, to the last bit; a test holds the two together.
+It finds what `shapes.scan` finds, to the last bit; a test holds the two together. Also what a text has in common with
+the one that it was made from.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.kernel import Library
+from ncfix.program.number_kernels import word_at
 
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
@@ -16,7 +18,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Tables = tuple[Bytes, Mask, Mask, Mask]
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__file__, (word_at,))
 
 POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
 OFFSET, PRIME = np.uint64(14695981039346656037), np.uint64(1099511628211)
@@ -271,3 +273,31 @@ def scan(
         group[block], known = numbered(table, code, shapes, (begin, end), starts, known)
     first[n] = count
     return known
+
+
+@LIBRARY.helper
+def same(old: Bytes, at: int, new: Bytes, to: int, count: int) -> bool:
+    """Whether so many bytes are the same in two texts."""
+    a, b, done, whole = np.uint64(at), np.uint64(to), np.uint64(0), np.uint64(count)
+    different = np.uint64(0)
+    while done + np.uint64(8) <= whole:
+        different |= word_at(old, a + done) ^ word_at(new, b + done)
+        done += np.uint64(8)
+    while done < whole:
+        different |= np.uint64(old[a + done] ^ new[b + done])
+        done += np.uint64(1)
+    return bool(different == np.uint64(0))
+
+
+@LIBRARY.kernel("u1[:]", "u1[:]", "i8[:]", "i8[:]", "i8[:]")
+def left_alone(old: Bytes, new: Bytes, start: Ints, stop: Ints, length: Ints) -> bool:
+    """Whether all between some edits, which are as in `Splices`, is the same in the text that they make of the old one.
+
+    The new text is as long as they make it.
+    """
+    at, to, alike = 0, 0, True
+    for edit in range(len(start)):
+        count = start[edit] - at
+        alike &= same(old, at, new, to, count)
+        at, to = stop[edit], to + count + length[edit]
+    return alike and same(old, at, new, to, len(old) - at)

@@ -120,6 +120,16 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     return _put_in(*_in_place(source, splices, other), splices, other)
 
 
+def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
+    """Whether a text that was made by edits is the source, byte for byte, between them: only asked where compiled."""
+    from ncfix.program import kernels
+
+    columns = tuple(np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
+    old, new = (np.frombuffer(each, dtype=np.uint8) for each in (source, text))
+    fitting = len(new) - len(old) == int((splices.length + splices.start - splices.stop).sum())
+    return fitting and bool(kernels.left_alone(old, new, *columns))
+
+
 FEW = 4
 """Where no more than one in so many edits changes the length of the text, the others are made where they stand."""
 
