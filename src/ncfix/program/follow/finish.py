@@ -30,7 +30,10 @@ def check_reach(program: Program, moves: Moves) -> None:
 def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) which of (n, k) places are too far away."""
     far = np.abs(places) > FAR
-    return far.any(axis=1) if far.any() else np.zeros(len(places), dtype=np.bool_)
+    rows = np.zeros(len(places), dtype=np.bool_)
+    if far.any():
+        rows[np.flatnonzero(far) // places.shape[1]] = True
+    return rows
 
 
 def finished(control: Control, program: Program, moves: Moves) -> Trace:
