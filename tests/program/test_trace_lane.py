@@ -58,14 +58,18 @@ def assert_same(text: str, dialect: str = "linuxcnc") -> None:
         for name, values in one.items():
             if name not in ("frame", "reason"):
                 np.testing.assert_array_equal(values, other[name], err_msg=name)
+            if name in ("start", "end"):
+                np.testing.assert_array_equal(np.signbit(values), np.signbit(other[name]), err_msg=name)
+
+
+SETTINGS = ["G91", "G90", "G20", "G21", "G55", "G92 X3", "G93", "G94 F50", "G43 H1", "S5", "G10 L2 P1 R30"]
+IN_BETWEEN = ["G4 P1", "G2 X1 Y1 R900", "G3 X-0. Y2 Z3 R900 F70", "G0 Z[5-2]", "G1 X[0-0] Y[0*-1]", "F[2*20]", "/G4 P1"]
 
 
 def line(random: Random) -> str:
     """A block, most often of the kind that the lane takes."""
-    if random.random() < 0.06:
-        return random.choice(
-            ["G91", "G90", "G20", "G21", "G55", "G92 X3", "G93", "G94 F50", "G43 H1", "S5", "G10 L2 P1 R30"]
-        )
+    if random.random() < 0.14:
+        return random.choice(random.choice([SETTINGS, IN_BETWEEN]))
     words = [
         letter + f"{random.uniform(-99, 99):.{random.choice([0, 1, 3])}f}"
         for letter in "XYZBC"
@@ -83,7 +87,10 @@ def line(random: Random) -> str:
 def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
     random = Random(seed)
     head = "G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.8 else "G0 X1"
-    assert_same("\n".join([head, *(line(random) for _ in range(random.randint(1, 40)))]), dialect)
+    body = [line(random) for _ in range(random.randint(1, 40))]
+    if dialect == "linuxcnc" and random.random() < 0.3:
+        body = ["o1 repeat [3]", *body, "o1 endrepeat"]
+    assert_same("\n".join([head, *body]), dialect)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,6 +70,12 @@ class Stretch:
     start: FloatArray
     end: FloatArray
     adrift: IntArray
+
+    def only(self, rows: NDArray[np.bool_]) -> Stretch:
+        """Some of the motions, (n,)."""
+        if rows.all():
+            return self
+        return Stretch(*(getattr(self, each.name).compress(rows, axis=0) for each in fields(self)))
 
 
 @dataclass(slots=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.ahead import Ahead
 from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.rs274.groups import Rules
 from ncfix.program.rs274.plans import Plan, plan_of
@@ -24,6 +25,7 @@ class Unit:
     first     where the numbers of each block begin
     numbers   all numbers
     flows     the blocks that are flow control, ascending
+    ahead     what the fast lane has seen of the blocks to come
     """
 
     program: Program
@@ -34,6 +36,7 @@ class Unit:
     first: Sequence[int] = field(init=False)
     numbers: Sequence[float] = field(init=False)
     flows: list[int] = field(init=False)
+    ahead: Ahead = field(init=False, default_factory=Ahead)
     _plans: list[Plan | None] = field(default_factory=list)
     _lane_stops: NDArray[np.int64] | None = field(init=False, default=None)
     _lanes: LaneTables | None = field(init=False, default=None)
@@ -72,7 +75,7 @@ class Unit:
         """The first block from `block` on that cannot go through the fast lane."""
         if self._lane_stops is None:
             lanes = [self.plan_of_shape(shape).lane is not None for shape in range(len(self._plans))]
-            closed = ~np.array(lanes, dtype=np.bool_)[self.program.template]
+            closed = ~np.array(lanes, dtype=np.bool_).take(self.program.template)
             self._lane_stops = np.append(np.flatnonzero(closed), len(self))
         return int(self._lane_stops[np.searchsorted(self._lane_stops, block)])
 

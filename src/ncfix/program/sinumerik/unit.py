@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.follow.ahead import Ahead
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
@@ -74,6 +75,7 @@ class Unit:
     labels      label -> the blocks where it stands
     parameters  of its PROC
     saves       the PROC says SAVE: modal codes and frames of the caller come back
+    ahead       what the fast lane has seen of the blocks to come
     """
 
     text: Text
@@ -87,6 +89,7 @@ class Unit:
     labels: dict[str, list[int]] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
     saves: bool = False
+    ahead: Ahead = field(default_factory=Ahead)
     _lane_stops: NDArray[np.int64] | None = None
     _lanes: LaneTables | None = None
     _vector_stops: NDArray[np.int64] | None = None

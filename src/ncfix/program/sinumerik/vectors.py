@@ -12,17 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.program.follow.coordinates import DEGREE
-from ncfix.program.follow.lane import (
-    SHORTEST,
-    FloatArray,
-    IntArray,
-    Stage,
-    before_placing,
-    filled,
-    is_open,
-    stage_of,
-    take,
-)
+from ncfix.program.follow.lane import SHORTEST, before_placing, is_open, take
+from ncfix.program.follow.stage import FloatArray, IntArray, Stage, stage_of
 from ncfix.program.moves import FeedMode
 from ncfix.program.pointing import Pointing
 from ncfix.program.sinumerik.orientation import BY_AXES, FAR, NO_LENGTH, ON_CURVES, direction_of, is_choice
@@ -49,12 +40,11 @@ def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
     stage = stage_of(control, unit, block, stop)
     stage = replace(stage, mask=mask[: stop - block])
     count = turn(control, pointing, letters, vectors_of(unit, block, stop), stage)
-    feed = filled(stage.feed, ~np.isnan(stage.feed), np.nan)
     if count < SHORTEST:
         return 0
     control.points = True
     control.builder.says_the_way(turning, count)
-    take(control, stage.head(count), feed[:count], block, main)
+    take(control, stage.rows(0, count), block, main)
     return count
 
 

@@ -1,0 +1,129 @@
+"""Blocks of plain numbers as columns: what they say, and where they lead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix import fast
+from ncfix.program.follow.control import Control
+from ncfix.program.follow.coordinates import N_LETTERS
+from ncfix.program.follow.lane_tables import LaneTables
+from ncfix.program.moves import FeedMode
+from ncfix.program.tree import Program
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+LONGEST = 1 << 16
+"""Blocks that are taken at once."""
+
+
+class Text(Protocol):
+    """A program text while it is executed."""
+
+    @property
+    def program(self) -> Program:
+        """The program whose text it is."""
+
+    @property
+    def lanes(self) -> LaneTables:
+        """The lanes of all shapes as columns."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Consecutive blocks as the control takes them, one row per block.
+
+    path    (n + 1, 9) the command before the first block, and at the end of each
+    feed    (n,) feed in force, mm/min, 1/min or mm/rev; `fed` where the block has an F
+    motion  (n,) motion code in force, in tenths; `coded` where the block has one
+    mask    (n,) axis words, as bits
+    """
+
+    path: FloatArray
+    feed: FloatArray
+    fed: Mask
+    motion: FloatArray
+    coded: Mask
+    mask: IntArray
+
+    def rows(self, start: int, stop: int) -> Stage:
+        """Some of the blocks."""
+        own = slice(start, stop)
+        path = self.path[start : stop + 1]
+        return Stage(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own])
+
+
+def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
+    """What blocks say, and where they lead."""
+    program, tables = unit.program, unit.lanes
+    shapes, first = program.template[start:stop], program.first_number[start:stop]
+    motion = tables.motion[shapes]
+    follow = followed_compiled if fast.engaged() else followed
+    path, words = follow(control, program.numbers, first, shapes, tables)
+    fed, coded = ~np.isnan(words), motion >= 0
+    feed = filled(feed_unit(control) * words, fed, control.modal.feed)
+    codes = filled(motion.astype(np.float64), coded, float(control.modal.motion))
+    return Stage(path, feed, fed, codes, coded, tables.mask[shapes])
+
+
+def feed_unit(control: Control) -> float:
+    """What the number of an F word counts."""
+    return 1.0 if control.modal.feed_mode == FeedMode.INVERSE_TIME else control.modal.unit
+
+
+def followed(
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
+) -> tuple[FloatArray, FloatArray]:
+    """The path (n + 1, 9) and the F words (n,) of blocks of some shapes with numbers from `first` on."""
+    path = np.empty((len(first) + 1, N_LETTERS))
+    path[0] = control.position
+    for letter in range(N_LETTERS):
+        path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[shapes, letter]))
+    return path, words(numbers, first, tables.feed[shapes])
+
+
+def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
+    """The numbers at some slots of blocks, NaN where the slot is -1."""
+    values = np.full(len(slots), np.nan)
+    rows = np.flatnonzero(slots >= 0)
+    values[rows] = numbers[first[rows] + slots[rows]]
+    return values
+
+
+def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
+    """The commands of one axis at the ends of blocks with these words, (n,)."""
+    here, given = control.position[letter], ~np.isnan(words)
+    if not given.any():
+        return np.full(len(words), here)
+    if control.modal.incremental:
+        steps = np.where(given, control.scale[letter] * words, 0.0)
+        return np.cumsum(np.append(here, steps))[1:]
+    return filled(control.offset[letter] + control.scale[letter] * words, given, here)
+
+
+def followed_compiled(
+    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
+) -> tuple[FloatArray, FloatArray]:
+    """As `followed`."""
+    from ncfix.program.follow import lane_kernel
+
+    position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
+    incremental = control.modal.incremental
+    found = np.empty((len(first) + 1, N_LETTERS)), np.empty(len(first))
+    frame = offset, scale
+    lane_kernel.followed(numbers, first, shapes, tables.axes, tables.feed, position, frame, incremental, found)
+    return found
+
+
+def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> FloatArray:
+    """Every row's value, or the last one given above it; `before` where none is."""
+    if valid.all():
+        return values
+    last = np.maximum.accumulate(np.where(valid, np.arange(len(values)), -1))
+    return np.where(last >= 0, values[last], before)
