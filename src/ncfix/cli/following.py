@@ -12,6 +12,7 @@ from ncfix.diagnostics import SourceError
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
+    from ncfix.compensate.comparison import Gaps
     from ncfix.compensate.simulation import TipError
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves, Trace
@@ -108,10 +109,10 @@ class Following:
 
         program, machine, meant = self._on_machine(original)
         other, _, done = self._on_machine(fixed, original, like=program)
-        there, back = compare(machine, meant, done)
-        before = error_of(machine, meant)
-        lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
         limit = tolerance_um / 1e3
+        there, back = compare(machine, meant, done, near=limit)
+        before = error_of(machine, meant, near=limit)
+        lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
         return Compared(
             before=figures(before, lines),
             after=figures(there, other_lines),
@@ -169,7 +170,7 @@ def lines_of(program: Program, blocks: Any) -> list[int]:
     return lines
 
 
-def figures(error: TipError, lines: list[int]) -> dict[str, Any]:
+def figures(error: TipError | Gaps, lines: list[int]) -> dict[str, Any]:
     """The error along a path in two figures, um, and the line of the worst."""
     row = error.worst_row
     return {"max": 1e3 * error.max_mm, "rms": 1e3 * error.rms_mm, "where": None if row is None else lines[row]}

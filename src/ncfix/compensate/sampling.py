@@ -41,7 +41,7 @@ def bends(intent: Intent, rows: Index) -> Array:
     swung = np.flatnonzero(moves.tcp[rows])
     if swung.size:
         angle = way[swung][:, machine.rotary].sum(axis=1)
-        way[swung[:, None], intent.columns] += (_reach(intent, rows[swung]) * angle)[:, None]
+        way[swung[:, None], intent.columns] += (reach(intent, rows[swung]) * angle)[:, None]
     arcs = np.flatnonzero(intent.segments.arc[rows])
     if arcs.size:
         way[arcs[:, None], intent.columns] += _arc_ways(intent, rows[arcs])
@@ -57,8 +57,8 @@ def too_long(intent: Intent, rows: Index) -> Mask:
     return found
 
 
-def _reach(intent: Intent, rows: Index) -> Array:
-    """The distance of the tip from the rotary axes with tool-centre-point control, roughly and from above, mm."""
+def reach(intent: Intent, rows: Index) -> Array:
+    """The distance of the tip from the rotary axes at the ends of motions, roughly and from above, (k,) mm."""
     machine, moves = intent.machine, intent.moves
     points = [float(np.linalg.norm(axis.point)) for axis in machine.axes if axis.rotary]
     fixed = max(points, default=0.0) + float(np.linalg.norm(machine.workpiece_offset))
@@ -69,13 +69,17 @@ def _reach(intent: Intent, rows: Index) -> Array:
 
 def _arc_ways(intent: Intent, rows: Index) -> Array:
     """What X Y Z move along arcs, (k, 3) mm, from above."""
-    moves, segments = intent.moves, intent.segments
-    start = segments.start[rows[:, None], intent.columns] - moves.centre[rows]
-    across = np.cross(moves.normal[rows], start)
-    radius = np.linalg.norm(across, axis=1)
+    moves = intent.moves
     in_plane = np.sqrt(np.maximum(1 - moves.normal[rows] ** 2, 0.0))
-    ways: Array = (radius * np.abs(moves.sweep[rows]))[:, None] * in_plane
+    ways: Array = (arc_radii(intent, rows) * np.abs(moves.sweep[rows]))[:, None] * in_plane
     return ways
+
+
+def arc_radii(intent: Intent, rows: Index) -> Array:
+    """The radii of arcs where they start, (k,) mm."""
+    start = intent.segments.start[rows[:, None], intent.columns] - intent.moves.centre[rows]
+    radius: Array = np.linalg.norm(np.cross(intent.moves.normal[rows], start), axis=1)
+    return radius
 
 
 def even(counts: Index) -> Array:
@@ -94,12 +98,23 @@ def interior(
     often = bends(intent, rows)
     often[DENSITY * often >= MOST] = 0.0
     counts = np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
-    fraction = even(counts)
+    return with_kinks(intent, real, rows, counts, even(counts))
+
+
+def with_kinks(
+    intent: Intent, real: Segments, rows: Index, counts: Index, fraction: Array, beside: float = 0.0
+) -> tuple[Index, Array]:
+    """Fractions of motions, ends left out, and those at which an axis passes a kink or a jump of the error model.
+
+    counts (k,) and flat `fraction`, ascending; `beside`: not there, but so far before and behind it.
+    """
     if not intent.kinks:
         return counts, fraction
     owner, at = _nodes(intent.curved[rows], counts, fraction)
     q = intent.joints(rows[owner], real.at(rows[owner], at))
-    return merged(len(rows), (owners(counts), fraction), crossed(intent, owner, at, q))
+    where, found = crossed(intent, owner, at, q)
+    sides = [(where, found)] if not beside else [(where, np.clip(found + way, 0.0, 1.0)) for way in (-beside, beside)]
+    return merged(len(rows), (owners(counts), fraction), *sides)
 
 
 def merged(n: int, *lists: tuple[Index, Array]) -> tuple[Index, Array]:

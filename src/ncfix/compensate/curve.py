@@ -1,0 +1,251 @@
+"""The path of a tool tip as a curve: parabolas through three of its points each, near enough to it everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+
+from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.ragged import owners, places
+from ncfix.compensate.rows import every, finite, picked
+from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
+from ncfix.compensate.simulation import batches
+from ncfix.program.moves import Kind
+
+Tip = Callable[[Index, Array], Array]
+
+NEAR_ENOUGH = 2e-5
+"""mm; so far a parabola may be from the path of a tip that turns round an axis."""
+CUBIC = 3**0.5 / 216
+"""A parabola through begin, middle and end of an arc of radius r and angle a is this times r a^3 from it, at most."""
+JUMP = 1e-6
+"""Fraction of a motion on both sides of a kink or jump of the errors where a parabola ends."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """k parabolas in the order in which they are gone along; a hole is one that has no length.
+
+    rows                (k,) the motion that each belongs to
+    start, stop         (k,) the fractions of the motion from which to which it goes
+    begin, middle, end  (k, 3) mm: where it begins, half-way, and ends
+    opens               (k,) it does not begin where the one before ends
+    first               mm, the way along the whole path to the first of them
+    """
+
+    rows: Index
+    start: Array
+    stop: Array
+    begin: Array
+    middle: Array
+    end: Array
+    opens: Mask
+    first: float = 0.0
+
+    @classmethod
+    def of(cls, intent: Intent, tip: Tip, after: int = 0) -> Curve:
+        """What motions from row `after` on cut, by a function that gives the tip; where it has none is left out."""
+        rows, start, stop = _stretches(intent, after)
+        opens = _opening(intent, rows, start)
+        fresh = np.flatnonzero(opens)
+        at = np.concatenate([rows, rows, rows[fresh]])
+        fraction = np.concatenate([(start + stop) / 2, stop, start[fresh]])
+        parts = [tip(at[part], fraction[part]) for part in batches(len(at))]
+        points = np.concatenate(parts) if parts else np.empty((0, 3))
+        middle, end = points[: len(rows)], points[len(rows) : 2 * len(rows)]
+        begin = np.empty_like(end)
+        begin[1:] = end[:-1]
+        begin[fresh] = points[2 * len(rows) :]
+        there = finite(begin) & finite(middle) & finite(end)
+        opens[1:] |= ~there[:-1]
+        curve = cls(rows, start, stop, begin, middle, end, opens)
+        return curve if there.all() else curve.taken(there)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def ways(self) -> Array:
+        """The length of each, (k,) mm: by Simpson's rule, as it were, from one chord and from two."""
+        halves = distance(self.begin, self.middle) + distance(self.middle, self.end)
+        return (4 * halves - distance(self.begin, self.end)) / 3
+
+    @cached_property
+    def gaps(self) -> Array:
+        """The way from the end of the one before to its begin, (k,) mm."""
+        gaps = np.zeros(len(self))
+        at = np.flatnonzero(self.opens[1:]) + 1
+        gaps[at] = distance(self.end[at - 1], self.begin[at])
+        return gaps
+
+    @cached_property
+    def lengths(self) -> Array:
+        """The way to the begin of each, straight over what lies between cuts, (k,) mm."""
+        lengths: Array = self.first + np.cumsum(self.ways + self.gaps) - self.ways
+        return lengths
+
+    @property
+    def total(self) -> float:
+        """The length of what is cut, mm."""
+        return float(self.ways.sum())
+
+    @cached_property
+    def slope(self) -> Array:
+        """(k, 3) mm: how the point at share u of a parabola moves with u where it begins."""
+        return 4 * self.middle - 3 * self.begin - self.end
+
+    @cached_property
+    def bend(self) -> Array:
+        """(k, 3) mm: the point is `begin + u * slope + u^2 * bend`."""
+        return 2 * (self.begin + self.end - 2 * self.middle)
+
+    @cached_property
+    def turns(self) -> Array:
+        """How much the path has turned, from below, where each begins and where it ends, (2, k) rad."""
+        enters, leaves = _unit(self.slope), _unit(self.slope + 2 * self.bend)
+        inside = distance(enters, leaves)
+        corner = np.zeros(len(self))
+        corner[1:] = np.where(self.opens[1:], np.pi, distance(enters[1:], leaves[:-1]))
+        at_begin = np.cumsum(corner + inside) - inside
+        return np.stack([at_begin, at_begin + inside])
+
+    @cached_property
+    def lying(self) -> Index:
+        """Those that have a length, ascending."""
+        return np.flatnonzero(self.ways > 0)
+
+    def place(self, lengths: Array) -> Index:
+        """The parabola in which a way along the path (n,) mm ends, (n,)."""
+        return np.maximum(np.searchsorted(self.lengths, lengths, side="right") - 1, 0)
+
+    def way(self, piece: Index, share: Array) -> Array:
+        """The way along the path to shares (n,) of parabolas (n,), mm."""
+        way: Array = self.lengths[piece] + share * self.ways[piece]
+        return way
+
+    def taken(self, which: Mask) -> Curve:
+        """Some of the parabolas."""
+        return replace(self, **{name: getattr(self, name)[which] for name in COLUMNS})
+
+
+COLUMNS = [each.name for each in fields(Curve) if each.name != "first"]
+"""The fields of a curve that have a row for each parabola."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Points of a curve at which it is looked at: half-way and at the end of each parabola, and where a cut begins.
+
+    piece   (k,) the parabola, ascending
+    share   (k,) 0, 0.5 or 1
+    points  (k, 3) mm
+    weight  (k,) mm of the path that it stands for, by Simpson's rule
+    """
+
+    piece: Index
+    share: Array
+    points: Array
+    weight: Array
+
+    @classmethod
+    def of(cls, curve: Curve) -> Samples:
+        """Of a curve."""
+        hole = curve.ways == 0
+        counts = np.where(hole, 1, 2 + curve.opens)
+        piece = owners(counts)
+        share = 1 - (counts[piece] - 1 - places(counts)) / 2
+        points = np.where((share == 1)[:, None], picked(curve.end, piece), picked(curve.middle, piece))
+        begin = np.flatnonzero(share == 0)
+        points[begin] = curve.begin[piece[begin]]
+        weight = np.where(share == 0.5, 4, 1) * curve.ways[piece] / 6
+        joined = np.flatnonzero(~curve.opens[1:])
+        last = np.cumsum(counts) - 1
+        weight[last[joined]] += curve.ways[joined + 1] / 6
+        return cls(piece, share, points, weight)
+
+
+def distance(one: Array, other: Array) -> Array:
+    """How far points (n, 3) are from others, (n,)."""
+    return length(one - other)
+
+
+def length(vectors: Array) -> Array:
+    """The lengths of vectors (n, 3), (n,)."""
+    found: Array = np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    return found
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors (n, 3) of length 1; those without length stay."""
+    size = length(vectors)
+    unit: Array = vectors / np.where(size > 0, size, 1.0)[:, None]
+    return unit
+
+
+def _stretches(intent: Intent, after: int) -> tuple[Index, Array, Array]:
+    """What is cut, in stretches: motion (k,), and the fractions of it from which to which each goes (k,)."""
+    moves = intent.moves
+    known = finite(moves.end) & moves.cuts
+    known[:after] = False
+    hole = moves.kind == Kind.CYCLE
+    along = np.flatnonzero(known & ~hole & finite(moves.start))
+    counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)
+    turning = reversals(intent, along, counts, between)
+    if turning[0].size:
+        sides = [(turning[0], np.clip(turning[1] + side, 0.0, 1.0)) for side in (-JUMP, JUMP)]
+        counts, between = merged(len(along), (owners(counts), between), *sides)
+    pieces = counts + 1
+    owner, ends = owners(pieces), np.ones(int(pieces.sum()))
+    last = np.cumsum(pieces) - 1
+    ends[np.delete(np.arange(len(ends)), last)] = between
+    starts = np.concatenate([[0.0], ends[:-1]])[: len(ends)]
+    starts[last - pieces + 1] = 0.0
+    at_end = np.flatnonzero(known & hole)
+    rows = np.concatenate([along[owner], at_end])
+    order = np.argsort(rows, kind="stable")
+    ones = np.ones(len(at_end))
+    return rows[order], np.concatenate([starts, ones])[order], np.concatenate([ends, ones])[order]
+
+
+def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:
+    """Fractions between which parabolas are near enough to the path: counts (k,) and flat fractions, ends left out."""
+    often = bends(intent, rows)
+    often[DENSITY * often >= MOST] = 0.0
+    counts = np.maximum(np.ceil(DENSITY / 2 * often), _round_axes(intent, rows))
+    found = np.clip(counts, 1, MOST_SHOWN).astype(np.intp) - 1
+    return found, even(found)
+
+
+def _round_axes(intent: Intent, rows: Index) -> Array:
+    """How many parabolas it takes for motions (k,) that lead the tip round an axis, (k,)."""
+    moves, rotary = intent.moves, intent.machine.rotary
+    angle, radius = np.zeros(len(rows)), np.zeros(len(rows))
+    arcs = np.flatnonzero(intent.segments.arc[rows])
+    angle[arcs], radius[arcs] = np.abs(moves.sweep[rows[arcs]]), arc_radii(intent, rows[arcs])
+    if rotary.any():
+        way = np.abs(picked(moves.end, rows) - picked(moves.start, rows))[:, rotary].sum(axis=1)
+        swung = np.flatnonzero((way > 0) & ~moves.tcp[rows])
+        angle[swung] += way[swung]
+        radius[swung] = np.maximum(radius[swung], reach(intent, rows[swung]))
+    count: Array = np.ceil(angle * np.cbrt(CUBIC * radius / NEAR_ENOUGH))
+    return count
+
+
+def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
+    """(k,) stretches of motions that may begin elsewhere than the one before ends."""
+    opens: Mask = start == 0
+    opens |= intent.moves.kind[rows] == Kind.CYCLE
+    if not len(rows) or intent.arrival is not None:
+        return opens
+    moves = intent.moves
+    next_one = np.flatnonzero(opens[1:]) + 1
+    row, before = rows[next_one], rows[next_one - 1]
+    same = every(picked(moves.start, row) == picked(moves.end, before)) & (moves.tcp[row] == moves.tcp[before])
+    same &= (moves.tool_length[row] == moves.tool_length[before]) & (moves.kind[row] != Kind.CYCLE)
+    opens[next_one[same]] = False
+    return opens

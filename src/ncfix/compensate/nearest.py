@@ -1,0 +1,210 @@
+"""The nearest point of a curve, looked for near the same length of path.
+
+A point of another path is followed down to where it is nearest, from where this path is as long as that one is there.
+Where that is farther away than is of no interest, and the path turns so much near by that it might come back nearer to
+the point, all of it is looked at that could be nearer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ncfix.compensate.curve import Curve, length
+from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.ragged import batches, owners, places
+from ncfix.compensate.rows import picked
+
+ALONG = 0.02
+"""A point that is so much shorter or longer along the path counts as this share of that farther away."""
+STEPS = 6
+"""Most Newton steps on a parabola; each squares what is missing."""
+CLOSE = 1e-6
+"""mm: a step along the path that makes no difference to the distance."""
+HOPS = 40
+"""Most parabolas on which a nearest point is looked for one after the other."""
+STRAIGHT = 0.1
+"""rad: a path that turns by less leads no nearer to a point than 1 - cos of it, half a per cent, of its distance."""
+TOGETHER = 4096
+"""Points for which the difference of the two lengths of path is taken as the same, at first."""
+PAIRS = 1 << 18
+"""Points and parabolas that are looked at together."""
+
+
+class LostError(Exception):
+    """The nearest point may lie on a part of the path that is not at hand."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """Where a curve is nearest to points.
+
+    piece  (n,) the parabola, and `share` (n,) of it
+    gap    (n,) mm
+    """
+
+    piece: Index
+    share: Array
+    gap: Array
+
+    def taken(self, which: Index) -> Nearest:
+        """For some of the points."""
+        return Nearest(self.piece[which], self.share[which], self.gap[which])
+
+    def put(self, which: Index, other: Nearest) -> None:
+        """Take for some of the points what is there instead."""
+        self.piece[which], self.share[which], self.gap[which] = other.piece, other.share, other.gap
+
+
+@dataclass(slots=True)
+class Search:
+    """Looks for the nearest points of a curve.
+
+    curve   the curve, or the part of it that is at hand
+    near    mm; of distances below nobody needs to know whether another point is nearer
+    ahead   how much farther one is along the curve than along the other path, mm, by what was found last
+    begins, ends  there is nothing before the part at hand, or behind it
+    """
+
+    curve: Curve
+    near: float
+    ahead: float = 0.0
+    begins: bool = True
+    ends: bool = True
+
+    def all(self, points: Array, lengths: Array) -> Nearest:
+        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `LostError`."""
+        found = [
+            self._together(points[at : at + TOGETHER], lengths[at : at + TOGETHER])
+            for at in range(0, len(points), TOGETHER)
+        ]
+        columns = ([getattr(each, name) for each in found] for name in ("piece", "share", "gap"))
+        none = (np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
+        return Nearest(*(np.concatenate([empty, *each]) for empty, each in zip(none, columns, strict=True)))
+
+    def _together(self, points: Array, lengths: Array) -> Nearest:
+        """For points of a short way."""
+        found = self.around(points, lengths + self.ahead)
+        last = len(points) * 3 // 4
+        surest = last + int(np.argmin(found.gap[last:]))
+        self.ahead = float(self.curve.way(found.piece, found.share)[surest] - lengths[surest])
+        return found
+
+    def around(self, points: Array, expected: Array) -> Nearest:
+        """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`."""
+        piece = self.curve.place(expected)
+        size = self.curve.ways[piece]
+        share = np.clip((expected - self.curve.lengths[piece]) / np.where(size > 0, size, 1.0), 0.0, 1.0)
+        found = self._down(points, piece, share)
+        far = np.flatnonzero(found.gap > self.near)
+        if far.size:
+            self._everywhere(points, expected, found, far)
+        return found
+
+    def _down(self, points: Array, piece: Index, share: Array) -> Nearest:
+        """The nearest points that are reached without going away from `points`, from shares of parabolas."""
+        share, gap, push = _newton(self.curve, points, piece, share)
+        found, lying = Nearest(piece, share, gap), self.curve.lying
+        rows, step_by_step = np.flatnonzero(push), np.zeros(len(points), dtype=bool)
+        for _ in range(HOPS if lying.size else 0):
+            if not rows.size:
+                break
+            new = self._hop(found.piece[rows], push[rows], step_by_step[rows])
+            entered = np.where(push[rows] > 0, 0.0, 1.0)
+            tried, way, further = _newton(self.curve, points[rows], new, entered)
+            better = way < found.gap[rows]
+            found.put(rows[better], Nearest(new[better], tried[better], way[better]))
+            push[rows[better]] = further[better]
+            again = ~better & ~step_by_step[rows] & (np.abs(push[rows]) > 0)
+            step_by_step[rows] = ~better
+            rows = rows[(better & (further != 0)) | again]
+        return found
+
+    def _hop(self, piece: Index, push: Array, one: Mask) -> Index:
+        """Where to look next: as far along as the point lies, or on the very next parabola that has a length."""
+        curve, lying = self.curve, self.curve.lying
+        ahead = push > 0
+        end = curve.lengths[piece] + np.where(ahead, curve.ways[piece], 0.0)
+        far = curve.place(end + np.where(one, 0.0, push))
+        after = np.searchsorted(lying, piece, side="right")
+        before = np.searchsorted(lying, piece, side="left") - 1
+        at = np.searchsorted(lying, far, side="right") - 1
+        at = np.where(ahead, np.where(one, after, np.maximum(at, after)), np.where(one, before, np.minimum(at, before)))
+        return lying[np.clip(at, 0, len(lying) - 1)]
+
+    # -- where the path turns -----------------------------------------------------------------------------------------
+
+    def _everywhere(self, points: Array, expected: Array, found: Nearest, far: Index) -> None:
+        """Look at all that could be nearer to points `far` (k,) than what was found, where the path turns near by."""
+        curve = self.curve
+        off = curve.way(found.piece[far], found.share[far]) - expected[far]
+        cost = np.hypot(found.gap[far], ALONG * off)
+        low, high = expected[far] - cost / ALONG, expected[far] + cost / ALONG
+        self._check(low, high)
+        first, last = curve.place(low), curve.place(high)
+        first, last = np.minimum(first, found.piece[far]), np.maximum(last, found.piece[far])
+        turning = curve.turns[1][last] - curve.turns[0][first] > STRAIGHT
+        counts = np.where(turning, last - first + 1, 0)
+        for some in batches(counts, PAIRS):
+            self._among(points, expected, found, far[some], (first[some], counts[some], cost[some]))
+
+    def _check(self, low: Array, high: Array) -> None:
+        """Raise `LostError` if the part of the curve between these lengths is not at hand."""
+        curve = self.curve
+        end = curve.lengths[-1] + curve.ways[-1]
+        if (not self.begins and low.min() < curve.lengths[0]) or (not self.ends and high.max() > end):
+            raise LostError
+
+    def _among(
+        self, points: Array, expected: Array, found: Nearest, rows: Index, where: tuple[Index, Index, Array]
+    ) -> None:
+        """Look at runs of parabolas for points `rows` (k,): the first, how many, and what was found in what measure."""
+        first, counts, cost = where
+        owner, piece = owners(counts), np.repeat(first, counts) + places(counts)
+        share, least = _on_chords(self.curve, picked(points, rows[owner]), piece)
+        way = np.clip(expected[rows[owner]], self.curve.lengths[piece], self.curve.way(piece, np.ones(len(piece))))
+        hopeful = np.flatnonzero(np.hypot(least, ALONG * (way - expected[rows[owner]])) < cost[owner])
+        owner, piece = owner[hopeful], piece[hopeful]
+        share, gap, _ = _newton(self.curve, picked(points, rows[owner]), piece, share[hopeful])
+        costs = np.hypot(gap, ALONG * (self.curve.way(piece, share) - expected[rows[owner]]))
+        order = np.lexsort((costs, owner))
+        best = order[np.unique(owner[order], return_index=True)[1]]
+        best = best[costs[best] < cost[owner[best]]]
+        found.put(rows[owner[best]], Nearest(piece[best], share[best], gap[best]))
+
+
+def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Array, Array, Array]:
+    """The nearest points to `points` (n, 3) on parabolas (n,), from shares (n,) of them.
+
+    Returns the shares, the distances, and how far beyond their ends the way to the points goes on: mm, negative before
+    their begin, 0 if it ends on them.
+    """
+    slope, bend = picked(curve.slope, piece), picked(curve.bend, piece)
+    u, left = share, points - picked(curve.begin, piece) - share[:, None] * (slope + share[:, None] * bend)
+    slope = slope + (2 * u)[:, None] * bend
+    for _ in range(STEPS):
+        square = np.einsum("ij,ij->i", slope, slope)
+        bowed = square - 2 * np.einsum("ij,ij->i", left, bend)
+        bowed = np.where(bowed > square / 4, bowed, square)
+        wanted = u + np.einsum("ij,ij->i", left, slope) / np.where(bowed > 0, bowed, 1.0)
+        new = np.clip(wanted, 0.0, 1.0)
+        step = (new - u)[:, None]
+        left = left - step * (slope + step * bend)
+        slope = slope + 2 * step * bend
+        moved, u = np.abs(new - u) * np.sqrt(square), new
+        if moved.max(initial=0.0) < CLOSE:
+            break
+    ahead = np.einsum("ij,ij->i", left, slope)
+    size = length(slope)
+    push = np.where(((u == 1) & (ahead > 0)) | ((u == 0) & (ahead < 0)), ahead / np.where(size > 0, size, 1.0), 0.0)
+    return u, length(left), push
+
+
+def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]:
+    """The shares of the chords of parabolas (n,) that are nearest to points (n, 3), and how near these are at most."""
+    begin = picked(curve.begin, piece)
+    chord, gap = picked(curve.end, piece) - begin, points - begin
+    square = np.einsum("ij,ij->i", chord, chord)
+    share = np.clip(np.einsum("ij,ij->i", gap, chord) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    return share, length(gap - share[:, None] * chord) - length(picked(curve.bend, piece)) / 4

@@ -1,0 +1,150 @@
+"""Two programs compared, against the same by brute force: points of both paths so dense that none is missed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import KDTree
+
+from ncfix.compensate.comparison import compare, error_of
+from ncfix.compensate.fix import fix_program
+from ncfix.compensate.following import follow
+from ncfix.compensate.options import FixOptions
+from ncfix.machine import Machine, load
+from ncfix.program.moves import Moves
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
+
+SETUP = Setup(assume_zero=True)
+HEAD = "G21 G90 G94 G17\nG0 X117.0 Y0 Z60\nG1 X117.05 Y0 Z7.15 B4.53 C{c} F2000\n"
+DENSE = 0.06
+"""mm from point to point on a path, at most."""
+LEVER = 250.0
+"""mm from the axes to the tip, at most."""
+AGREED = 3e-5
+"""mm: the parabolas are within 0.02 um of the path, and the distance between lines
+from point to point, 0.06 mm apart on circles of 200 mm, and what they stand for, is less than 3e-6 mm."""
+
+
+def unwinding(step: float = 1.7) -> str:
+    """Short blocks, one in which C unwinds, short blocks, one that turns the other way for half a turn."""
+    c = [5.1 - step * i for i in range(4)] + [358.4 - step * i for i in range(6)]
+    c += [c[-1] - 180.0 - step * i for i in range(4)]
+    lines = [
+        f"X{117.05 + 0.36 * i:.4f} Z{7.15 - 0.03 * i:.4f} B{4.53 - 0.07 * i:.4f} C{at:.4f}" for i, at in enumerate(c)
+    ]
+    return HEAD.format(c=c[0]) + "\n".join(lines[1:]) + "\nM2\n"
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return load(str(root / "benchmarks/five_axis.toml"))
+
+
+def moves_of(text: str, machine: Machine) -> Moves:
+    return follow(read(text.encode(), "part", "linuxcnc"), machine, SETUP).trace.moves
+
+
+def fixed(text: str, machine: Machine) -> str:
+    return fix_program(read(text.encode(), "part", "linuxcnc"), machine, SETUP, FixOptions()).text.decode()
+
+
+def dense(moves: Moves, rows: list[int]) -> np.ndarray:
+    """Axis positions along straight motions."""
+    found = []
+    for row in rows:
+        way = np.abs(moves.end[row] - moves.start[row]) * np.where(moves.rotary, LEVER, 1.0)
+        at = np.linspace(0, 1, int(way.sum() / DENSE) + 10)[1 if found else 0 :, None]
+        found.append(moves.start[row] + at * (moves.end[row] - moves.start[row]))
+    return np.concatenate(found)
+
+
+def farthest(path: np.ndarray, other: np.ndarray) -> float:
+    """The largest distance of points of one path from the other, as lines from point to point, mm."""
+    _, near = KDTree(other).query(path, k=8)
+    found = np.full(len(path), np.inf)
+    for each in (*near.T, *(near.T - 1)):
+        a, b = (other[np.clip(each + k, 0, len(other) - 1)] for k in (0, 1))
+        square = np.maximum(((b - a) ** 2).sum(axis=1), 1e-30)
+        share = np.clip(((path - a) * (b - a)).sum(axis=1) / square, 0, 1)
+        found = np.minimum(found, np.linalg.norm(path - a - share[:, None] * (b - a), axis=1))
+    return float(found.max())
+
+
+def truth(machine: Machine, original: Moves, other: Moves) -> tuple[float, float]:
+    """What `compare` has to find: the same by dense points. Both only turn, and cut from their second motion on."""
+    meant = machine.tip(dense(original, list(range(1, len(original)))))
+    done = machine.actual_tip(dense(other, list(range(1, len(other)))))
+    return farthest(done, meant), farthest(meant, done)
+
+
+def test_a_motion_in_which_an_axis_turns_far(machine: Machine) -> None:
+    text = unwinding()
+    before, after = moves_of(text, machine), moves_of(fixed(text, machine), machine)
+    assert len(after) > len(before) + 10
+    there, back = compare(machine, before, after)
+    assert (there.max_mm, back.max_mm) == pytest.approx(truth(machine, before, after), abs=AGREED)
+    assert max(there.max_mm, back.max_mm) < 1e-3
+    assert error_of(machine, before).max_mm == pytest.approx(truth(machine, before, before)[0], abs=AGREED)
+
+
+@pytest.mark.parametrize("axis", range(5))
+def test_a_fault_in_any_piece_of_such_a_motion_is_seen(machine: Machine, axis: int) -> None:
+    text = unwinding()
+    before, after = moves_of(text, machine), moves_of(fixed(text, machine), machine)
+    fault = np.where(after.rotary, 2e-5, 2e-3)[axis]
+    for row in range(4 + axis, len(after) - 1, 10):
+        end, start = after.end.copy(), after.start.copy()
+        end[row, axis] += fault
+        start[row + 1, axis] += fault
+        wrong = replace(after, start=start, end=end)
+        found = compare(machine, before, wrong)
+        assert tuple(each.max_mm for each in found) == pytest.approx(truth(machine, before, wrong), abs=AGREED)
+
+
+@pytest.mark.parametrize("near", [1e-5, 1e-3])
+def test_a_fault_of_a_micrometre_is_found_wherever_it_is(machine: Machine, near: float) -> None:
+    """On a machine without errors, square to the path: on short blocks and long ones, with corners of all angles."""
+    rng = np.random.default_rng(5)
+    perfect = replace_errors(machine)
+    way = np.cumsum(rng.choice([0.02, 0.3, 4.0], 300))
+    xy = np.column_stack([100 + 60 * np.cos(way / 9), 100 + 80 * np.sin(way / 23)])
+    text = "G21 G90 G94 G17\nG0 X100 Y100 Z5\n" + "".join(f"G1 X{x:.4f} Y{y:.4f} Z1 F900\n" for x, y in xy) + "M2\n"
+    meant, z = moves_of(text, perfect), machine.axis_names.index("Z")
+    for row in range(2, len(meant) - 1, 7):
+        end, start = meant.end.copy(), meant.start.copy()
+        end[row, z] += 1.5e-3
+        start[row + 1, z] += 1.5e-3
+        there, _ = compare(perfect, meant, replace(meant, start=start, end=end), near=near)
+        assert there.max_mm == pytest.approx(1.5e-3, rel=1e-4)
+        assert there.worst_row in (row, row + 1)
+
+
+def replace_errors(machine: Machine) -> Machine:
+    """The machine without its errors."""
+    return machine.replace(effects=())
+
+
+@pytest.mark.parametrize(
+    ("change", "least_mm"),
+    [
+        (lambda lines: lines[:150] + lines[151:], 2e-3),
+        (lambda lines: [*lines[:150], lines[151], lines[150], *lines[152:]], 0.005),
+        (lambda lines: lines[:150] + [lines[149]] * 3 + lines[150:], 0.0),
+        (lambda lines: [*lines[:150], lines[149], lines[148], lines[149], *lines[150:]], 0.0),
+    ],
+    ids=["left out", "exchanged", "said again", "gone over again"],
+)
+def test_blocks_that_are_missing_or_too_many(machine: Machine, change: object, least_mm: float) -> None:
+    perfect = replace_errors(machine)
+    lines = [f"G1 X{100 + 40 * np.cos(i / 60):.4f} Y{100 + 40 * np.sin(i / 60):.4f} Z1 F900\n" for i in range(300)]
+    head = "G21 G90 G94 G17\nG0 X140 Y100 Z5\n"
+    texts = [head + "".join(each) + "M2\n" for each in (lines, change(lines))]  # type: ignore[operator]
+    meant, done = (moves_of(text, perfect) for text in texts)
+    found = compare(perfect, meant, done)
+    # the distance rises by up to 0.006 mm in half a block of 0.67 mm: by so much between two dense points at the peak
+    assert tuple(each.max_mm for each in found) == pytest.approx(truth(perfect, meant, done), abs=3e-4)
+    assert max(each.max_mm for each in found) >= least_mm
