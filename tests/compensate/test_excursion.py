@@ -15,7 +15,9 @@ LENGTH = 120.0
 LOOKS = 41
 
 
-@pytest.mark.parametrize("name", ["benchmarks/five_axis.toml", "examples/machines/dmu50.toml"])
+@pytest.mark.parametrize(
+    "name", ["benchmarks/five_axis.toml", "examples/machines/dmu50.toml", "examples/machines/angle_head.toml"]
+)
 @pytest.mark.parametrize("turn", [0.001, 0.03, 0.5])
 def test_what_surely_stays_within_does(name: str, turn: float, root: Path) -> None:
     machine = load(root / name)

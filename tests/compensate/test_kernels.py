@@ -12,6 +12,7 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
+from ncfix.compensate.ends import corrected
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import _look, bounds, uneasy_starts
 from ncfix.compensate.path import plan
@@ -80,11 +81,32 @@ def test_no_look_finds_more_than_the_bound(root: Path, step: float, passing: flo
     assert found.max() > 1e-8
 
 
+@pytest.mark.parametrize(
+    "name", ["benchmarks/five_axis", "examples/machines/angle_head", "examples/machines/wCAYFXZSt"]
+)
+@pytest.mark.parametrize("step", [0.2, 3.0, 20.0])
+def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, step: float) -> None:
+    """The same under tool-centre-point control, where linear axes do not move evenly."""
+    machine = load(root / f"{name}.toml")
+    wound = winding(machine, 300, step)
+    intent = replace(wound, moves=replace(wound.moves, tcp=np.ones(len(wound.moves), dtype=bool)))
+    moves, rows = intent.moves, np.arange(1, len(wound.moves))
+    done = corrected(intent, get_strategy("position"), np.arange(len(moves))).wanted
+    real = replace(Segments.of_moves(moves, intent.columns), start=np.vstack((moves.start[:1], done[:-1])), end=done)
+    uneasy = uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
+    bound, found = bounds(intent, real, rows, uneasy), _look(intent, real, rows, uneasy, 8, 15)
+    assert np.isfinite(bound).mean() > 0.5
+    assert (found <= bound).all()
+    assert found.max() > 1e-8
+
+
 @pytest.mark.parametrize("name", ["benchmarks/five_axis", "examples/machines/wCAYFXZSt", "examples/machines/dmu50"])
-def test_figures_from_what_is_known(root: Path, name: str) -> None:
+@pytest.mark.parametrize("led", [False, True])
+def test_figures_from_what_is_known(root: Path, name: str, led: bool) -> None:
     """What the correction found at ends is what a look at the ends finds, to a hundredth of a nanometre."""
     machine = load(root / f"{name}.toml")
-    intent = winding(machine, 200, 0.4)
+    intent = winding(machine, 200, 0.1 if led else 0.4)
+    intent = replace(intent, moves=replace(intent.moves, tcp=np.full(len(intent.moves), led)))
     planned = plan(machine, intent.moves, get_strategy("rotary-then-linear"), 0.005)
     assert planned.known is not None
     pieces = replace(planned.pieces, end=np.round(planned.pieces.end, 4))

@@ -1,16 +1,18 @@
 """How far axes can stray from the straight way between two positions while tool-centre-point control leads them.
 
-The tip goes straight in the workpiece, at even speed, and the rotary axes turn evenly by angles that together are S. A
-point at most r away from every line about which it is turned then has an acceleration, in the base frame and with the
-fraction of the motion as time, of at most S^2 r + 2 S P, where P is the way of the tip in the workpiece. Whatever has
-no more acceleration than that strays by no more than an eighth of it from its chord.
+The tip goes straight in the workpiece, at even speed, and the rotary axes under the workpiece turn evenly by angles
+that together are S. A point at most r away from every line about which it is turned then has an acceleration, in the
+base frame and with the fraction of the motion as time, of at most S^2 r + 2 S P, where P is the way of the tip in the
+workpiece; where rotary axes carry the tool, its tip has one more, of at most S^2 r with the S and r of these. Whatever
+has no more acceleration than that strays by no more than an eighth of it from its chord. A straight way in the
+workpiece is nowhere farther from a pivot than at one of its ends.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import linear_columns
 from ncfix.compensate.rows import lengths
 from ncfix.machine import Machine
@@ -21,20 +23,55 @@ def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float
 
     tool_length  mm, the longest
     """
-    share = skew(machine)
-    if share is None:
+    acceleration = accelerations(machine, begin, end, tool_length)
+    if acceleration is None:
         return np.zeros(len(begin), dtype=bool)
-    turning = machine.rotary
-    turn = np.abs(end - begin)[:, turning].sum(axis=1)
-    way = lengths((end - begin)[:, ~turning])
-    pivots = sum(float(np.linalg.norm(axis.point)) for axis in machine.axes if axis.rotary)
-    fixed = tool_length + float(np.linalg.norm(machine.tool.point)) + 4 * pivots
-    fixed += float(np.linalg.norm(machine.workpiece_offset))
-    arm = 2 * (np.maximum(lengths(begin[:, ~turning]), lengths(end[:, ~turning])) + fixed)
-    stray = share * (3 * turn**2 * arm + 2 * turn * way) / 8
+    turning, stray = machine.rotary, acceleration / 8
     low, high = machine.ranges.T
     room = np.minimum(np.minimum(begin, end) - low, high - np.maximum(begin, end))
     return np.asarray((room[:, ~turning] > stray[:, None]).all(axis=1) & (room[:, turning] >= 0).all(axis=1))
+
+
+def accelerations(
+    machine: Machine, begin: Array, end: Array, tool_length: float, way: Array | None = None
+) -> Array | None:
+    """What no linear axis exceeds along motions between positions begin and end (k, n_axes), (k,) mm per motion^2.
+
+    tool_length  mm, the longest
+    way          (k,) mm: of the tip in the workpiece, if known
+
+    None where rotary axes carry some of X, Y and Z along.
+    """
+    share = skew(machine)
+    if share is None:
+        return None
+    table, head = (_pivots(machine, side) for side in (True, False))
+    origin, ways = machine.at_zero
+    base, travel = origin + machine.workpiece_offset, np.abs(end - begin)
+    turning, tilting = (travel[:, columns].sum(axis=1) for columns, _ in (table, head))
+    swing = _reach(head[1][::-1], base) + tool_length if len(head[1]) else 0.0
+    first, last = (q @ ways + base for q in (begin, end))
+    arm = np.zeros(len(begin))
+    if len(table[1]):
+        outermost = table[1][-1]
+        arm += np.maximum(lengths(first - outermost), lengths(last - outermost))
+        arm += tool_length + 2 * swing + 2 * _reach(table[1], table[1][0])
+    if way is None:
+        way = lengths(last - first) + turning * arm + tilting * swing
+    result: Array = share * (turning**2 * arm + 2 * turning * way + tilting**2 * swing)
+    return result
+
+
+def _pivots(machine: Machine, workpiece_side: bool) -> tuple[Index, Array]:
+    """The rotary axes on one side, in the order of the chain: their columns, and points on their lines (k, 3) mm."""
+    found = [k for k, axis in enumerate(machine.axes) if axis.rotary and axis.workpiece_side == workpiece_side]
+    points = np.array([machine.axes[k].point for k in found]).reshape(-1, 3)
+    return np.array(found, dtype=np.intp), points
+
+
+def _reach(pivots: Array, point: Array) -> float:
+    """How far a point is from pivots (k, 3) at most, mm, whatever turns it about the first, that about the next, ..."""
+    return float(lengths(np.diff(np.vstack((point, pivots)), axis=0)).sum())
 
 
 def skew(machine: Machine) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.excursion import accelerations
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
@@ -15,6 +16,7 @@ from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.bow import Bow
+from ncfix.program.moves import Kind
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""
@@ -61,21 +63,52 @@ def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, toleran
 def bounds(intent: Intent, real: Segments, rows: Index, uneasy: Mask) -> Array:
     """What the deviation along motions `rows` (k,) does not exceed, mm; inf where that is not known.
 
-    Known it is for straight motions from one corrected end to the next. The tip's error leaves its chord by its bow;
-    what is added to the linear axes goes straight from end to end, but turns with the workpiece meanwhile.
+    Known it is for straight motions from one corrected end to the next.
     """
-    bow = intent.machine.bow
-    most = np.full(len(rows), np.inf)
-    plain = ~(intent.curved[rows] | uneasy[rows] | _passes_kink(intent, real, rows))
+    most, moves = np.full(len(rows), np.inf), intent.moves
+    plain = ~((moves.kind == Kind.ARC)[rows] | uneasy[rows])
     plain[lacking(intent, rows)] = False
-    if bow is None or intent.state.inputs or not plain.any():
+    if intent.machine.bow is None or intent.state.inputs or not plain.any():
         return most
-    chosen = slice(None) if plain.all() else plain
-    on = rows[chosen]
-    start, end, linear = picked(real.start, on), picked(real.end, on), ~intent.machine.rotary
-    meant = picked(intent.moves.start, on), picked(intent.moves.end, on)
+    led = moves.tcp[rows]
+    for chosen, found in ((plain & ~led, _bounds_of_axes), (plain & led, _bounds_of_tip)):
+        if chosen.all():
+            return found(intent, real, rows, intent.machine.bow)
+        if chosen.any():
+            most[chosen] = found(intent, real, rows[chosen], intent.machine.bow)
+    return most
+
+
+def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Array:
+    """As `bounds`, of motions in axis positions.
+
+    The tip's error leaves its chord by its bow; what is added to the linear axes goes straight from end to end, but
+    turns with the workpiece meanwhile.
+    """
+    start, end, linear = picked(real.start, rows), picked(real.end, rows), ~intent.machine.rotary
+    meant = picked(intent.moves.start, rows), picked(intent.moves.end, rows)
     shifts = (start - meant[0])[:, linear], (end - meant[1])[:, linear]
-    most[chosen] = straight_bounds(bow, start, end, shifts, intent.lengths(on), linear)
+    most = straight_bounds(bow, start, end, shifts, intent.lengths(rows), linear)
+    most[passed(intent, start, end)[0]] = np.inf
+    return most
+
+
+def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Array:
+    """As `bounds`, of motions under tool-centre-point control.
+
+    What is added to X Y Z goes straight in the workpiece, so that only the tip's error can leave its chord.
+    """
+    machine, longest = intent.machine, float(np.abs(intent.lengths(rows)).max())
+    commands = picked(real.start, rows), picked(real.end, rows)
+    start, end = (intent.joints(rows, each) for each in commands)
+    way = lengths(intent.meant(rows, commands[1]) - intent.meant(rows, commands[0]))
+    acceleration = accelerations(machine, start, end, longest, way)
+    if acceleration is None or intent.arrival is not None:
+        return np.full(len(rows), np.inf)
+    most_far = np.maximum(farthest(start), farthest(end))
+    most = bow.of(np.abs(end - start), most_far, longest, machine.rotary, acceleration)[0] + CLOSE
+    stray = np.where(machine.rotary, 0.0, acceleration[:, None] / 8)
+    most[passed(intent, np.minimum(start, end) - stray, np.maximum(start, end) + stray)[0]] = np.inf
     return most
 
 
@@ -90,14 +123,6 @@ def straight_bounds(
     turned = (np.maximum(sizes[0], sizes[1]) * angle + 2 * sizes[2]) * angle
     most: Array = least + CORNER * turned / 8 + CLOSE
     return most
-
-
-def _passes_kink(intent: Intent, real: Segments, rows: Index) -> Mask:
-    """Motions (k,) on the way of which the error has a kink or a jump."""
-    found = np.zeros(len(rows), dtype=bool)
-    if intent.kinks:
-        found[passed(intent, picked(real.start, rows), picked(real.end, rows))[0]] = True
-    return found
 
 
 def _look(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int) -> Array:

@@ -10,6 +10,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import greatest, picked
 from ncfix.compensate.wordless import lacking
 from ncfix.compensate.written import Written
+from ncfix.program.moves import Kind
 
 TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""
@@ -43,7 +44,8 @@ class Known:
             return np.zeros(len(piece), dtype=bool), before, before
         off = picked(pieces.end, piece) - picked(self.end, move)
         turned = greatest(np.abs(off[:, machine.rotary]))
-        here = np.isfinite(before) & (pieces.fraction[piece] == 1) & ~intent.curved[move] & (turned <= TURNED)
+        straight = (intent.moves.kind[move] != Kind.ARC) & (turned <= TURNED)
+        here = np.isfinite(before) & (pieces.fraction[piece] == 1) & straight
         here[lacking(intent, move)] = False
         shift = off[:, intent.columns] @ ways.T
         return here, before, np.sqrt(np.einsum("ij,ij->i", shift, shift))

@@ -3,8 +3,9 @@
 Along a motion the tip's error is the sum over all joints of Q (t + r x a): t and r the joint's small motion, a the arm
 from its reference point to the tip, Q the rotation from there to the workpiece. Of a product the second derivative is
 bounded by those of its factors; so that of the error is, by the ways of the axes. A curve whose second derivative stays
-below b leaves its chord by at most b / 8. Products of errors are parts in ten thousand of errors; `MORE` has room for
-them.
+below b leaves its chord by at most b / 8. Linear axes that do not move evenly are faster at times by as much as their
+acceleration, which also bends the error by its slopes. Products of errors are parts in ten thousand of errors; `MORE`
+has room for them.
 """
 
 from __future__ import annotations
@@ -45,22 +46,37 @@ class Bow:
         """How far the tip is at most from any reference point, mm; arguments as in `of`."""
         return self.reach + abs(tool_length) + float(farthest[~rotary].sum())
 
-    def of(self, ways: Array, farthest: Array, tool_length: float, rotary: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def of(
+        self,
+        ways: Array,
+        farthest: Array,
+        tool_length: float,
+        rotary: NDArray[np.bool_],
+        acceleration: Array | None = None,
+    ) -> tuple[Array, Array]:
         """How far the error may leave its chord, (k,) mm, and the angles turned by, (k,) rad.
 
-        ways         (k, n_axes) of straight motions, not negative, mm and rad
-        farthest     (n_axes,) from zero that they go
-        tool_length  the largest, mm
+        ways          (k, n_axes) of motions, not negative, mm and rad
+        farthest      (n_axes,) from zero that they go
+        tool_length   the largest, mm
+        acceleration  (k,) mm per motion squared: of each linear axis on the way at most; all axes move evenly if not
+                      given
         """
-        arm = self.arm(farthest, tool_length, rotary)
+        arm: Array | float = self.arm(farthest, tool_length, rotary)
+        bent: Array | float = 0.0
+        if acceleration is not None:
+            linear = ~rotary
+            ways = ways + np.where(linear, acceleration[:, None], 0.0)
+            arm = arm + linear.sum() * acceleration / 8
+            bent = acceleration * ((self.slopes[0] + self.turn)[linear].sum() + arm * self.slopes[1, linear].sum())
         way, angle = ways[:, ~rotary].sum(axis=1), ways[:, rotary].sum(axis=1)
         shifting, turning = ways @ self.slopes.T[:, 0], ways @ self.slopes.T[:, 1]
         swing = way + arm * angle
         first = shifting + arm * turning + self.turn * swing
-        second = (ways * ways) @ (self.curvatures[0] + arm * self.curvatures[1])
+        second = (ways * ways) @ self.curvatures[0] + arm * ((ways * ways) @ self.curvatures[1])
         second += 2 * turning * swing + self.turn * (2 * way * angle + arm * angle * angle)
         whole = second + 2 * first * angle + (self.shift + arm * self.turn) * angle * angle
-        bow: Array = MORE * whole / 8
+        bow: Array = MORE * (whole + bent) / 8
         return bow, angle
 
 
