@@ -10,10 +10,11 @@ from ncfix.compensate.ends import as_commands, path_of
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.held import with_rotary_held
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.kinematics import regular
 from ncfix.compensate.ragged import batches, offsets, owners, places, sums
 from ncfix.compensate.round import RoundGrid
 from ncfix.compensate.rows import picked
-from ncfix.compensate.sampling import MOST, bends, crossed, even, merged, reversals
+from ncfix.compensate.sampling import MOST, bends, crossed, merged, reversals
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
 from ncfix.compensate.strategies import Strategy
@@ -146,7 +147,8 @@ def _grid(intent: Intent, real: Segments, rows: Index, nodes: Index, strategy: S
     first, last = ends[:-1], ends[1:] - 1
     bounds = np.zeros(len(move), dtype=bool)
     bounds[first] = bounds[last] = True
-    programmed, q = intent.segments.at(move, fraction), intent.joints_at(move, fraction)
+    programmed = intent.segments.at(move, fraction)
+    q = intent.joints(move, programmed)
     path = None
     if strategy.corrects_orientation:
         decided = np.where(bounds[:, None], real.at(move, fraction) - programmed, 0.0)
@@ -182,23 +184,33 @@ def _fractions(intent: Intent, real: Segments, rows: Index, nodes: Index) -> tup
     Nodes stand evenly, behind the start, and on both sides of wherever the corrected axes pass a kink or a jump, or
     reverse if that matters.
     """
-    each, inner = np.arange(len(rows)), even(nodes)
-    bounds = [(each, np.full(len(rows), place)) for place in (0.0, INSTANT, 1.0)]
-    counts, fraction = merged(len(rows), (owners(nodes), inner), *bounds)
+    counts = nodes + 3
+    fraction = (places(counts) - 1) / np.repeat(nodes + 1, counts)
+    first = offsets(counts)[:-1]
+    fraction[first], fraction[first + 1] = 0.0, INSTANT
     found = [reversals(intent, rows, counts, fraction)]
     if intent.kinks:
         owner = owners(counts)
         q = intent.joints(rows[owner], intent.guessed(real, rows[owner], fraction))
         found.append(crossed(intent, owner, fraction, q))
+    if not any(len(at) for _, at in found):
+        return counts, fraction
     sides = [(owner, np.clip(at + side, INSTANT, 1.0)) for owner, at in found for side in (-INSTANT / 2, INSTANT / 2)]
     return merged(len(rows), (owners(counts), fraction), *sides)
 
 
 def _follow(intent: Intent, rows: Index, commands: Array, strategy: Strategy) -> Array:
-    """How the tip follows commands (k, n_axes) of motions `rows`, (k, 3, n_axes) mm per mm and mm per rad.
+    """How the tip follows commands (k, n_axes) of motions `rows`, (k or 1, 3, n_axes) mm per mm and mm per rad.
 
-    With tool-centre-point control the tip stays where it is when only rotary commands change.
+    As seen from where is all the same to the size of a deviation. Where X, Y and Z turn together and nothing else is
+    corrected, that is from where they move, so that one is for all. With tool-centre-point control the tip stays where
+    it is when only rotary commands change.
     """
+    together = intent.machine.linear_ways
+    if together is not None and not strategy.corrects_orientation:
+        follow = np.zeros((1, 3, commands.shape[1]))
+        follow[0, :, intent.columns] = regular(together[None])[0][0].T
+        return follow
     follow = np.zeros((len(rows), 3, commands.shape[1]))
     follow[:, :, intent.columns] = intent.follows(rows, commands)
     plain = np.flatnonzero(~intent.moves.tcp[rows])

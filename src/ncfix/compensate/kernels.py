@@ -23,13 +23,14 @@ def deviation(fraction: Array, command: Array, follow: Array, a: int, b: int) ->
     """The largest deviation of the straight piece from node a to node b: as `Grid.deviations`."""
     most = 0.0
     for node in range(a + 1, b):
+        seen = node if len(follow) > 1 else 0
         share = (fraction[node] - fraction[a]) / (fraction[b] - fraction[a])
         square = 0.0
         for i in range(follow.shape[1]):
             off = 0.0
             for j in range(command.shape[1]):
                 here = command[a, j] + share * (command[b, j] - command[a, j])
-                off += follow[node, i, j] * (here - command[node, j])
+                off += follow[seen, i, j] * (here - command[node, j])
             square += off * off
         most = max(most, np.sqrt(square))
     return most

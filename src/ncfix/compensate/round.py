@@ -129,7 +129,8 @@ class RoundGrid:
         piece = owners(inner)
         node = first[piece] + places(inner)
         command = pieces.at(piece, share) - self.grid.command[node]
-        off: Array = np.einsum("kij,kj->ki", self.grid.follow[node], command)
+        follow = self.grid.follow
+        off: Array = np.einsum("kij,kj->ki", follow[node] if len(follow) > 1 else follow, command)
         return off
 
 

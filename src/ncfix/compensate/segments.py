@@ -69,8 +69,10 @@ class Segments:
     def _on_line(self, rows: Index, fraction: Array) -> Array:
         """The commands at fractions, each axis linear, (k, n_axes)."""
         axes = self.end.shape[1]
-        result: Array = spread(1 - fraction, axes) * picked(self.start, rows)
-        result += spread(fraction, axes) * picked(self.end, rows)
+        result, end = picked(self.start, rows), picked(self.end, rows)
+        result *= spread(1 - fraction, axes)
+        end *= spread(fraction, axes)
+        result += end
         return result
 
     def _on_arc(self, rows: Index, fraction: Array) -> Array:

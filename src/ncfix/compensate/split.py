@@ -48,7 +48,7 @@ class Grid:
     counts    (g,) nodes of each motion, its start and end included; at least 2
     fraction  (k,) ascending from 0 to 1 in each motion
     command   (k, n_axes) exactly corrected command; at the start where the machine really stands
-    follow    (k, 3, n_axes) how the tip follows the command there, mm per mm and mm per rad
+    follow    (k or 1, 3, n_axes) how the tip follows the command there, mm per mm and mm per rad
     """
 
     counts: Index
@@ -69,13 +69,14 @@ class Grid:
             start, way = (np.repeat(each, inner) for each in (command[first], command[last] - command[first]))
             short = start + share * way - command[node]
             for row, each in zip(off, follow, strict=True):
-                row += each[node] * short
+                if each.any():
+                    row += (each[node] if len(each) > 1 else each) * short
         square: Array = largest(off[0] * off[0] + off[1] * off[1] + off[2] * off[2], inner)
         return np.sqrt(square)
 
     @cached_property
     def _columns(self) -> list[tuple[Array, Array]]:
-        """Commands (k,) of the axes that the tip follows at all, and how it follows them (3, k)."""
+        """Commands (k,) of the axes that the tip follows at all, and how it follows them (3, k or 1)."""
         axes = np.flatnonzero(self.follow.any(axis=(0, 1))).tolist()
         return [(self.command[:, j].copy(), np.ascontiguousarray(self.follow[:, :, j].T)) for j in axes]
 
