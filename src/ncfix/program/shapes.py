@@ -102,7 +102,7 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
     starts, stops, last = comments_of(source)
     numeric = is_numeric(text)
     if len(starts):
-        numeric &= ~cover(len(text), starts, stops)
+        fill(numeric, np.stack((starts, stops), axis=1), False)
     numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, starts[last])] = starts[last]
@@ -179,8 +179,12 @@ def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np
 
 def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Start and stop of each comment, and whether it ends its block."""
-    text = source if b"(" in source or b";" in source else b""
-    found = [(*match.span(), match.start("last") >= 0) for match in COMMENT.finditer(text)]
+    text, found, done = np.frombuffer(source, dtype=np.uint8), [], 0
+    for at in np.flatnonzero((text == ord("(")) | (text == ord(";"))).tolist():
+        match = COMMENT.match(source, at) if at >= done else None
+        if match is not None:
+            done = match.end()
+            found.append((at, done, match.start("last") >= 0))
     columns = np.array(found, dtype=np.int64).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
 
@@ -207,7 +211,7 @@ def shape_keys(
     """
     keep = np.append(~cover(len(text), *numbers.T) if covered is None else ~covered, True)
     if len(comments):
-        keep[:-1] &= ~cover(len(text), *comments.T)
+        fill(keep, comments, False)
     marked = np.append(text, np.uint8(ord("\n")))
     for places, mark in ((numbers[:, 0], marks), (comments[:, 0], COMMENT_MARK), (blocks[:, 1], ord("\n"))):
         marked[places], keep[places] = mark, True
