@@ -47,7 +47,7 @@ def test_a_sign_belongs_to_the_number_unless_it_is_an_operator(text: bytes, expe
     assert [written for written, _ in numbers(text)] == expected
 
 
-@pytest.mark.parametrize("text", [b"1.2.3", b"..", b".", b"9" * 400])
+@pytest.mark.parametrize("text", [b"1.2.3", b"..", b".", b"9" * 400, b".2345678.2345678", b"1..2345678"])
 def test_what_is_no_number_is_marked(text: bytes) -> None:
     characters = np.frombuffer(text, dtype=np.uint8)
     assert find_numbers(characters, NUMERIC[characters], table(b"")).broken.tolist() == [True]

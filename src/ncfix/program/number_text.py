@@ -56,14 +56,15 @@ def styles_of(text: NDArray[np.uint8], spans: IntArray, *, signed: bool = False)
     signs = text[starts]
     first = starts + SIGN[signs]
     found = digits_of(text, np.stack((first, stops), axis=1), valued=False)
-    whole = stops - first - found.decimals - found.points
+    decimals = found.tail - found.pointed
+    whole = stops - first - found.tail
     return Styles(
-        decimals=found.decimals,
-        point=found.points > 0,
+        decimals=decimals,
+        point=found.pointed,
         plus=(signs == PLUS) | (signs == MINUS) if signed else signs == PLUS,
         leading_zero=whole > 0,
         width=np.where((whole > 1) & (text[first] == ZERO), whole, 0),
-        clear=found.pure & (found.points < 2) & (stops - first <= LONGEST) & (found.decimals <= MOST_DECIMALS),
+        clear=found.pure & ~found.several & (stops - first <= LONGEST) & (decimals <= MOST_DECIMALS),
     )
 
 

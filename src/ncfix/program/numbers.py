@@ -7,6 +7,7 @@ reader compares the two for every shape, and goes by the grammar where they diff
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,16 +58,21 @@ def find_numbers(text: NDArray[np.uint8], numeric: NDArray[np.bool_], fixed: NDA
     numeric  (n,) the bytes that may belong to a number
     fixed    (256,) a run after one of these characters is no number but belongs to the shape
     """
-    runs = runs_of(numeric)
-    at = last_before(text, runs[:, 0])
-    free = ~fixed[at.characters]
-    covered = numeric.copy()
-    fill(covered, runs[~free], False)
-    rows = np.flatnonzero(free)
-    runs, at = runs.take(rows, axis=0), Before(at.places[rows], at.characters[rows])
+    runs, covered = runs_of(numeric), numeric.copy()
+    heeded = np.flatnonzero((fixed | SIGN | BLANK).take(text.take(runs[:, 0] - 1)))
+    at = last_before(text, runs[heeded, 0])
+    named, signed = fixed[at.characters], SIGN[at.characters]
+    fill(covered, runs[heeded[named]], False)
+    free = np.ones(len(runs), dtype=np.bool_)
+    free[heeded[named]] = False
+    runs = runs.take(np.flatnonzero(free), axis=0)
     values, broken = convert(text, runs)
-    negative = with_sign(text, runs, at, covered)
-    values[negative] *= -1
+    rows, signs = (heeded - np.cumsum(named))[signed], at.places[signed]
+    own = np.flatnonzero(~UNSIGNED_AFTER[last_before(text, signs).characters])
+    rows, signs = rows[own], signs[own]
+    fill(covered, np.stack((signs, runs[rows, 0]), axis=1), True)
+    runs[rows, 0] = signs
+    values[rows[text[signs] == ord("-")]] *= -1
     return Numbers(runs, values, broken, covered)
 
 
@@ -76,14 +82,23 @@ def is_numeric(text: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return numeric
 
 
-def fill(mask: NDArray[np.bool_], spans: NDArray[np.int64], value: bool) -> None:
-    """Set a mask over short stretches of it."""
-    starts, lengths, place = spans[:, 0], spans[:, 1] - spans[:, 0], 0
-    while len(starts):
-        further = lengths > place
-        starts, lengths = starts[further], lengths[further]
-        mask[starts + place] = value
-        place += 1
+SHORT = 64
+"""Stretches up to this long are filled all at once, place by place; the rest of longer ones one by one."""
+
+
+def fill(cells: NDArray[Any], spans: NDArray[np.int64], value: int) -> None:
+    """Set cells over stretches of them, most of which are short."""
+    starts, stops = spans[:, 0].copy(), spans[:, 1]
+    for _ in range(SHORT):
+        rows = np.flatnonzero(stops > starts)
+        if not len(rows):
+            return
+        if len(rows) < len(starts):
+            starts, stops = starts.take(rows), stops.take(rows)
+        cells[starts] = value
+        starts += 1
+    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
+        cells[start:stop] = value
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,20 +130,6 @@ def runs_of(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.flatnonzero(framed[1:] != framed[:-1]).reshape(-1, 2)
 
 
-def with_sign(
-    text: NDArray[np.uint8], runs: NDArray[np.int64], at: Before, covered: NDArray[np.bool_]
-) -> NDArray[np.int64]:
-    """Put the sign that stands before a run into it, if it belongs to it, and mark it; the runs that are negative."""
-    rows = np.flatnonzero(SIGN[at.characters])
-    further = last_before(text, at.places[rows]).characters
-    rows = rows[~UNSIGNED_AFTER[further]]
-    signs = at.places[rows]
-    fill(covered, np.stack((signs, runs[rows, 0]), axis=1), True)
-    runs[rows, 0] = signs
-    negative: NDArray[np.int64] = rows[text[signs] == ord("-")]
-    return negative
-
-
 EIGHT = 8
 """Bytes that are converted at once, as one whole number; the last ones of a run are its highest."""
 
@@ -136,10 +137,11 @@ EIGHT = 8
 def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The values of runs of digits and points, exactly rounded; and which are malformed."""
     found = digits_of(text, runs)
-    digits = runs[:, 1] - runs[:, 0] - found.points
-    values = found.value / POWERS[found.decimals]
+    values = found.value.astype(np.float64)
+    values /= POWERS.take(found.tail)
     broken = np.zeros(len(runs), dtype=np.bool_)
-    for row in np.flatnonzero((found.points > 1) | (digits == 0) | (digits > EXACT_DIGITS)):
+    lengths = runs[:, 1] - runs[:, 0]
+    for row in np.flatnonzero(found.several | (lengths == found.pointed) | (lengths > EXACT_DIGITS)):
         try:
             values[row] = float(text[slice(*runs[row])].tobytes())
         except ValueError:
@@ -149,20 +151,29 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
 
 
 def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64], *, valued: bool = True) -> Digits:
-    """What stands in runs of digits and points; of long ones in their last sixteen bytes. Values only if `valued`."""
-    stops, lengths = runs[:, 1], runs[:, 1] - runs[:, 0]
-    padded = np.concatenate((np.zeros(2 * EIGHT, dtype=np.uint8), text))
-    words = np.ndarray(len(text) + EIGHT + 1, dtype="<u8", buffer=padded.data, strides=(1,))
-    found = Digits.of(words[stops + EIGHT], np.minimum(lengths, EIGHT), valued)
+    """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
+    stops, lengths = np.ascontiguousarray(runs[:, 1]), runs[:, 1] - runs[:, 0]
+    padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
+    padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
+    lanes = padded.view("<u8")
+    found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
     long = np.flatnonzero(lengths > EIGHT)
     if len(long):
-        front = Digits.of(words[stops[long]], np.minimum(lengths[long] - EIGHT, EIGHT), valued)
-        if valued:
-            found.value[long] += front.value * 10 ** (EIGHT - found.points[long])
-        found.decimals[long] += np.where(front.points > 0, front.decimals + EIGHT, 0)
-        found.points[long] += front.points
-        found.pure[long] &= front.pure
+        found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - EIGHT, valued))
     return found
+
+
+def eight_at(lanes: NDArray[np.uint64], places: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Eight bytes from each of some places on, as one number; `lanes` has them at every eighth place."""
+    lane, over = places >> 3, (places & 7).view(np.uint64)
+    over <<= np.uint64(3)
+    low = lanes.take(lane)
+    low >>= over
+    lane += 1
+    high = lanes.take(lane)
+    high <<= np.subtract(np.uint64(8 * EIGHT), over, out=over)  # by 64 leaves nothing
+    low |= high
+    return low
 
 
 def repeated(byte: int) -> np.uint64:
@@ -181,39 +192,82 @@ POWERS = 10.0 ** np.arange(23)
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """Up to sixteen characters each: their digits as a whole number, those behind the point, points, nothing else."""
+    """Up to sixteen characters each, columns.
+
+    value    their digits as a whole number, ten times as large where there is a point; 0 if not asked for
+    tail     how many characters stand from the point on, 0 without one: the value is in units of 10^-tail
+    pointed  there is a point; `several`: there are more
+    pure     there is nothing but digits and points; True where the value was asked for
+    """
 
     value: NDArray[np.int64]
-    decimals: NDArray[np.int64]
-    points: NDArray[np.int64]
+    tail: NDArray[np.int64]
+    pointed: NDArray[np.bool_]
+    several: NDArray[np.bool_]
     pure: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64], valued: bool = True) -> Digits:
+    def of(cls, words: NDArray[np.uint64], lengths: NDArray[np.int64], valued: bool) -> Digits:
         """Of the last `lengths` bytes of words in which the first character is the lowest byte.
 
-        Eight digits are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits",
-        2018). A point shows as the only zero byte when its code is taken from all bytes; the characters before it move
-        up by one.
+        A point shows as the only zero byte when its code is taken from all bytes. `valued`: the words are known to be
+        digits and points, and their value is wanted; else it is looked what they are.
         """
-        own = OWN[lengths]
-        words = words & own
+        own = OWN.take(lengths, mode="clip")
+        words &= own
         rest = words ^ POINTS
-        points = (rest - ONES) & ~rest & TOPS
-        digits = words ^ ZEROS
-        others = (((digits & ~TOPS) + ABOVE) | digits) & TOPS
-        pure = others == points | (TOPS & ~own)
-        point, pointed = points >> np.uint64(7), points != 0
-        value = np.zeros_like(words)
-        if valued:
-            behind = ~((point << np.uint64(8)) - np.uint64(1))
-            words = np.where(pointed, words & behind | (words & (point - np.uint64(1))) << np.uint64(8), words)
-            value = words & FOURS
-            for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
-                value *= np.uint64((weight << bits) + 1)
-                value >>= np.uint64(bits)
-                value &= np.uint64(MASKS[bits])
-        power = point.astype(np.float64).view(np.int64) >> 52
-        decimals = np.where(pointed, EIGHT - 1 - (power - 1023 >> 3), 0)
-        several = (points & (points - np.uint64(1))) != 0
-        return cls(value.view(np.int64), decimals, pointed + several.astype(np.int64), pure)
+        points = rest - ONES
+        points &= np.invert(rest, out=rest)
+        points &= TOPS
+        below = points - np.uint64(1)
+        tail = points.astype(np.float64).view(np.int64)
+        tail >>= 52
+        np.subtract(1023 + 8 * EIGHT + 7, tail, out=tail)
+        tail >>= 3
+        pointed = points != 0
+        tail *= pointed
+        several = (points & below) != 0
+        pure = np.ones(len(words), dtype=np.bool_) if valued else others(words, own) == points
+        value = whole(words, points, below) if valued else words
+        return cls(value.view(np.int64), tail, pointed, several, pure)
+
+    def put_before(self, rows: NDArray[np.int64], front: Digits) -> None:
+        """Put eight characters before those of some rows."""
+        again = front.pointed & self.pointed[rows]
+        first = front.pointed & ~again
+        self.value[rows] *= np.where(first, 10, 1)
+        self.value[rows] += front.value * 10**EIGHT
+        self.tail[rows] += np.where(first, front.tail + EIGHT, 0)
+        self.several[rows] |= front.several | again
+        self.pointed[rows] |= front.pointed
+        self.pure[rows] &= front.pure
+
+
+def others(words: NDArray[np.uint64], own: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The top bit of each byte of words, among those that are their `own`, that is no digit."""
+    digits = words ^ ZEROS
+    return (((digits & ~TOPS) + ABOVE) | digits) & TOPS & own
+
+
+def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The digits of words as whole numbers, those behind the point moved down onto it, and a zero behind them.
+
+    points  the top bit of the byte that is a point, 0 without one; one less is `below`. Both are lost.
+
+    Eight digits are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits", 2018).
+    """
+    points += below
+    behind = np.invert(points, out=points)
+    behind &= words
+    behind >>= np.uint64(8)
+    before = below.view(np.int64)
+    before >>= 7
+    value = below
+    value &= words
+    value |= behind
+    value &= FOURS
+    for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
+        value *= np.uint64((weight << bits) + 1)
+        value >>= np.uint64(bits)
+        value &= np.uint64(MASKS[bits])
+    return value

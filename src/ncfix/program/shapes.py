@@ -7,7 +7,9 @@ language: it only says where numbers would be. Whether they are is checked once 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
@@ -34,8 +36,8 @@ COMMENT_MARK = 2
 POINTLESS_MARK = 3
 """Of a number without a decimal point, in languages where it means something else than one with."""
 
-ODD = table(bytes([NUMBER_MARK, COMMENT_MARK, POINTLESS_MARK]) + b"\r")
-"""What a block may not hold to have a shape: the marks themselves, and carriage returns, where a comment might end."""
+ODD = table(bytes([0, NUMBER_MARK, COMMENT_MARK, POINTLESS_MARK]) + b"\r")
+"""What a block may not hold to have a shape: zero and the marks, and carriage returns, where a comment might end."""
 
 FIXED = table(b"GgMmOo")
 """A number after these belongs to the shape: what it selects has a meaning of its own."""
@@ -101,8 +103,7 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
             return found
     starts, stops, last = comments_of(source)
     numeric = is_numeric(text)
-    if len(starts):
-        fill(numeric, np.stack((starts, stops), axis=1), False)
+    fill(numeric, np.stack((starts, stops), axis=1), False)
     numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, starts[last])] = starts[last]
@@ -160,7 +161,7 @@ def scan_compiled(
 
 def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
     """The blocks that hold an `ODD` byte."""
-    suspicious = np.flatnonzero(text <= ord("\r"))
+    suspicious = np.flatnonzero((text <= ord("\r")) & (text != ord("\n")))
     places = suspicious[ODD[text[suspicious]]]
     owner = block_of(blocks, places)
     return list(map(int, owner[places < blocks[owner, 1]]))
@@ -179,22 +180,21 @@ def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np
 
 def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Start and stop of each comment, and whether it ends its block."""
-    text, found, done = np.frombuffer(source, dtype=np.uint8), [], 0
-    for at in np.flatnonzero((text == ord("(")) | (text == ord(";"))).tolist():
-        match = COMMENT.match(source, at) if at >= done else None
-        if match is not None:
-            done = match.end()
-            found.append((at, done, match.start("last") >= 0))
+    found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
     columns = np.array(found, dtype=np.int64).reshape(-1, 3)
     return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
 
 
-def cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
-    change = np.zeros(size + 1, dtype=np.int8)
-    change[starts] += 1
-    change[stops] -= 1
-    return np.cumsum(change[:-1], dtype=np.int8).astype(np.bool_)
+def matches(pattern: re.Pattern[bytes], source: bytes, heads: bytes) -> Iterator[re.Match[bytes]]:
+    """As `pattern.finditer`, if all it may find begins with one of a few characters: sought where these are alone."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    begins = reduce(np.logical_or, [text == head for head in heads if head in source] or [np.empty(0, np.bool_)])
+    done = 0
+    for place in np.flatnonzero(begins).tolist():
+        found = pattern.match(source, place) if place >= done else None
+        if found:
+            done = found.end()
+            yield found
 
 
 def shape_keys(
@@ -203,20 +203,19 @@ def shape_keys(
     numbers: NDArray[np.int64],
     comments: NDArray[np.int64],
     marks: NDArray[np.uint8],
-    covered: NDArray[np.bool_] | None = None,
+    covered: NDArray[np.bool_],
 ) -> list[bytes | None]:
     """The key of each block: its bytes, with one mark for each number and for the comment at its end.
 
-    covered  (n,) the bytes that belong to numbers, if they are known already
+    covered  (n,) the bytes that belong to numbers
     """
-    keep = np.append(~cover(len(text), *numbers.T) if covered is None else ~covered, True)
-    if len(comments):
-        fill(keep, comments, False)
-    marked = np.append(text, np.uint8(ord("\n")))
+    marked = np.empty(len(text) + 1, dtype=np.uint8)
+    np.bitwise_and(text, covered.view(np.uint8) - np.uint8(1), out=marked[:-1])  # zero is what goes
+    fill(marked, comments, 0)
     for places, mark in ((numbers[:, 0], marks), (comments[:, 0], COMMENT_MARK), (blocks[:, 1], ord("\n"))):
-        marked[places], keep[places] = mark, True
-    fill(keep, np.stack((np.append(0, blocks[:, 1] + 1), np.append(blocks[:, 0], len(text) + 1)), axis=1), False)
-    return list(marked[keep].tobytes().split(b"\n")[: len(blocks)])
+        marked[places] = mark
+    fill(marked, np.stack((np.append(0, blocks[:, 1] + 1), np.append(blocks[:, 0], len(text) + 1)), axis=1), 0)
+    return list(marked.tobytes().translate(None, b"\0").split(b"\n")[: len(blocks)])
 
 
 def without_point(text: NDArray[np.uint8], numbers: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.numbers import find_numbers, is_numeric, table
+from ncfix.program.numbers import fill, find_numbers, is_numeric, table
 from ncfix.program.shapes import (
     NUMBER_MARK,
     ODD,
     Scan,
     block_of,
-    cover,
     first_numbers,
     odd_blocks,
     scan_compiled,
@@ -81,12 +80,10 @@ def in_halves(source: bytes, blocks: NDArray[np.int64]) -> Scan:
 
 def scan_plain(source: bytes, text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> Scan:
     """As `scan`, with numpy alone; `text` has points for commas."""
-    found = COMMENT.finditer(source) if b";" in source else ()
-    comments = np.array([match.span() for match in found], dtype=np.int64).reshape(-1, 2)
+    comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
     numeric = is_numeric(text)
-    if len(comments):
-        numeric &= ~cover(len(text), comments[:, 0], comments[:, 1])
+    fill(numeric, comments, False)
     numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]

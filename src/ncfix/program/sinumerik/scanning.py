@@ -11,8 +11,8 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.numbers import find_numbers, is_numeric, runs_of, table
-from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, cover, first_numbers, odd_blocks, shape_keys
+from ncfix.program.numbers import fill, find_numbers, is_numeric, runs_of, table
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, first_numbers, matches, odd_blocks, shape_keys
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -32,14 +32,13 @@ PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block."""
     text = np.frombuffer(source, dtype=np.uint8)
-    passive = list(PASSIVE.finditer(source)) if b";" in source or b'"' in source else []
+    passive = list(matches(PASSIVE, source, b';"'))
     quiet = np.array([match.span() for match in passive], dtype=np.int64).reshape(-1, 2)
     final = [match.span() for match in passive if match["comment"] is not None]
     comments = np.array(final, dtype=np.int64).reshape(-1, 2)
     numeric = is_numeric(text)
     numeric &= ~in_names(text, source)
-    if len(quiet):
-        numeric &= ~cover(len(text), quiet[:, 0], quiet[:, 1])
+    fill(numeric, quiet, False)
     numbers = find_numbers(text, numeric, FIXED)
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
@@ -58,7 +57,8 @@ def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
     words = runs_of(NAMES[text])
     start = words[:, 0]
     second = text[np.minimum(start + 1, len(text) - 1)]
-    named = cover(len(text), *words[LETTER[text[start]] & LETTER[second]].T)
+    named = np.zeros(len(text), dtype=np.bool_)
+    fill(named, words[LETTER[text[start]] & LETTER[second]], True)
     for place in np.flatnonzero(text == ord("=")).tolist():
         named[slice(*extension(source, place))] = True
     return named
