@@ -140,8 +140,8 @@ class Library:
         from numba import njit, types
         from numba.extending import register_jitable
 
-        for function in (*self.parts, *self.helpers):
-            register_jitable(function)
+        for function in (*self.parts, *self.helpers):  # to hand arrays over to one takes longer than most of them do
+            register_jitable(forceinline=True)(function)
         llvm = binding()
         module = llvm.parse_assembly("")
         for kernel in self.kernels:

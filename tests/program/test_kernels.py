@@ -79,10 +79,8 @@ def test_the_corpus(shared: Callable[[str], Path]) -> None:
             assert_same(source)
 
 
-def test_a_shape_that_shares_a_hash_is_seen() -> None:
-    from ncfix.program import kernels
-
-    shapes, starts = np.frombuffer(b"G1 XG1 Y", np.uint8), np.array([0, 4, 8])
-    table = np.array([0, -1, -1, -1])
-    assert kernels.entry(table, np.uint64(0), shapes, 0, 4, starts) == 0
-    assert kernels.entry(table, np.uint64(0), shapes, 4, 8, starts) == 1
+def test_shapes_that_begin_alike_are_told_apart() -> None:
+    lines = [
+        head + tail for head in ("G1 X", "G1 X1 Y", "G1", "G1 X-", "G1 X+ ") for tail in ("", "2", " Z3", "-4.", "#")
+    ]
+    assert_same("\n".join([*lines, *lines[::-1], *lines, "M2", ""]).encode("latin-1"))

@@ -15,14 +15,13 @@ from ncfix.program.number_kernels import word_at
 Bytes = NDArray[np.uint8]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+Rows = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 Tables = tuple[Bytes, Mask, Mask, Mask]
 
 LIBRARY = Library(__file__, (word_at,))
 
 POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
-OFFSET, PRIME = np.uint64(14695981039346656037), np.uint64(1099511628211)
-"""Of the hash FNV-1a."""
 UNTOUCHED = -1
 """Instead of the number of shapes: there is a block that must be taken as it is."""
 NONE, BROKEN = -1, -2
@@ -30,6 +29,10 @@ FREE, FIXED = 1, 2
 """A number, and one that belongs to the shape."""
 LITERAL, NUMERIC, SIGN, COMMENT, ODD = range(5)
 """Kinds of bytes: of the shape as they are, of a number, a sign, the beginning of a comment, or not to be scanned."""
+CHARACTER, CHILD, SIBLING, SHAPE = range(4)
+"""Columns of the tree of shapes, a row for each beginning of one: its last character, the first of the rows that go on
+from it (0: none), the next row that goes on from where this one does, and the number of the shape that ends there (-1:
+none does). Row 0 is the beginning of all."""
 
 
 @LIBRARY.helper
@@ -91,36 +94,6 @@ def is_last(text: Bytes, place: int, stop: int, blank: Mask) -> bool:
 
 
 @LIBRARY.helper
-def entry(table: Ints, code: np.uint64, shapes: Bytes, begin: int, end: int, starts: Ints) -> np.int64:
-    """Where in a table of hashes the shape from `begin` to `end` is, or is to be entered (-1 stands there)."""
-    mask = len(table) - 1
-    at = np.int64(code & np.uint64(mask))
-    while table[at] >= 0:
-        first, k = starts[table[at]], 0
-        same = starts[table[at] + 1] - first == end - begin
-        while same and begin + k < end:
-            same = shapes[first + k] == shapes[begin + k]
-            k += 1
-        if same:
-            break
-        at = (at + 1) & mask
-    return at
-
-
-@LIBRARY.helper
-def numbered(
-    table: Ints, code: np.uint64, shapes: Bytes, span: tuple[int, int], starts: Ints, known: int
-) -> tuple[int, int]:
-    """The number of the shape at a span, a new one if it is not known yet; and how many are known."""
-    slot = entry(table, code, shapes, span[0], span[1], starts)
-    if table[slot] < 0:
-        table[slot] = known
-        known += 1
-        starts[known] = span[1]
-    return table[slot], known
-
-
-@LIBRARY.helper
 def number_from(
     text: Bytes, place: int, stop: int, tables: Tables, most: tuple[int, int], powers: Floats
 ) -> tuple[int, int, int, bool, float]:
@@ -143,58 +116,18 @@ def number_from(
 
 
 @LIBRARY.helper
-def spelled(
-    shapes: Bytes, end: int, code: np.uint64, text: Bytes, place: int, past: int, character: np.uint8
-) -> tuple[int, np.uint64]:
-    """Add a character to a shape, and those behind its place up to `past`; where the shape ends then, and its hash."""
-    while True:
-        shapes[end] = character
-        code = (code ^ np.uint64(character)) * PRIME
-        place, end = place + 1, end + 1
-        if place >= past:
-            return end, code
-        character = text[place]
-
-
-@LIBRARY.helper
-def in_shape(
-    text: Bytes,
-    span: tuple[int, int],
-    shape: Bytes,
-    tables: Tables,
-    most: tuple[int, int],
-    marks: tuple[int, int, int],
-    powers: Floats,
-    numbers: tuple[Ints, Floats],
-    count: int,
-) -> int:
-    """Put down the numbers of a block that has a certain shape; how many there are then, `NONE` if it has not.
-
-    Nor where that takes a look at more than one character after the other: at a comment, or at a run of digits that
-    belongs to the shape in part.
-    """
-    (kinds, _, _, _), (spans, values), (place, stop) = tables, numbers, span
-    before_number = LITERAL
-    for mark in shape:
-        if place >= stop:
-            return NONE
-        character = text[np.uint64(place)]
-        kind = kinds[character]
-        if mark == marks[0] or mark == marks[1]:
-            at = place + (kind == SIGN)
-            if before_number == NUMERIC or at >= stop or kinds[text[np.uint64(at)]] != NUMERIC:
-                return NONE
-            form, start, past, pointed, value = number_from(text, at, stop, tables, most, powers)
-            if form != FREE or start != place or mark != (marks[0] if pointed else marks[1]):
-                return NONE
-            row = np.uint64(count)
-            spans[row, 0], spans[row, 1], values[row] = start, past, value
-            count, place, before_number = count + 1, past, NUMERIC
-        elif character == mark and kind < COMMENT:
-            place, before_number = place + 1, kind
-        else:
-            return NONE
-    return count if place == stop else NONE
+def led(tree: Rows, row: int, character: int, size: int) -> tuple[int, int]:
+    """The row of a tree of shapes to which a character leads from another; a new one if none does. And their number."""
+    at = np.int64(tree[np.uint64(row), CHILD])
+    while at and tree[np.uint64(at), CHARACTER] != character:
+        at = np.int64(tree[np.uint64(at), SIBLING])
+    if at:
+        return at, size
+    new = np.uint64(size)
+    tree[new, CHARACTER], tree[new, CHILD], tree[new, SHAPE] = character, 0, NONE
+    tree[new, SIBLING] = tree[np.uint64(row), CHILD]
+    tree[np.uint64(row), CHILD] = size
+    return size, size + 1
 
 
 @LIBRARY.kernel(
@@ -206,7 +139,7 @@ def in_shape(
     "f8[:]",
     ("i8[:]", "i8[:]", "i8[:]"),
     ("i8[:,:]", "f8[:]"),
-    ("u1[:]", "i8[:]", "i8[:]"),
+    ("u1[:]", "i8[:]", "i4[:,:]"),
 )
 def scan(
     text: Bytes,
@@ -217,7 +150,7 @@ def scan(
     powers: Floats,
     columns: tuple[Ints, Ints, Ints],
     numbers: tuple[Ints, Floats],
-    found: tuple[Bytes, Ints, Ints],
+    found: tuple[Bytes, Ints, Rows],
 ) -> int:
     """Scan the n blocks of a text; how many shapes there are, or `UNTOUCHED`.
 
@@ -230,32 +163,26 @@ def scan(
 
     columns  which shape each block has, where its last comment begins (-1: it has none), and (n + 1,) its first number
     numbers  spans and values
-    found    the shapes one after the other, where each begins, and a table of hashes, all -1, whose size is a power of
-             two
+    found    the shapes one after the other, where each begins, and their tree, see `CHARACTER`
     """
     (kinds, _, _, blank), (number_mark, pointless_mark, comment_mark) = tables, marks
-    (group, comment, first), (spans, values), (shapes, starts, table) = columns, numbers, found
-    n, count, known, end, starts[0] = len(blocks), 0, 0, 0, 0
-    for block in range(n):
-        first[block], begin, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
-        if block:
-            likely = group[block - 1]
-            shape = shapes[starts[likely] : starts[likely + 1]]
-            done = in_shape(text, (place, stop), shape, tables, most, marks, powers, numbers, count)
-            if done >= 0:
-                group[block], count = likely, done
-                continue
-        end, code, code_at_sign, end_at_sign = begin, OFFSET, OFFSET, begin
+    (group, comment, first), (spans, values), (shapes, starts, tree) = columns, numbers, found
+    count, known, size, starts[0] = 0, 0, 1, 0
+    tree[0, CHILD], tree[0, SHAPE] = 0, NONE
+    for block in range(len(blocks)):
+        first[block], end, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
+        row, row_at_sign, end_at_sign = 0, 0, end
         while place < stop:
-            character, past = text[place], place + 1
+            character, past = text[np.uint64(place)], place + 1
             kind = kinds[character]
             if kind == NUMERIC:
                 form, start, past, pointed, value = number_from(text, place, stop, tables, most, powers)
                 kind = ODD if form == BROKEN else kind
                 if form == FREE:
                     if start < place:
-                        code, end = code_at_sign, end_at_sign
-                    spans[count, 0], spans[count, 1], values[count] = start, past, value
+                        row, end = row_at_sign, end_at_sign
+                    at = np.uint64(count)
+                    spans[at, 0], spans[at, 1], values[at] = start, past, value
                     count += 1
                     place, character = past - 1, np.uint8(number_mark if pointed else pointless_mark)
             elif kind == COMMENT:
@@ -265,13 +192,22 @@ def scan(
                     comment[block], place, character = place, close - 1, np.uint8(comment_mark)
                 kind = ODD if close == BROKEN else kind
             elif kind == SIGN:
-                code_at_sign, end_at_sign = code, end
+                row_at_sign, end_at_sign = row, end
             if kind == ODD:
                 return UNTOUCHED
-            end, code = spelled(shapes, end, code, text, place, past, character)
-            place = max(past, place + 1)
-        group[block], known = numbered(table, code, shapes, (begin, end), starts, known)
-    first[n] = count
+            while True:
+                row, size = led(tree, row, character, size)
+                shapes[np.uint64(end)] = character
+                place, end = place + 1, end + 1
+                if place >= past:
+                    break
+                character = text[np.uint64(place)]
+        if tree[np.uint64(row), SHAPE] < 0:
+            tree[np.uint64(row), SHAPE] = known
+            known += 1
+            starts[known] = end
+        group[block] = tree[np.uint64(row), SHAPE]
+    first[len(blocks)] = count
     return known
 
 

@@ -150,7 +150,7 @@ def scan_compiled(
         POWERS,
         (group, comment, first),
         (spans, values),
-        (shapes, starts, np.full(1 << (2 * n).bit_length(), -1)),
+        (shapes, starts, np.empty((len(text) + 1, 4), np.int32)),
     )
     if known == kernels.UNTOUCHED:
         return None
