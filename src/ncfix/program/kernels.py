@@ -118,9 +118,9 @@ def number_from(
 @LIBRARY.helper
 def led(tree: Rows, row: int, character: int, size: int) -> tuple[int, int]:
     """The row of a tree of shapes to which a character leads from another; a new one if none does. And their number."""
-    at = np.int64(tree[np.uint64(row), CHILD])
+    at = int(tree[np.uint64(row), CHILD])
     while at and tree[np.uint64(at), CHARACTER] != character:
-        at = np.int64(tree[np.uint64(at), SIBLING])
+        at = int(tree[np.uint64(at), SIBLING])
     if at:
         return at, size
     new = np.uint64(size)
