@@ -170,7 +170,7 @@ def test_a_writer_that_gets_a_character_wrong_is_caught(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Displacements to the last bit, bounds but for rounding."""
+    """The same is said of limits, and bounds agree but for rounding."""
     pytest.importorskip("numba", reason="the `fast` extra is not installed")
     monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
     planner = Planner.of(machine, OPTIONS)
@@ -178,24 +178,23 @@ def test_compiled_as_by_columns(seed: int, machine: Machine, monkeypatch: pytest
     rng = np.random.default_rng(seed)
     course = course_of(winding(seed, 300), machine, monkeypatch)
     moves, lengths = course.part.moves, course.intent.lengths(np.arange(1))
-    shift = np.zeros((len(moves) + 1, len(machine.axes)))
-    shift[:, ~machine.rotary] = rng.uniform(-0.01, 0.01, (len(moves) + 1, 3))
-    plain = planner._displaced(moves, shift), planner._bounds(course.real, shift, lengths)
+    meant = np.concatenate([moves.start[:1], moves.end])
+    done = meant.copy()
+    done[:, ~machine.rotary] += rng.uniform(-0.01, 0.01, (len(meant), 3))
+    plain = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
     assert fast.engage()
     try:
-        found = planner._displaced(moves, shift), planner._bounds(course.real, shift, lengths)
-        assert plain[0] is not None
-        assert found[0] is not None
-        for mine, theirs in zip(found[0], plain[0], strict=True):
-            assert np.array_equal(mine, theirs)
+        found = planner._within_limits(meant, done), planner._bounds(meant, done, lengths)
+        assert plain[0]
+        assert found[0]
         assert found[1] == pytest.approx(plain[1], rel=1e-12)
         x, b = machine.axis_names.index("X"), machine.axis_names.index("B")
         for row, axis, much in ((1, x, 0.06), (2, b, 1.0), (3, x, np.nan)):
-            wrong = shift.copy()
+            wrong = done.copy()
             wrong[row, axis] += much
-            assert planner._displaced(moves, wrong) is None
+            assert not planner._within_limits(meant, wrong)
             fast.disengage()
-            assert planner._displaced(moves, wrong) is None
+            assert not planner._within_limits(meant, wrong)
             assert fast.engage()
     finally:
         fast.disengage()

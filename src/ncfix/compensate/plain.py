@@ -27,7 +27,7 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.others import Others, planned
 from ncfix.compensate.path import Demands, in_pieces
 from ncfix.compensate.ragged import distinct, offsets, owners, places
-from ncfix.compensate.rows import farthest, lengths, picked, some
+from ncfix.compensate.rows import extent, lengths, picked, some
 from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import Settled, rounding
@@ -51,11 +51,10 @@ class Course:
     part    its text and motions
     plain   (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
     intent  the motions on the machine
-    real    where they really start and end, before rounding
+    real    where they really start and end, before rounding: there the tip is where it should be, to 1 nm
     pieces  what is to be written
     first   (n + 1,) the first piece of each motion, and how many there are
-    wanted  (n, n_axes) commands at which the tip is where it should be, to 1 nm
-    before  (n,) mm: how far off it is there without a correction
+    before  (n,) mm: how far off it is at their ends without a correction
     """
 
     part: Part
@@ -64,7 +63,6 @@ class Course:
     real: Segments
     pieces: Pieces
     first: Index
-    wanted: Array
     before: Array
 
     @property
@@ -120,11 +118,7 @@ class Planner:
             return None
         q = np.concatenate([unit.head.moves.end, moves.end])
         found = self.strategy.solve(self.machine, q, State(float(moves.tool_length[0])))
-        if found.before is None or not found.converged.all():
-            return None
-        shift = found.q - q
-        ends = self._displaced(moves, shift)
-        if ends is None:
+        if found.before is None or not found.converged.all() or not self._within_limits(q, found.q):
             return None
         intent, others, alone = Intent(self.machine, moves, State()), None, plain
         if not plain.all():
@@ -133,29 +127,27 @@ class Planner:
                 return None
             alone = plain.copy()
             alone[others.rows] = False
-        real = replace(intent.segments, start=ends[0], end=ends[1])
-        over, parts = self._split(intent, real, shift, alone)
+        real = replace(intent.segments, start=found.q[:-1], end=found.q[1:])
+        over, parts = self._split(intent, real, (q, found.q), alone)
         if over.size and parts is None:
             return None
         pieces, first = pieces_of(real, over, parts, others)
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
             pieces = on_digits(self.machine, moves, pieces, inner)
-            if not self._fine_inside(intent, pieces, inner, shift):
+            if not self._fine_inside(intent, pieces, inner, found.q - q):
                 return None
-        return Course(part, plain, intent, real, pieces, first, found.q[1:], found.before[1:])
+        return Course(part, plain, intent, real, pieces, first, found.before[1:])
 
-    def followed(self, moves: Moves) -> Mask:
-        """(n,) motions that are looked at along their way."""
-        moving = some(np.abs(moves.end - moves.start) >= REST)
-        return moving if self.demands.split_rapids else moving & (moves.kind == Kind.FEED)
-
-    def _split(self, intent: Intent, real: Segments, shift: Array, among: Mask) -> tuple[Index, Split | None]:
+    def _split(
+        self, intent: Intent, real: Segments, poses: tuple[Array, Array], among: Mask
+    ) -> tuple[Index, Split | None]:
         """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way."""
         moves, limit = intent.moves, self.demands.budget.path
-        bound = self._bounds(real, shift, intent.lengths(np.arange(1)))
+        bound = self._bounds(*poses, intent.lengths(np.arange(1)))
         bound[passed(intent, real.start, real.end)[0]] = np.inf
-        rows = np.flatnonzero(~(bound <= SURE * limit) & self.followed(moves) & among)
+        rows = np.flatnonzero(~(bound <= SURE * limit) & among)
+        rows = rows[self._followed(moves, rows)]
         if not rows.size:
             return rows, None
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
@@ -166,42 +158,47 @@ class Planner:
         parts = in_pieces(intent, real, rows, worst[over], self.strategy, self.demands)
         return rows, parts if np.isfinite(parts.worst).all() else None
 
-    def _bounds(self, real: Segments, shift: Array, tool_length: Array) -> Array:
-        """What the deviation of the tip does not exceed along each motion, (n,) mm."""
+    def _followed(self, moves: Moves, rows: Index) -> Mask:
+        """Which of motions `rows` (k,) are looked at along their way."""
+        moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
+        return moving if self.demands.split_rapids else moving & (moves.kind[rows] == Kind.FEED)
+
+    def _bounds(self, meant: Array, done: Array, tool_length: Array) -> Array:
+        """What the deviation of the tip does not exceed along motions from pose to pose, (n,) mm.
+
+        meant, done  (n + 1, n_axes) poses as programmed and as corrected
+        """
         bow, linear = self.machine.bow, ~self.machine.rotary
         assert bow is not None
         if not fast.engaged():
-            return straight_bounds(
-                bow, real.start, real.end, (shift[:-1, linear], shift[1:, linear]), tool_length, linear
-            )
+            shift = (done - meant)[:, linear]
+            return straight_bounds(bow, done[:-1], done[1:], (shift[:-1], shift[1:]), tool_length, linear)
         from ncfix.compensate import plain_kernels
 
-        most_far = np.maximum(farthest(real.start), farthest(real.end))
-        constants = bow.shift, bow.turn, bow.arm(most_far, float(tool_length), ~linear), MORE, CORNER
-        bound = np.empty(len(real))
-        bends = bow.slopes, bow.curvatures
-        plain_kernels.bounds(real.start, real.end, shift, linear, bends, constants, CLOSE, bound)
+        constants = bow.shift, bow.turn, bow.arm(np.zeros(len(linear)), float(tool_length), ~linear), MORE, CORNER
+        bound = np.empty(len(done) - 1)
+        plain_kernels.bounds(meant, done, self._linear, (bow.slopes, bow.curvatures), constants, CLOSE, bound)
         return bound
 
-    def _displaced(self, moves: Moves, shift: Array) -> tuple[Array, Array] | None:
-        """Where motions really start and end, (n, n_axes) each; None if they come near a limit: as `limits`."""
+    @property
+    def _linear(self) -> Array:
+        """1 for linear axes, 0 for others: loops multiply by it faster than they ask."""
+        return 1.0 - self.machine.rotary
+
+    def _within_limits(self, meant: Array, done: Array) -> bool:
+        """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
         low, high = self.machine.ranges.T
         if fast.engaged():
             from ncfix.compensate import plain_kernels
 
-            found = np.empty_like(moves.end), np.empty_like(moves.end)
-            ranges = np.ascontiguousarray(low), np.ascontiguousarray(high)
             linear, rotary = (NEARLY * most for most in self.machine.max_correction)
-            limits = linear, rotary, NEARLY * JUMP, FUZZ
-            fine = plain_kernels.displaced(moves.start, moves.end, shift, ranges, ~self.machine.rotary, limits, found)
-            return found if fine else None
-        ends = moves.end, moves.end + shift[1:]
-        within = all(
-            bool((low - end.min(axis=0) <= FUZZ).all() and (end.max(axis=0) - high <= FUZZ).all()) for end in ends
-        )
-        if not (within and self._small(shift) and self._steady(np.diff(shift, axis=0))):
-            return None
-        return moves.start + shift[:-1], ends[1]
+            axes = low.copy(), high.copy(), np.where(self.machine.rotary, rotary, np.inf), self._linear
+            return bool(plain_kernels.within_limits(meant, done, axes, (linear, NEARLY * JUMP, FUZZ)))
+        for least, most in (extent(meant), extent(done)):
+            if not ((low - least <= FUZZ).all() and (most - high <= FUZZ).all()):
+                return False
+        shift = done - meant
+        return self._small(shift) and self._steady(shift[1:] - shift[:-1])
 
     def _fine_inside(self, intent: Intent, pieces: Pieces, inner: Index, shift: Array) -> bool:
         """The same of pieces that end inside of motions (k,)."""

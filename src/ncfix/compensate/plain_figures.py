@@ -69,7 +69,7 @@ def _compiled(
     plain_kernels.at_ends(
         (moves.start, moves.end),
         (text.start[0], text.end, course.first),
-        (course.wanted, course.before),
+        (course.real.end, course.before),
         (features(machine), np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
         (STRAIGHT, TURNED),
         masks,
@@ -84,7 +84,7 @@ def _to_be_followed(course: Course, end: Array) -> Mask:
     """(n,) motions along which the error may bend, or at the end of which it is not known."""
     moves, machine = course.part.moves, course.intent.machine
     found: Mask = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1) >= STRAIGHT
-    found |= greatest(np.abs(end - course.wanted)[:, machine.rotary]) > TURNED
+    found |= greatest(np.abs(end - course.real.end)[:, machine.rotary]) > TURNED
     return found
 
 
@@ -93,7 +93,7 @@ def _at_ends(course: Course, start: Array, end: Array, rows: Index) -> Samples:
     ways, columns = course.intent.machine.linear_ways, course.intent.columns
     assert ways is not None
     chosen = slice(None) if len(rows) == len(end) else rows
-    off = (end[chosen] - course.wanted[chosen])[:, columns] @ ways.T
+    off = (end[chosen] - course.real.end[chosen])[:, columns] @ ways.T
     way = lengths((end[chosen] - start[chosen])[:, ~course.intent.machine.rotary])
     return Samples(rows, np.ones(len(rows)), course.before[chosen], lengths(off), way, 0.0, 0.0)
 
@@ -105,5 +105,5 @@ def _along(course: Course, text: Emission, rows: Index) -> Iterator[Samples]:
     whole, no = course.pieces, np.broadcast_to(False, len(own))
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
     written = Written(course.intent, pieces, text.start)
-    known = Known(course.before, course.wanted)
+    known = Known(course.before, course.real.end)
     return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=course.behind_dwells)

@@ -14,114 +14,79 @@ Mask = NDArray[np.bool_]
 LIBRARY = Library(__file__)
 
 
-@LIBRARY.helper
-def size_of(vectors: Array, row: int, linear: Mask) -> float:
-    """The length of a row along linear axes, mm."""
-    square = 0.0
-    for axis in range(len(linear)):
-        if linear[axis]:
-            square += vectors[row, axis] * vectors[row, axis]
-    return float(np.sqrt(square))
-
-
-@LIBRARY.helper
-def step_of(vectors: Array, row: int, linear: Mask) -> float:
-    """How far the next row is from a row along linear axes, mm."""
-    square = 0.0
-    for axis in range(len(linear)):
-        if linear[axis]:
-            off = vectors[row + 1, axis] - vectors[row, axis]
-            square += off * off
-    return float(np.sqrt(square))
-
-
-@LIBRARY.helper
-def is_within(position: float, low: float, high: float, fuzz: float) -> bool:
-    """Whether an axis is not beyond its range; not so if its position is not known."""
-    return low - position <= fuzz and position - high <= fuzz
-
-
-@LIBRARY.helper
-def corrections_fine(shift: Array, linear: Mask, most: tuple[float, float, float]) -> bool:
-    """Whether corrections (n + 1, axes) stay below the largest linear and rotary ones, and do not jump."""
-    for row in range(len(shift)):
-        for axis in range(len(linear)):
-            if not (linear[axis] or abs(shift[row, axis]) <= most[1]):
-                return False
-        if not size_of(shift, row, linear) <= most[0]:
-            return False
-        if row + 1 < len(shift) and not step_of(shift, row, linear) <= most[2]:
-            return False
-    return True
-
-
-@LIBRARY.kernel(
-    "f8[:,:]", "f8[:,:]", "f8[:,:]", ("f8[:]", "f8[:]"), "b1[:]", ("f8", "f8", "f8", "f8"), ("f8[:,:]", "f8[:,:]")
-)
-def displaced(
-    start: Array,
-    end: Array,
-    shift: Array,
-    ranges: tuple[Array, Array],
-    linear: Mask,
-    limits: tuple[float, float, float, float],
-    found: tuple[Array, Array],
+@LIBRARY.kernel("f8[:,:]", "f8[:,:]", ("f8[:]", "f8[:]", "f8[:]", "f8[:]"), ("f8", "f8", "f8"))
+def within_limits(
+    meant: Array, done: Array, axes: tuple[Array, Array, Array, Array], limits: tuple[float, float, float]
 ) -> int:
-    """Where motions (n, axes) really start and end; 0 if they come near a limit, else 1.
+    """1 if corrected poses, and those of the program (n, axes), come near no limit and are known, else 0.
 
-    shift   (n + 1, axes) corrections at their starts and ends
-    ranges  lowest and highest position of each axis
-    limits  largest correction of linear and rotary axes, largest change of one, and how far on a limit is on it
-    found   room for starts and ends
+    axes    lowest and highest position of each, its largest correction alone, and 1 for a linear axis, 0 for others
+    limits  largest correction of the linear axes together, largest change of one, and how far on a limit is on it
     """
-    (low, high), (real_start, real_end) = ranges, found
-    if not corrections_fine(shift, linear, limits[:3]):
-        return 0
-    for row in range(len(end)):
+    low, high, most, linear = axes
+    together, jump, fuzz = limits
+    for row in range(len(done)):
+        before, square, change = max(row - 1, 0), 0.0, 0.0
         for axis in range(len(linear)):
-            meant = end[row, axis]
-            done = meant + shift[row + 1, axis]
-            real_start[row, axis], real_end[row, axis] = start[row, axis] + shift[row, axis], done
-            if not is_within(meant, low[axis], high[axis], limits[3]):
+            here, there = meant[row, axis], done[row, axis]
+            off = there - here
+            step = off - (done[before, axis] - meant[before, axis])
+            beyond = max(low[axis] - min(here, there), max(here, there) - high[axis])
+            if not (beyond <= fuzz and abs(off) <= most[axis]):
                 return 0
-            if not is_within(done, low[axis], high[axis], limits[3]):
-                return 0
+            square, change = square + linear[axis] * off * off, change + linear[axis] * step * step
+        if not (square <= together * together and change <= jump * jump):
+            return 0
     return 1
 
 
-@LIBRARY.kernel(
-    "f8[:,:]", "f8[:,:]", "f8[:,:]", "b1[:]", ("f8[:,:]", "f8[:,:]"), ("f8", "f8", "f8", "f8", "f8"), "f8", "f8[:]"
-)
+@LIBRARY.helper
+def reached(done: Array, linear: Array) -> float:
+    """What the largest ways of all linear axes from zero add up to, mm."""
+    total = 0.0
+    for axis in range(len(linear)):
+        most = 0.0
+        for row in range(len(done)):
+            most = max(most, abs(done[row, axis]))
+        total += linear[axis] * most
+    return total
+
+
+@LIBRARY.kernel("f8[:,:]", "f8[:,:]", "f8[:]", ("f8[:,:]", "f8[:,:]"), ("f8", "f8", "f8", "f8", "f8"), "f8", "f8[:]")
 def bounds(
-    start: Array,
-    end: Array,
-    shift: Array,
-    linear: Mask,
+    meant: Array,
+    done: Array,
+    linear: Array,
     bends: tuple[Array, Array],
     constants: tuple[float, float, float, float, float],
     close: float,
     bound: Array,
 ) -> None:
-    """What the deviation of the tip along corrected motions does not exceed: as `judge.straight_bounds`.
+    """What the deviation of the tip from pose to pose (n + 1, axes) does not exceed: as `judge.straight_bounds`.
 
-    shift      (n + 1, axes) corrections at their starts and ends
+    linear     1 for a linear axis, 0 for others
     bends      slopes and curvatures (2, axes) of `bow.Bow`
-    constants  its `shift` and `turn`, the largest arm, mm, a factor for products of errors, and `judge.CORNER`
+    constants  its `shift` and `turn`, the arm with all axes at zero, mm, a factor for products of errors, and
+               `judge.CORNER`
     """
-    (slopes, curvatures), (moved, turned, arm, more, corner) = bends, constants
-    for row in range(len(end)):
-        way, angle, shifting, turning, second = 0.0, 0.0, 0.0, 0.0, 0.0
+    (slopes, curvatures), (moved, turned, least_arm, more, corner) = bends, constants
+    arm = least_arm + reached(done, linear)
+    for row in range(len(bound)):
+        way, angle, shifting, turning, second, before, after, change = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for axis in range(len(linear)):
-            step = abs(end[row, axis] - start[row, axis])
-            way, angle = (way + step, angle) if linear[axis] else (way, angle + step)
+            here, there, along = done[row, axis], done[row + 1, axis], linear[axis]
+            step, first, last = abs(there - here), here - meant[row, axis], there - meant[row + 1, axis]
+            way, angle = way + along * step, angle + (1 - along) * step
             shifting, turning = shifting + step * slopes[0, axis], turning + step * slopes[1, axis]
             second += step * step * (curvatures[0, axis] + arm * curvatures[1, axis])
+            before, after = before + along * first * first, after + along * last * last
+            change += along * (last - first) * (last - first)
         swing = way + arm * angle
-        first = shifting + arm * turning + turned * swing
+        leaning = shifting + arm * turning + turned * swing
         second += 2 * turning * swing + turned * (2 * way * angle + arm * angle * angle)
-        bow = more * (second + 2 * first * angle + (moved + arm * turned) * angle * angle) / 8
-        size = max(size_of(shift, row, linear), size_of(shift, row + 1, linear))
-        bound[row] = bow + corner * (size * angle + 2 * step_of(shift, row, linear)) * angle / 8 + close
+        bow = more * (second + 2 * leaning * angle + (moved + arm * turned) * angle * angle) / 8
+        most = np.sqrt(max(before, after))
+        bound[row] = bow + corner * (most * angle + 2 * np.sqrt(change)) * angle / 8 + close
 
 
 @LIBRARY.kernel(
