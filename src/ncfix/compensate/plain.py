@@ -183,7 +183,7 @@ class Planner:
     @property
     def _linear(self) -> Array:
         """1 for linear axes, 0 for others: loops multiply by it faster than they ask."""
-        return 1.0 - self.machine.rotary
+        return np.where(self.machine.rotary, 0.0, 1.0)
 
     def _within_limits(self, meant: Array, done: Array) -> bool:
         """Whether corrected poses, and those of the program, come near no limit: as `limits`. Arrays as for bounds."""
