@@ -67,15 +67,26 @@ def exists_already(path: str) -> UsageError:
     return UsageError.of("NCF004", "exists already", Place(path), "--force replaces an output")
 
 
+def put_at(handle: int, at: int, data: bytes) -> None:
+    """Write into an open file, from a byte on."""
+    rest = memoryview(data)
+    while rest:
+        done = os.pwrite(handle, rest, at)
+        at, rest = at + done, rest[done:]
+
+
 def unnamed(folder: str | None) -> IO[bytes]:
-    """A new file without a name, in a folder if that is there: gone with this process unless it is given one."""
+    """A new file without a name, in a folder if that is there: gone with this process unless it is given one.
+
+    What is written into it is there at once, for all processes that have it open.
+    """
     folder = folder if folder and os.path.isdir(folder) else None
     if folder and hasattr(os, "O_TMPFILE"):
         with suppress(OSError):
-            return os.fdopen(os.open(folder, os.O_RDWR | os.O_TMPFILE, 0o666), "w+b")
+            return os.fdopen(os.open(folder, os.O_RDWR | os.O_TMPFILE, 0o666), "w+b", buffering=0)
     from tempfile import TemporaryFile
 
-    return TemporaryFile(dir=folder)
+    return TemporaryFile(dir=folder, buffering=0)
 
 
 def holds(path: str, data: bytes | Iterable[bytes]) -> bool:
@@ -143,7 +154,6 @@ def _written_beside(path: str, data: bytes | Iterable[bytes], like: str | None) 
 def _filled(path: str, data: bytes | Iterable[bytes], like: str | None) -> int:
     """A new file with this content, still open."""
     if isinstance(data, Whole):
-        data.handle.flush()
         _like(data.handle.fileno(), like)
         if _named(data.handle.fileno(), path):
             return os.dup(data.handle.fileno())

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from ncfix.compensate.stream import Stream, Streamed
 from ncfix.diagnostics import ExitCode
 
 PART = 1000
@@ -51,6 +52,33 @@ def test_a_file(long_program: Path, fix: Any, tmp_path: Path) -> None:
         "long.ngc",
         *(f"{part}.ngc" for part in (1 << 20, PART, 5000)),
     }
+
+
+@pytest.mark.parametrize(("jobs", "part"), [(2, 1700), (3, PART)])
+def test_several_processes(jobs: int, part: int, long_program: Path, fix: Any, tmp_path: Path) -> None:
+    alone = fix(part, "-", stdin=long_program.read_bytes())
+    assert alone.code == ExitCode.DONE, alone.err
+    assert fix(part, "-", "--jobs", jobs, stdin=long_program.read_bytes()).out == alone.out
+    assert fix(part, long_program, "--jobs", jobs, "-o", "-").out == alone.out
+    assert fix(part, long_program, "--jobs", jobs, "-o", tmp_path / "out.ngc").code == ExitCode.DONE
+    assert (tmp_path / "out.ngc").read_bytes() == alone.out
+
+
+def test_a_file_that_is_changed_meanwhile(
+    long_program: Path, fix: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Stream.run
+
+    def changed(stream: Stream) -> Streamed:
+        with long_program.open("ab") as more:
+            more.write(b"(more)\n")
+        return run(stream)
+
+    monkeypatch.setattr(Stream, "run", changed)
+    result = fix(PART, long_program, "-o", tmp_path / "out.ngc")
+    assert "NCF002" in result.err
+    assert "was changed while it was read" in result.err
+    assert not (tmp_path / "out.ngc").exists()
 
 
 def test_a_pipe(long_program: Path, fix: Any) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
+from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
 
+from ncfix.cli.parts import Outlet
+from ncfix.compensate.crew import Ground
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.stream import Stream, Task
+from ncfix.compensate.stream import Stream, Streamed, Task
 from ncfix.machine import Machine
 from ncfix.program import dialects
 from ncfix.program.parts import NotInPartsError
@@ -34,13 +36,21 @@ def streamed(
     files: Mapping[str, bytes] | None = None,
 ) -> Found:
     """Text and report of a program that is corrected in parts of so many bytes; raises `NotInPartsError`."""
-    out: list[bytes] = []
-    given = io.BytesIO(source)
     task = Task(machine, setup, OPTIONS, (files or {}).get, "p.nc", dialects.get(dialect), size)
-    done = Stream(task, given.read, out.append, jobs).run()
-    text, stamp = b"".join(out), done.stamp
+    text, done = run(task, source, jobs)
+    stamp = done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
     return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()
+
+
+def run(task: Task, source: bytes, jobs: int) -> tuple[bytes, Streamed]:
+    """What is written, with its stamp as it was first, and what is said; all processes read the text from a file."""
+    with TemporaryFile(buffering=0) as given, TemporaryFile(buffering=0) as out:
+        given.write(source)
+        given.seek(0)
+        outlet = Outlet(out, direct=False, stamped=lambda: False)
+        done = Stream(task, given.read, outlet.put, jobs, Ground(given.fileno(), True, out.fileno())).run()
+        return out.read(), done
 
 
 def whole(

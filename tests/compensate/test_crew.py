@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import io
 import multiprocessing
-import multiprocessing.queues
 import os
 import signal
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
 
-from compensate.test_stream import OPTIONS, program, streamed
+from compensate.streaming import run
+from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.cli import console
 from ncfix.cli.job import Job
+from ncfix.cli.parts import Outlet, Source
 from ncfix.cli.targets import Target
 from ncfix.compensate import crew, fix
 from ncfix.compensate.corrector import Corrector, Done
+from ncfix.compensate.post import GoneError, Post, lines_between
 from ncfix.compensate.stream import Stream
 from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError, UsageError
@@ -61,9 +65,9 @@ def killed(*_: object) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def killed_in_a_message(queue: Any, _: object) -> None:
+def killed_in_a_message(line: Connection, _: object) -> None:
     """After the size of a message, and a little of it."""
-    os.write(queue._writer.fileno(), (1 << 20).to_bytes(4, "big") + b"some")
+    os.write(line.fileno(), (1 << 20).to_bytes(4, "big") + b"some")
     killed()
 
 
@@ -79,7 +83,7 @@ def in_another_process(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str, i
     [
         (Corrector, "_corrected", killed),
         (Corrector, "_follow_on", killed),
-        (crew, "tell", killed_in_a_message),
+        (Connection, "send_bytes", killed_in_a_message),
         (crew, "_work", lambda *_: None),
     ],
 )
@@ -87,7 +91,7 @@ def test_a_process_that_is_gone(
     owner: Any, name: str, instead: Callable[..., Any], jobs: int, machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     in_another_process(monkeypatch, owner, name, instead)
-    with pytest.raises(crew.GoneError):
+    with pytest.raises(GoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=jobs)
     assert not multiprocessing.active_children()
 
@@ -100,18 +104,45 @@ def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("here", [False, True])
 def test_what_does_not_arrive(here: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What packs messages on their way, in this process or in the others, has no memory."""
-    own, queues = os.getpid(), multiprocessing.queues
-    packs = queues._ForkingPickler.dumps
+    """What sends messages, in this process or in the others, has no memory."""
+    own, send = os.getpid(), Connection.send_bytes
 
-    def full(what: object) -> object:
+    def full(line: Connection, data: bytes) -> None:
         if (os.getpid() == own) == here:
             raise MemoryError
-        return packs(what)
+        send(line, data)
 
-    monkeypatch.setattr(queues, "_ForkingPickler", type("Packing", (), {"dumps": staticmethod(full)}))
-    with pytest.raises(crew.GoneError):
+    monkeypatch.setattr(Connection, "send_bytes", full)
+    with pytest.raises(GoneError):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
+
+
+def test_messages_of_any_size_that_nobody_hears_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processes that tell each other more than a line holds do not wait for each other."""
+    lines = lines_between(2, multiprocessing.get_context())
+    posts = [Post(mine, {1 - mine: lines[mine, 1 - mine]}) for mine in range(2)]
+    with posts[0].opened(killed), posts[1].opened(killed):
+        for post in posts:
+            for number in range(3):
+                post.tell("much", number, bytes(1 << 22))
+        for post in posts:
+            assert [len(post.waited_for("much", number)) for number in range(3)] == [1 << 22] * 3
+
+
+def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
+    source = program(5, 400, 0.0)
+    task = Task(machine, SETUP, OPTIONS, None, "p.ngc", dialects.get("linuxcnc"), 1000)
+    with TemporaryFile(buffering=0) as kept, TemporaryFile(buffering=0) as out:
+        source_of_pipe = Source("-", io.BytesIO(source), kept)
+        stream = Stream(task, source_of_pipe.read, Outlet(out, False, bool).put, 3, source_of_pipe.ground(out.fileno()))
+        stream.run()
+        assert out.read() == run(task, source, 1)[0]
+
+
+def test_where_processes_cannot_be_forked_one_does_it_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = streamed(program(5, 400, 0.0), machine, 1000)
+    monkeypatch.delattr(os, "fork")
+    assert streamed(program(5, 400, 0.0), machine, 1000, jobs=3) == expected
 
 
 def test_what_is_said_of_it(machine: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

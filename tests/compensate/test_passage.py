@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import io
-import pickle
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +31,11 @@ def machine(root: Path) -> Machine:
     return load(root / "benchmarks" / "five_axis.toml")
 
 
+@dataclass
 class Telling(Share):
     """Has all parts, and keeps what it would tell of them."""
+
+    heard: dict[int, Passage | None] = field(default_factory=dict)
 
     def has(self, number: int) -> bool:
         return True
@@ -45,8 +47,11 @@ class Telling(Share):
         return None
 
 
+@dataclass
 class Hearing(Share):
     """Has no part, and has heard of all."""
+
+    heard: dict[int, Passage | None] = field(default_factory=dict)
 
     def has(self, number: int) -> bool:
         return False
@@ -82,9 +87,9 @@ def test_a_control_goes_on_as_if_it_had_followed_what_was_passed_over(
     source = (
         program(seed, 500, 0.02 * (seed % 3)) if seed % 2 else winding(seed, 500, 0.02, (*AMONG, "#100=7.5\nF650."))
     )
-    telling = Telling(2, 0)
+    telling = Telling(2)
     reference, expected = gone_through(source, machine, dialect, telling)
-    units, found = gone_through(source, machine, dialect, Hearing(2, 1, heard=telling.heard))
+    units, found = gone_through(source, machine, dialect, Hearing(2, heard=telling.heard))
     assert sum(each is not None for each in telling.heard.values()) >= 1
     assert len(found) == len(expected)
     for mine, theirs in zip(found, expected, strict=True):
@@ -130,9 +135,3 @@ def test_an_error_in_a_part_that_others_would_pass_over_is_told(machine: Machine
     for jobs in (1, 2, 3):
         with pytest.raises(NcfixError, match="X"):
             streamed(source, machine, 2000, jobs=jobs)
-
-
-def test_a_share_can_be_handed_to_a_process_that_is_started_anew() -> None:
-    """As on Windows, where processes are not forked."""
-    share = pickle.loads(pickle.dumps(Share(2, 1)))
-    assert share.has(1)

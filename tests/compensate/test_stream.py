@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import random
 import re
 from collections.abc import Callable
@@ -12,12 +11,12 @@ from typing import Any
 
 import pytest
 
+from compensate.streaming import run
 from ncfix import fast
 from ncfix.compensate import corrector
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError
-from ncfix.compensate.stream import Stream
 from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Machine, load
@@ -35,12 +34,9 @@ SIZES = (150, 1500)
 def streamed(
     source: bytes, machine: Machine, size: int, options: FixOptions = OPTIONS, jobs: int = 1
 ) -> tuple[bytes, dict[str, Any]]:
-    out: list[bytes] = []
-    dialect = dialects.get("linuxcnc")
-    given = io.BytesIO(source)
-    task = Task(machine, SETUP, options, None, "p.ngc", dialect, size)
-    done = Stream(task, given.read, out.append, jobs).run()
-    text, stamp = b"".join(out), done.stamp
+    task = Task(machine, SETUP, options, None, "p.ngc", dialects.get("linuxcnc"), size)
+    text, done = run(task, source, jobs)
+    stamp = done.stamp
     assert text[stamp.at : stamp.at + len(stamp.written)] == stamp.written
     return text[: stamp.at] + stamp.wanted + text[stamp.at + len(stamp.written) :], done.report.as_dict()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,13 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
+from compensate.streaming import run
 from ncfix import fast
 from ncfix.compensate.checking import check_on
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.stream import Stream
 from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
@@ -285,15 +284,12 @@ def test_part_by_part_and_compiled_make_the_same_bytes(lines: list[str]) -> None
     text = "\n".join(["G21 G90 G94 F500", *body, "M2", ""]).encode()
     machine, options = smooth_machine(), FixOptions(allow_refused=True)
     whole = fix_program(read(text, "part.nc", "linuxcnc"), machine, ASSUMED, options)
-    source, out = BytesIO(text), BytesIO()
-    task = Task(machine, ASSUMED, options, None, "part.nc", get("linuxcnc"), 200)
-    stream = Stream(task, source.read, out.write)
     try:
-        report = stream.run().report
+        written, done = run(Task(machine, ASSUMED, options, None, "part.nc", get("linuxcnc"), 200), text, 1)
     except NotInPartsError:
         return
-    assert without_stamp(out.getvalue()) == without_stamp(whole.text)
-    assert report.left == whole.report.left
+    assert without_stamp(written) == without_stamp(whole.text)
+    assert done.report.left == whole.report.left
     if fast.engage():
         compiled = fix_program(read(text, "part.nc", "linuxcnc"), machine, ASSUMED, options)
         fast.disengage()

@@ -111,11 +111,11 @@ class Job:
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
             task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes())
-            stream = Stream(task, source.read, outlet.put, jobs)
+            stream = Stream(task, source.read, outlet.put, jobs, source.ground(outlet.kept.fileno()))
             yield stream, outlet
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:
-        from ncfix.compensate.crew import GoneError
+        from ncfix.compensate.post import GoneError
         from ncfix.program.parts import NotInPartsError
 
         _let_stay()
@@ -128,6 +128,7 @@ class Job:
         except GoneError:
             text = "one of the processes that worked on it was killed"
             raise FaultError.of("NCF017", text, Place(shown(source.path)), "fix it with --jobs 1") from None
+        source.check_unchanged()
         return Fixed(outlet.remaining(done.stamp), done.report.changed, done.report)
 
 

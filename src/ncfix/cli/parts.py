@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
+import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,10 +13,11 @@ from typing import IO, TYPE_CHECKING
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, Target, shown, stdin
-from ncfix.diagnostics import Place, RefusedError, UsageError
+from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport
+    from ncfix.compensate.crew import Ground
     from ncfix.compensate.stream import Stamp
 
 LONG = 2
@@ -58,7 +59,7 @@ class Fixed:
 def source_of(path: str) -> Iterator[Source]:
     """An input file, or standard input, to be read from its beginning."""
     if path == STREAM:
-        with tempfile.TemporaryFile() as kept:
+        with files.unnamed(None) as kept:
             yield Source(path, stdin(), kept)
         return
     try:
@@ -66,17 +67,38 @@ def source_of(path: str) -> Iterator[Source]:
     except OSError as error:
         raise files.unreadable(shown(path), error) from error
     with handle:
-        yield Source(path, handle, None)
+        yield Source(path, handle, None, os.fstat(handle.fileno()))
 
 
 @dataclass(slots=True)
 class Source:
-    """A text that can be read part by part, and again as a whole: what is read of standard input is kept in a file."""
+    """A text that can be read part by part, and again as a whole: what is read of standard input is kept in a file.
+
+    began  what the system said of a file at first
+    """
 
     path: str
     handle: IO[bytes]
     kept: IO[bytes] | None
+    began: os.stat_result | None = None
     head: bytes = b""
+    taken: int = 0
+
+    def ground(self, out: int) -> Ground | None:
+        """What other processes need to read the text, too, and to write into the file `out`; None for a named pipe."""
+        from ncfix.compensate.crew import Ground
+
+        if self.kept is not None:
+            return Ground(self.kept.fileno(), False, out)
+        regular = self.began is not None and stat.S_ISREG(self.began.st_mode)
+        return Ground(self.handle.fileno(), True, out) if regular else None
+
+    def check_unchanged(self) -> None:
+        """Raise SourceError NCF002 if the file is not what it was at first: parts of it may not fit together."""
+        began, now = self.began, os.fstat(self.handle.fileno()) if self.began else None
+        if began and now and (now.st_size, now.st_mtime_ns) != (began.st_size, began.st_mtime_ns):
+            text = "was changed while it was read"
+            raise SourceError.of("NCF002", text, Place(shown(self.path)), "fix it again when it is whole")
 
     def looked_into(self) -> tuple[bytes, bool]:
         """The first bytes, which `read` gives once more, and whether there are so many that the program is long."""
@@ -87,14 +109,12 @@ class Source:
     @property
     def size(self) -> int | None:
         """The bytes of the whole text; None where that is not known yet."""
-        return os.fstat(self.handle.fileno()).st_size if self.kept is None else None
+        return self.began.st_size if self.began else None
 
     def read(self, size: int) -> bytes:
-        """The next bytes, up to `size`; none at the end."""
-        if self.head:
-            part, self.head = self.head[:size], self.head[size:]
-            return part
-        return self._read(size)
+        """The next bytes, just `size` of them but at the end."""
+        part, self.head = self.head[:size], self.head[size:]
+        return part + self._read(size - len(part)) if len(part) < size else part
 
     def _read(self, size: int) -> bytes:
         try:
@@ -102,7 +122,8 @@ class Source:
         except OSError as error:
             raise files.unreadable(shown(self.path), error) from error
         if self.kept is not None:
-            self.kept.write(part)
+            files.put_at(self.kept.fileno(), self.taken, part)
+            self.taken += len(part)
         return part
 
     def everything(self) -> bytes:
@@ -120,37 +141,48 @@ class Outlet:
     """Where corrected text goes: into a file at first, and to standard output as soon as its stamp is written.
 
     stamped  whether the stamp, which says all there is to say, is part of what was put in
+    taken    bytes so far, of which so many were `sent`; the others stand in the file, at their places
     """
 
     kept: IO[bytes]
     direct: bool
     stamped: Callable[[], bool]
+    taken: int = 0
     sent: int = 0
     digest: hashlib._Hash = field(default_factory=hashlib.sha256)
 
-    def put(self, data: bytes) -> None:
-        """Take the next part."""
-        if not (self.direct and self.stamped()):
-            self.kept.write(data)
-            return
-        self._empty()
-        self._send(data)
+    def put(self, data: bytes | int) -> None:
+        """Take the next part; or so many bytes of it, which have been put into the file already."""
+        direct = self.direct and self.stamped()
+        if isinstance(data, int):
+            self.taken += data
+        elif not direct:
+            files.put_at(self.kept.fileno(), self.taken, data)
+            self.taken += len(data)
+        if direct:
+            for part in self._unsent():
+                self._send(part)
+        if direct and isinstance(data, bytes):
+            self._send(data)
+            self.taken += len(data)
 
     def _send(self, data: bytes) -> None:
         console.put(data)
         self.sent += len(data)
         self.digest.update(data)
 
-    def _empty(self) -> None:
-        for part in files.Whole(self.kept):
-            self._send(part)
-        self.kept.seek(0)
-        self.kept.truncate()
+    def _unsent(self) -> Iterator[bytes]:
+        at = self.sent
+        while part := os.pread(self.kept.fileno(), min(files.COPIED, self.taken - at), at):
+            yield part
+            at += len(part)
 
     def remaining(self, stamp: Stamp) -> Iterable[bytes]:
         """What was not sent, with the stamp as it has to be."""
+        if self.sent:
+            return self._unsent()
         kept = files.Whole(self.kept)
-        return kept if self.sent or stamp.written == stamp.wanted else _stamped(kept, stamp)
+        return kept if stamp.written == stamp.wanted else _stamped(kept, stamp)
 
     def after(self, text: bytes, path: str) -> bytes:
         """What is left of a text of which the beginning was sent; raises RefusedError NCF013 if it was another."""

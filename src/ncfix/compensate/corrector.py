@@ -23,6 +23,7 @@ from ncfix.compensate.task import Task
 from ncfix.compensate.units import Part, Unit, Units
 from ncfix.compensate.verify import path_error
 from ncfix.diagnostics import Message, NcfixError
+from ncfix.files import put_at
 from ncfix.machine import State
 from ncfix.program import stamp
 from ncfix.program.emit import Emission
@@ -39,13 +40,19 @@ FRAMES = "the program takes frames or values from where the machine stands"
 class Done:
     """A part that has been corrected and proved; of the first one, what makes one think that it was corrected before.
 
-    text   what it is now
+    text   what it is now; how many bytes that are, where it has been put into a file
     tally  what there is to report of it
     """
 
-    text: bytes
+    text: bytes | int
     tally: Tally
     suspicion: tuple[Message, ...] = ()
+
+    def placed(self, file: int, at: int) -> Done:
+        """The same with the text put into a file, from a byte on."""
+        assert isinstance(self.text, bytes)
+        put_at(file, at, self.text)
+        return replace(self, text=len(self.text))
 
 
 class Corrector:
@@ -113,16 +120,17 @@ class Corrector:
         if course is not None and before is not None and not before.kept:
             plain = written(self.language, course, before.position, increments(self.machine))
             if plain is not None:
-                return self._plainly(course, plain, share)
-        return self._settled(unit, agreed or self._agreed(unit), before, share)
+                return self._plainly(course, plain, number, share)
+        return self._settled(unit, agreed or self._agreed(unit), before, number, share)
 
-    def _plainly(self, course: Course, plain: Emission, share: Share) -> Done:
+    def _plainly(self, course: Course, plain: Emission, number: int, share: Share) -> Done:
         """Finish a part of plain motions."""
         part, moves = course.part, course.part.moves
+        text = spliced(part.program.source, plain.splices)
         if not part.last:
             shift = course.real.start[-1] - moves.start[-1]
-            share.leave(Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy()))
-        text = spliced(part.program.source, plain.splices)
+            left = Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
+            share.leave(number, left, len(text))
         settled = course.settled(plain)
         _check(differences(settled, self._read_again(text, part, plain.splices)))
         tally = Tally()
@@ -138,7 +146,7 @@ class Corrector:
         guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
         return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
-    def _settled(self, unit: Unit, agreed: Agreed, before: Before | None, share: Share) -> Done:
+    def _settled(self, unit: Unit, agreed: Agreed, before: Before | None, number: int, share: Share) -> Done:
         """Correct a part by the long way."""
         task, part = self.task, unit.together
         moves = part.moves
@@ -149,9 +157,9 @@ class Corrector:
         settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
         if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
             raise NotInPartsError("a refusal reaches back into an earlier part")
-        if not part.last:
-            share.leave(_left(settled))
         text = self._text(part.program, settled, before is None)
+        if not part.last:
+            share.leave(number, _left(settled), len(text))
         own = np.ones(len(moves), dtype=bool)
         own[:1] = unit.head is None
         self._prove(text, settled, own, unit)

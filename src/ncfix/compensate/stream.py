@@ -18,7 +18,7 @@ from functools import partial
 
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.corrector import Corrector, Done
-from ncfix.compensate.crew import Read, crew
+from ncfix.compensate.crew import Ground, Read, crew
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
@@ -49,14 +49,16 @@ class Stream:
     """One program on its way. `run` is called once.
 
     read   gives the next so many bytes of the text; none at its end
-    write  takes the corrected text, part by part
+    write  takes the corrected text, part by part; or how much of it stands where it belongs already (`Ground.out`)
     jobs   processes that work on it
+    ground  the files, which all of them have; without it there is one process
     """
 
     task: Task
     read: Read
-    write: Callable[[bytes], None]
+    write: Callable[[bytes | int], object]
     jobs: int = 1
+    ground: Ground | None = None
     tally: Tally = field(default_factory=Tally)
     suspicion: tuple[Message, ...] = ()
     corrector: Corrector | None = None
@@ -71,7 +73,7 @@ class Stream:
         task = self.task
         task.check()
         task.follower()
-        with crew(self.jobs, partial(Corrector, task)) as others:
+        with crew(self.jobs, partial(Corrector, task), self.ground) as others:
             own = self.corrector = Corrector(task, others.spread(self.read))
             for number, done in own.work(others.share):
                 others.put(number, done)
