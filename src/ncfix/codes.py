@@ -7,8 +7,8 @@ from ncfix.diagnostics import Code
 CODES = {
     "NCF002": Code(
         "an input file cannot be read",
-        "The file does not exist, is a folder, or may not be read; the message says what the system says. Or a long program was "
-        "changed while it was corrected, so that its parts need not fit together.",
+        "The file does not exist, is a folder, or may not be read; the message says what the system says. Or a "
+        "long program was changed while it was corrected, so that its parts need not fit together.",
         "Check the path and the permissions.",
     ),
     "NCF004": Code(
