@@ -7,12 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from ncfix.cli.options import load_machine, read_program, subprograms
 from ncfix.cli.setup_options import SetupOptions
-from ncfix.cli.targets import STREAM
-from ncfix.diagnostics import SourceError
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
-    from ncfix.compensate.comparison import Gaps
     from ncfix.compensate.simulation import TipError
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves, Trace
@@ -22,31 +19,6 @@ if TYPE_CHECKING:
 LINEAR = ("X", "Y", "Z")
 ROTARY = ("A", "B", "C")
 PARALLEL = ("U", "V", "W")
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
-
-    beyond       lines of the other with errors larger than the tolerance
-    not_reached  lines of the original from which the other is farther away
-    unseen       lines of the original that cut, nobody knows where
-    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
-                 nothing can be corrected along it there
-    """
-
-    before: dict[str, Any]
-    after: dict[str, Any]
-    left_out: dict[str, Any]
-    beyond: list[int]
-    not_reached: list[int]
-    unseen: list[int]
-    left: dict[str, list[int]]
-
-    @property
-    def within(self) -> bool:
-        """Nothing is farther from the intended path than the tolerance."""
-        return not self.beyond and not self.not_reached
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,60 +70,17 @@ class Following:
         """A program, its motions, and the error of the tool tip along them."""
         from ncfix.compensate.simulation import tip_error
 
-        program, machine, moves = self._on_machine(path)
+        program = self.read(path)
+        machine, moves = self.on_machine(program, path)
         return program, moves, tip_error(machine, moves)
 
-    def compared(self, original: str, fixed: str, tolerance_um: float) -> Compared:
-        """What this machine does with two programs, measured against what the first one means."""
-        from ncfix.compensate.comparison import compare, error_of
-        from ncfix.compensate.simulation import unseen
-        from ncfix.compensate.wordless import left_in_cuts
-
-        program, machine, meant = self._on_machine(original)
-        other, _, done = self._on_machine(fixed, original, like=program)
-        limit = tolerance_um / 1e3
-        there, back = compare(machine, meant, done, near=limit)
-        before = error_of(machine, meant, near=limit)
-        lines, other_lines = lines_of(program, meant.block), lines_of(other, done.block)
-        return Compared(
-            before=figures(before, lines),
-            after=figures(there, other_lines),
-            left_out=figures(back, lines),
-            beyond=_lines_at(there.rows_beyond(limit), other_lines),
-            not_reached=_lines_at(back.rows_beyond(limit), lines),
-            unseen=_lines_at(unseen(meant), lines),
-            left={axis: _lines_at(rows, lines) for axis, rows in left_in_cuts(meant).items()},
-        )
-
-    def _read_like(self, path: str, other: Program) -> Program:
-        """A program in the dialect of another one, unless one is given, or its text shows that it is of another family.
-
-        What was written out flat may have lost all that shows a dialect.
-        """
-        if self.dialect is not None or path == STREAM:
-            return self.read(path)
-        try:
-            return read_program(path, other.dialect.name, self.machine)
-        except SourceError:
-            return self.read(path)
-
-    def _on_machine(self, path: str, *others: str, like: Program | None = None) -> tuple[Program, Machine, Moves]:
-        """A program as this machine follows it.
-
-        others  programs beside which its subprograms may be, too: `fix` writes the program alone
-        like    one in whose dialect it is, if its text does not forbid it
-        """
+    def on_machine(self, program: Program, *paths: str) -> tuple[Machine, Moves]:
+        """A program as this machine follows it; `paths`: files beside which its subprograms may be."""
         from ncfix.compensate.following import follow
 
         assert self.machine is not None
-        program = self.read(path) if like is None else self._read_like(path, like)
-        found = follow(program, self.machine, self.setup, subprograms(path, *others))
-        return program, found.machine, found.trace.moves
-
-
-def _lines_at(rows: Any, lines: list[int]) -> list[int]:
-    """The lines of motions, each once, in order."""
-    return sorted({lines[row] for row in rows.tolist()})
+        found = follow(program, self.machine, self.setup, subprograms(*paths))
+        return found.machine, found.trace.moves
 
 
 def named_axes(program: Program) -> tuple[str, ...]:
@@ -170,7 +99,7 @@ def lines_of(program: Program, blocks: Any) -> list[int]:
     return lines
 
 
-def figures(error: TipError | Gaps, lines: list[int]) -> dict[str, Any]:
+def figures(error: TipError, lines: list[int]) -> dict[str, Any]:
     """The error along a path in two figures, um, and the line of the worst."""
     row = error.worst_row
     return {"max": 1e3 * error.max_mm, "rms": 1e3 * error.rms_mm, "where": None if row is None else lines[row]}

@@ -104,14 +104,14 @@ def load_machine(path: str) -> Machine:
     return load(path) if path != STREAM else loads(read(path), shown(path))
 
 
-def read_program(path: str, dialect: str | None, machine: Machine | None = None) -> Program:
+def read_program(path: str, dialect: str | None, machine: Machine | None = None, text: bytes | None = None) -> Program:
     """A program from a file or standard input, in the dialect given, else in that of the machine's control.
 
-    A control that has no dialect of its own leaves it to what the program looks like.
+    A control that has no dialect of its own leaves it to what the program looks like. `text`: what is in the file.
     """
     from ncfix.program.reader import read as read_source
 
-    source = read(path)
+    source = read(path) if text is None else text
     if len(source) >= compiled_from():
         fast.engage()
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))

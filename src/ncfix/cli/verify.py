@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import click
 
 from ncfix.cli import console
-from ncfix.cli.following import Compared, Following
+from ncfix.cli.comparing import Compared, compared
+from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, machine_option, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import shown
@@ -40,7 +41,7 @@ def verify(
     """
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
-        found = following.compared(original, fixed, tolerance_um)
+        found = compared(following, original, fixed, tolerance_um)
     if as_json:
         console.put_json(
             original=shown(original),

@@ -78,7 +78,7 @@ def compare(
     """
     meant, done = Intent(machine, original, state), Intent(machine, other, state)
     intended, actual = Curve.of(meant, meant.tip), as_made(done)
-    check_alike(intended.total, actual.total)
+    check_alike((len(intended), intended.total), (len(actual), actual.total))
     flank = Flank.of(done, actual)
     return there(intended, actual, flank, near), back(intended, actual, flank, near)
 
@@ -101,7 +101,7 @@ def there(intended: Curve, actual: Curve, flank: Flank | None, near: float) -> G
     found = _nearest(intended, actual, samples, near)
     gap = found.gap
     if flank is not None:
-        gap = flank.there(Search(intended, near), samples, found)
+        gap = flank.there(Search(intended, near), found)
     return Gaps(actual.rows[samples.piece], gap, samples.weight)
 
 
@@ -111,7 +111,7 @@ def back(intended: Curve, actual: Curve, flank: Flank | None, near: float) -> Ga
     found = _nearest(actual, intended, samples, near)
     gap = found.gap
     if flank is not None:
-        gap = flank.back(near, samples, found)
+        gap = flank.back(near, samples.points, found)
     return Gaps(intended.rows[samples.piece], gap, samples.weight)
 
 
@@ -122,8 +122,9 @@ def _nearest(curve: Curve, other: Curve, samples: Samples, near: float) -> Neare
     return Search(curve, near).all(samples.points, other.way(samples.piece, samples.share))
 
 
-def check_alike(intended: float, actual: float) -> None:
-    """Raise `DifferenceError` NCF420 if two paths, of these lengths (mm), are not the same cut."""
-    if abs(intended - actual) > UNLIKE * max(intended, actual) or (intended == 0) != (actual == 0):
-        text = f"the two programs do not cut the same: {intended:.3f} mm and {actual:.3f} mm of path"
+def check_alike(intended: tuple[int, float], actual: tuple[int, float]) -> None:
+    """Raise `DifferenceError` NCF420 if two paths are not the same cut: of so many parabolas, and so long, mm."""
+    (many, meant), (others, made) = intended, actual
+    if (many == 0) != (others == 0) or abs(meant - made) > UNLIKE * max(meant, made):
+        text = f"the two programs do not cut the same: {meant:.3f} mm and {made:.3f} mm of path"
         raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")

@@ -19,7 +19,7 @@ from ncfix.program.moves import Kind
 
 Tip = Callable[[Index, Array], Array]
 
-NEAR_ENOUGH = 2e-5
+NEAR_ENOUGH = 5e-5
 """mm; so far a parabola may be from the path of a tip that turns round an axis."""
 CUBIC = 3**0.5 / 216
 """A parabola through begin, middle and end of an arc of radius r and angle a is this times r a^3 from it, at most."""
@@ -128,7 +128,7 @@ class Curve:
         way: Array = self.lengths[piece] + share * self.ways[piece]
         return way
 
-    def taken(self, which: Mask) -> Curve:
+    def taken(self, which: Mask | slice) -> Curve:
         """Some of the parabolas."""
         return replace(self, **{name: getattr(self, name)[which] for name in COLUMNS})
 
@@ -166,6 +166,8 @@ class Samples:
         joined = np.flatnonzero(~curve.opens[1:])
         last = np.cumsum(counts) - 1
         weight[last[joined]] += curve.ways[joined + 1] / 6
+        if len(curve) and not curve.opens[0]:
+            weight[0] += curve.ways[0] / 6
         return cls(piece, share, points, weight)
 
 

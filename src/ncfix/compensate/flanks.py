@@ -58,7 +58,7 @@ class Flank:
         points = other_side(done, rows[samples], fraction[samples], turning[samples])
         return cls(samples, points, some(motions), curve)
 
-    def there(self, search: Search, samples: Samples, found: Nearest) -> Array:
+    def there(self, search: Search, found: Nearest) -> Array:
         """The gaps (k,) from what is made to what is meant, with this path at its samples where that is nearer."""
         expected = search.curve.way(found.piece, found.share)[self.samples]
         other = search.around(self.points, expected)
@@ -66,13 +66,13 @@ class Flank:
         gap[self.samples] = np.minimum(gap[self.samples], other.gap)
         return gap
 
-    def back(self, near: float, samples: Samples, found: Nearest) -> Array:
-        """The gaps (k,) from what is meant to what is made, with this path where its motions are nearer."""
+    def back(self, near: float, points: Array, found: Nearest) -> Array:
+        """The gaps (k,) from points (k, 3) of what is meant to what is made, with this path where that is nearer."""
         curve = self.curve
         beside = [curve.rows[np.clip(found.piece + way, 0, len(curve) - 1)] for way in (-1, 0, 1)]
         rows = np.flatnonzero(np.logical_or.reduce([self.motions[each] for each in beside]) & (found.gap > near))
         expected = curve.way(found.piece, found.share)[rows]
-        other = Search(curve, near).around(samples.points[rows], expected)
+        other = Search(curve, near).around(points[rows], expected)
         gap = found.gap.copy()
         gap[rows] = np.minimum(gap[rows], other.gap)
         return gap

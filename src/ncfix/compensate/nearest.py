@@ -105,6 +105,7 @@ class Search:
     def _down(self, points: Array, piece: Index, share: Array) -> Nearest:
         """The nearest points that are reached without going away from `points`, from shares of parabolas."""
         share, gap, push = _newton(self.curve, points, piece, share)
+        push += CLOSE * self._at_gap(piece, share) * (gap > self.near)
         found, lying = Nearest(piece, share, gap), self.curve.lying
         rows, step_by_step = np.flatnonzero(push), np.zeros(len(points), dtype=bool)
         for _ in range(HOPS if lying.size else 0):
@@ -119,6 +120,13 @@ class Search:
             again = ~better & ~step_by_step[rows] & (np.abs(push[rows]) > 0)
             step_by_step[rows] = ~better
             rows = rows[(better & (further != 0)) | again]
+        return found
+
+    def _at_gap(self, piece: Index, share: Array) -> Array:
+        """1 where a cut ends, -1 where one begins, 0 elsewhere, (n,)."""
+        opens = self.curve.opens
+        ends = (share == 1) & opens.take(piece + 1, mode="clip")
+        found: Array = 1.0 * ends - ((share == 0) & opens[piece])
         return found
 
     def _hop(self, piece: Index, push: Array, one: Mask) -> Index:
@@ -137,11 +145,8 @@ class Search:
 
     def _everywhere(self, points: Array, expected: Array, found: Nearest, far: Index) -> None:
         """Look at all that could be nearer to points `far` (k,) than what was found, where the path turns near by."""
-        curve = self.curve
-        off = curve.way(found.piece[far], found.share[far]) - expected[far]
-        cost = np.hypot(found.gap[far], ALONG * off)
+        curve, cost = self.curve, self._cost(expected, found, far)
         low, high = expected[far] - cost / ALONG, expected[far] + cost / ALONG
-        self._check(low, high)
         first, last = curve.place(low), curve.place(high)
         first, last = np.minimum(first, found.piece[far]), np.maximum(last, found.piece[far])
         turning = curve.turns[1][last] - curve.turns[0][first] > STRAIGHT
@@ -149,11 +154,19 @@ class Search:
         for some in batches(counts, PAIRS):
             self._among(points, expected, found, far[some], (first[some], counts[some], cost[some]))
 
-    def _check(self, low: Array, high: Array) -> None:
-        """Raise `LostError` if the part of the curve between these lengths is not at hand."""
-        curve = self.curve
-        end = curve.lengths[-1] + curve.ways[-1]
-        if (not self.begins and low.min() < curve.lengths[0]) or (not self.ends and high.max() > end):
+        self._check(expected[far], self._cost(expected, found, far))
+
+    def _cost(self, expected: Array, found: Nearest, which: Index) -> Array:
+        """The measure in which a point is nearest, mm: its distance, and how far it is from where it was expected."""
+        off = self.curve.way(found.piece[which], found.share[which]) - expected[which]
+        cost: Array = np.hypot(found.gap[which], ALONG * off)
+        return cost
+
+    def _check(self, expected: Array, cost: Array) -> None:
+        """Raise `LostError` if the path is not at hand as far as there might be a nearer point."""
+        low, high = (expected - cost / ALONG).min(), (expected + cost / ALONG).max()
+        end = self.curve.lengths[-1] + self.curve.ways[-1]
+        if (not self.begins and low < self.curve.lengths[0]) or (not self.ends and high > end):
             raise LostError
 
     def _among(

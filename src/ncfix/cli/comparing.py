@@ -1,0 +1,142 @@
+"""Two programs compared, for `verify`: long ones while they are read, if they can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ncfix import fast
+from ncfix.cli.following import Following
+from ncfix.cli.options import dialect_of, read_program, subprograms
+from ncfix.cli.parts import Source, part_bytes, source_of
+from ncfix.cli.targets import STREAM, shown
+from ncfix.diagnostics import DifferenceError, NcfixError, SourceError
+
+if TYPE_CHECKING:
+    from ncfix.compensate.side_by_side import Along, SideBySide
+    from ncfix.program.dialect import Dialect
+    from ncfix.program.tree import Program
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
+
+    beyond       lines of the other with errors larger than the tolerance
+    not_reached  lines of the original from which the other is farther away
+    unseen       lines of the original that cut, nobody knows where
+    left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
+                 nothing can be corrected along it there
+    """
+
+    before: dict[str, Any]
+    after: dict[str, Any]
+    left_out: dict[str, Any]
+    beyond: list[int]
+    not_reached: list[int]
+    unseen: list[int]
+    left: dict[str, list[int]]
+
+    @property
+    def within(self) -> bool:
+        """Nothing is farther from the intended path than the tolerance."""
+        return not self.beyond and not self.not_reached
+
+    @classmethod
+    def of(cls, found: SideBySide) -> Compared:
+        """What was found along both programs."""
+        before, there, back = (match.along for match in found.matches)
+        return cls(
+            before=_figures(before),
+            after=_figures(there),
+            left_out=_figures(back),
+            beyond=there.lines_beyond,
+            not_reached=back.lines_beyond,
+            unseen=found.lines_unseen,
+            left=found.lines_left,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """The two texts, and what is needed to follow them."""
+
+    following: Following
+    original: Source
+    fixed: Source
+    tolerance_um: float
+
+    def compared(self) -> SideBySide:
+        """What this machine does with the two, measured against what the first one means."""
+        from ncfix.compensate.nearest import LostError
+        from ncfix.program.parts import NotInPartsError
+
+        long = [source.looked_into()[1] for source in (self.original, self.fixed)]
+        if any(long):
+            fast.engage()
+            try:
+                return self._in_parts()
+            except DifferenceError:
+                raise
+            except (NcfixError, NotInPartsError, LostError):
+                pass  # as wholes then; what is wrong with one of them is said there
+        return self._as_wholes()
+
+    def _in_parts(self) -> SideBySide:
+        """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
+        from ncfix.compensate.cuts import Cuts
+        from ncfix.compensate.options import FixOptions
+        from ncfix.compensate.side_by_side import SideBySide
+        from ncfix.compensate.task import Task
+
+        found = SideBySide(self.tolerance_um / 1e3)
+        machine, dialect = self.following.machine, self._dialect()
+        assert machine is not None
+        cuts = []
+        for source, beside in ((self.original, ()), (self.fixed, (self.original.path,))):
+            find = subprograms(source.path, *beside)
+            name = shown(source.path)
+            task = Task(machine, self.following.setup, FixOptions(force=True), find, name, dialect, part_bytes())
+            cuts.append(Cuts(task, source.read, meant=source is self.original))
+        found.run(*map(iter, cuts))
+        return found
+
+    def _dialect(self) -> Dialect:
+        head = self.original.head
+        return dialect_of(head, shown(self.original.path), self.following.dialect, self.following.machine)
+
+    def _as_wholes(self) -> SideBySide:
+        from ncfix.compensate.cuts import whole
+        from ncfix.compensate.side_by_side import SideBySide
+
+        found = SideBySide(self.tolerance_um / 1e3)
+        original = self._read(self.original)
+        machine, moves = self.following.on_machine(original, self.original.path)
+        other = self._read(self.fixed, like=original)
+        _, done = self.following.on_machine(other, self.fixed.path, self.original.path)
+        found.run(whole(machine, original, moves, meant=True), whole(machine, other, done))
+        return found
+
+    def _read(self, source: Source, like: Program | None = None) -> Program:
+        """A program; if its text does not show that it is of another family, in the dialect of another one.
+
+        What was written out flat may have lost all that shows a dialect.
+        """
+        text, following = source.everything(), self.following
+        if like is not None and following.dialect is None and source.path != STREAM:
+            try:
+                return read_program(source.path, like.dialect.name, following.machine, text)
+            except SourceError:
+                pass
+        return read_program(source.path, following.dialect, following.machine, text)
+
+
+def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
+    """What this machine does with two programs, measured against what the first one means."""
+    with source_of(original) as first, source_of(fixed) as second:
+        return Compared.of(Pair(following, first, second, tolerance_um).compared())
+
+
+def _figures(along: Along) -> dict[str, Any]:
+    """How far a path is from another one in two figures, um, and the line of the worst."""
+    return {"max": 1e3 * along.max, "rms": 1e3 * along.rms, "where": along.where}

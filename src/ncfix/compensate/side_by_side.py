@@ -1,0 +1,258 @@
+"""Two programs compared while they are read: what is at hand of their paths goes along with the reading.
+
+    original --> what it means ----------------+--> there: from what the other makes to what is meant
+             --> what the machine makes of it  |    back:  from what is meant to what the other makes
+    other    --> what the machine makes of it -+    before: from what the original makes to what it means
+
+Of every path as much is kept as a nearest point may lie on. If that is not enough, `nearest.LostError` is raised, and
+both programs have to be at hand as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import numpy as np
+
+from ncfix.compensate.comparison import check_alike
+from ncfix.compensate.curve import COLUMNS, Curve, Samples
+from ncfix.compensate.cuts import Cut
+from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.flanks import Flank
+from ncfix.compensate.nearest import Search
+
+KEPT = 100.0
+"""mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
+
+
+def lines_of(parts: list[Index]) -> list[int]:
+    """The lines that occur in parts, each once, in order."""
+    lines: list[int] = np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
+    return lines
+
+
+@dataclass(slots=True)
+class Track:
+    """What is at hand of a path.
+
+    dropped   parabolas before it
+    complete  nothing comes behind it
+    cut       the length of all that was cut, mm
+    flank     the other side of the play, if there is any: of a path that is at hand as a whole
+    """
+
+    curve: Curve
+    dropped: int = 0
+    complete: bool = False
+    cut: float = 0.0
+    flank: Flank | None = None
+
+    @classmethod
+    def empty(cls) -> Track:
+        """Of a path that begins."""
+        none = np.zeros(0)
+        places = np.zeros((0, 3))
+        return cls(Curve(np.zeros(0, dtype=np.intp), none, none, places, places, places, np.zeros(0, dtype=bool)))
+
+    @property
+    def count(self) -> int:
+        """Parabolas so far."""
+        return self.dropped + len(self.curve)
+
+    @property
+    def reached(self) -> float:
+        """The way along the whole path to where it ends now, mm."""
+        curve = self.curve
+        return float(curve.lengths[-1] + curve.ways[-1]) if len(curve) else curve.first
+
+    def add(self, more: Curve, last: bool, flank: Flank | None = None) -> None:
+        """Go on along the path; `last`: to its end."""
+        self.complete, self.flank = last, flank
+        self.cut += more.total
+        old = self.curve
+        columns = {name: np.concatenate([getattr(each, name) for each in (old, more)]) for name in COLUMNS}
+        new: Curve = replace(old, **cast(Any, columns))
+        if len(old) and len(more):
+            new.opens[len(old)] = (old.end[-1] != more.begin[0]).any()
+        self.curve = new
+
+    def drop(self, before: float) -> None:
+        """Forget what lies before a way along the path."""
+        curve = self.curve
+        count = int(np.searchsorted(curve.lengths + curve.ways, before))
+        if count:
+            self.curve = self.part(count, len(curve))
+            self.dropped += count
+
+    def part(self, start: int, stop: int) -> Curve:
+        """Some parabolas of what is at hand."""
+        curve = self.curve
+        first = float(curve.lengths[start]) if start < len(curve) else self.reached
+        return replace(curve.taken(slice(start, stop)), first=first)
+
+
+@dataclass(slots=True)
+class Along:
+    """How far a path is from another one, added up.
+
+    limit   mm; where it is farther is noted
+    where   the line of the largest gap
+    beyond  lines with gaps beyond the limit, by parts
+    """
+
+    limit: float
+    max: float = 0.0
+    where: int | None = None
+    squares: float = 0.0
+    way: float = 0.0
+    plain_squares: float = 0.0
+    count: int = 0
+    beyond: list[Index] = field(default_factory=list)
+
+    def add(self, lines: Index, gap: Array, weight: Array) -> None:
+        """Add gaps (k,) in lines (k,), with the way (k,) that each stands for."""
+        if not len(gap):
+            return
+        worst = int(np.argmax(gap))
+        if self.where is None or gap[worst] > self.max:
+            self.max, self.where = float(gap[worst]), int(lines[worst])
+        squares = gap**2
+        self.squares += float(squares @ weight)
+        self.way += float(weight.sum())
+        self.plain_squares += float(squares.sum())
+        self.count += len(gap)
+        if self.max > self.limit:
+            self.beyond.append(np.unique(lines[gap > self.limit]))
+
+    @property
+    def rms(self) -> float:
+        """The root mean square along the path, mm; over the places where the path has no length."""
+        if not self.count:
+            return 0.0
+        return float(np.sqrt(self.squares / self.way if self.way else self.plain_squares / self.count))
+
+    @property
+    def lines_beyond(self) -> list[int]:
+        """The lines with gaps beyond the limit, in order."""
+        return lines_of(self.beyond)
+
+
+@dataclass(slots=True)
+class Match:
+    """Looks from one path to another for what is nearest, as far as both are at hand.
+
+    done   parabolas of the path that have been looked at
+    ahead  how much farther one is along the other path at the end of these, mm
+    """
+
+    path: Track
+    other: Track
+    along: Along
+    done: int = 0
+    ahead: float = 0.0
+
+    def go_on(self) -> None:
+        """Look from as much of the path as there is enough of the other for."""
+        curve, other = self.path.curve, self.other
+        start, stop = self.done - self.path.dropped, len(curve)
+        if not other.complete:
+            stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * KEPT))
+        if stop <= start or not len(other.curve):
+            return
+        self.done += stop - start
+        part = self.path.part(start, stop)
+        samples = Samples.of(part)
+        search = Search(other.curve, self.along.limit, self.ahead, other.dropped == 0, other.complete)
+        found = search.all(samples.points, part.way(samples.piece, samples.share))
+        self.ahead = search.ahead
+        gap = found.gap
+        if self.path.flank is not None:
+            gap = self.path.flank.there(search, found)
+        if other.flank is not None:
+            gap = other.flank.back(search.near, samples.points, found)
+        self.along.add(part.rows[samples.piece], gap, samples.weight)
+
+    @property
+    def first_needed(self) -> float:
+        """The way along the other path before which nothing of it will be looked at any more."""
+        curve, start = self.path.curve, self.done - self.path.dropped
+        at = float(curve.lengths[start]) if start < len(curve) else self.path.reached
+        return at + self.ahead - 2 * KEPT
+
+
+@dataclass(slots=True)
+class SideBySide:
+    """Two programs on their way, and what was found so far.
+
+    limit        mm: the tolerance
+    unseen, left as `Cut` has them, of the original, by parts
+    """
+
+    limit: float
+    unseen: list[Index] = field(default_factory=list)
+    left: dict[str, list[Index]] = field(default_factory=dict)
+    intended: Track = field(default_factory=Track.empty)
+    unfixed: Track = field(default_factory=Track.empty)
+    fixed: Track = field(default_factory=Track.empty)
+    matches: tuple[Match, Match, Match] = field(init=False)
+
+    def __post_init__(self) -> None:
+        before, there, back = (Along(self.limit) for _ in range(3))
+        self.matches = (
+            Match(self.unfixed, self.intended, before),
+            Match(self.fixed, self.intended, there),
+            Match(self.intended, self.fixed, back),
+        )
+
+    @property
+    def lines_unseen(self) -> list[int]:
+        """Lines of the original that cut nobody knows where, in order."""
+        return lines_of(self.unseen)
+
+    @property
+    def lines_left(self) -> dict[str, list[int]]:
+        """Linear axis -> lines of the original in which nothing can be corrected along it."""
+        return {axis: lines_of(lines) for axis, lines in self.left.items()}
+
+    def run(self, original: Iterator[Cut], other: Iterator[Cut]) -> None:
+        """Go along both programs; raises what reading them does, `LostError`, and `DifferenceError` NCF420."""
+        while not (self.intended.complete and self.fixed.complete):
+            behind = self.intended.reached <= self.fixed.reached
+            if self.fixed.complete or (behind and not self.intended.complete):
+                self._take_original(next(original, None))
+            else:
+                self._take_other(next(other, None))
+            self._go_on()
+        check_alike((self.intended.count, self.intended.cut), (self.fixed.count, self.fixed.cut))
+
+    def _take_original(self, cut: Cut | None) -> None:
+        if cut is None:
+            self.unfixed.complete = self.intended.complete = True
+            return
+        assert cut.intended is not None
+        self.unfixed.add(cut.actual, cut.last, cut.flank)
+        self.intended.add(cut.intended, cut.last)
+        self.unseen.append(cut.unseen)
+        for axis, lines in cut.left.items():
+            self.left.setdefault(axis, []).append(lines)
+
+    def _take_other(self, cut: Cut | None) -> None:
+        if cut is None:
+            self.fixed.complete = True
+        else:
+            self.fixed.add(cut.actual, cut.last, cut.flank)
+
+    def _go_on(self) -> None:
+        for match in self.matches:
+            match.go_on()
+        for track in (self.intended, self.unfixed, self.fixed):
+            needed = [match.first_needed for match in self.matches if match.other is track]
+            own = [self._looked_at(match) for match in self.matches if match.path is track]
+            track.drop(min(needed + own))
+
+    def _looked_at(self, match: Match) -> float:
+        """The way along its path up to which a match has looked."""
+        curve, start = match.path.curve, match.done - match.path.dropped
+        return float(curve.lengths[start]) if start < len(curve) else match.path.reached

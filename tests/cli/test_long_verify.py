@@ -1,0 +1,112 @@
+"""Long programs are compared while they are read: with the figures of a comparison as wholes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ncfix.cli.comparing import Pair
+from ncfix.diagnostics import ExitCode
+
+GIVEN = ("--offset", "G54=0,0,0,0,0", "--tool", "0=0", "--dialect", "linuxcnc")
+HEAD = ["%", "(LONG)", "G21 G90 G94 G54 G17 F900.", "G0 X10. Y20. Z5. B0. C0."]
+SAME = {"rel": 1e-6, "abs": 2e-3}
+"""um: nearest points are within half a per cent where they are beyond the tolerance, and found from elsewhere."""
+
+
+def lines() -> list[str]:
+    """Cuts there and back with the rotary axes turning, a hundredth of them over 300 degrees, and rapids in between."""
+    found = list(HEAD)
+    for k in range(600):
+        word = "G0" if k % 50 == 49 else "G1"
+        turned = -20 + k % 43 if k % 97 else 300
+        found.append(
+            f"{word} X{10 + abs(k % 140 - 70):.3f} Y{20 + k % 9:.3f} Z{5 + k % 4}. B{k % 11}. C{turned}. F900."
+        )
+    return [*found, "M2", "%", ""]
+
+
+@pytest.fixture
+def verify(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """`verify(part, original, fixed)`: the JSON, of texts read in parts of so many bytes."""
+    machine = root / "benchmarks/five_axis.toml"
+
+    def call(part: int, original: list[str], fixed: list[str]) -> dict[str, Any]:
+        monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+        monkeypatch.setenv("NCFIX_NO_FAST", "1")
+        paths = [tmp_path / "a.ngc", tmp_path / "b.ngc"]
+        for path, each in zip(paths, (original, fixed), strict=True):
+            path.write_text("\n".join(each))
+        result = ncfix("verify", *paths, "-m", machine, *GIVEN, "--json")
+        assert result.code in (ExitCode.DONE, ExitCode.FINDINGS), result.err
+        found: dict[str, Any] = result.json()
+        return found
+
+    return call
+
+
+@pytest.fixture
+def corrected(root: Path, ncfix: Any, tmp_path: Path) -> list[str]:
+    """What `fix` makes of the lines."""
+    path, out = tmp_path / "original.ngc", tmp_path / "fixed.ngc"
+    path.write_text("\n".join(lines()))
+    assert ncfix("fix", path, "-o", out, "-m", root / "benchmarks/five_axis.toml", *GIVEN).code == ExitCode.DONE
+    return out.read_text().splitlines()
+
+
+@pytest.fixture
+def only_in_parts(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Nothing may be compared as a whole."""
+
+    def never(pair: Pair) -> None:
+        raise AssertionError("compared as a whole")
+
+    monkeypatch.setattr(Pair, "_as_wholes", never)
+    return monkeypatch
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether two comparisons say the same."""
+    for each in ("error_before_um", "error_after_um", "left_out_um"):
+        for figure in ("max", "rms"):
+            assert one[each][figure] == pytest.approx(other[each][figure], **SAME), (each, figure)
+        assert one[each]["where"] == other[each]["where"]
+    rest = ("within", "lines_beyond", "lines_not_reached", "lines_not_looked_at", "left_where_it_stands")
+    return all(one[key] == other[key] for key in rest)
+
+
+@pytest.mark.parametrize("part", [3000, 9000])
+def test_what_fix_wrote_is_right_in_any_parts(verify: Any, corrected: list[str], part: int, request: Any) -> None:
+    whole = verify(1 << 20, lines(), corrected)
+    assert whole["within"]
+    assert whole["error_before_um"]["max"] > 10
+    request.getfixturevalue("only_in_parts")
+    assert same(verify(part, lines(), corrected), whole)
+
+
+def test_faults_are_found_in_any_parts(verify: Any, corrected: list[str], request: Any) -> None:
+    wrong = list(corrected)
+    for at in (7, len(corrected) // 2, len(corrected) - 5):
+        wrong[at] += "\nG91 G1 Z0.0025\nZ-0.0025\nG90"
+    whole = verify(1 << 20, lines(), wrong)
+    assert len(whole["lines_beyond"]) >= 3
+    request.getfixturevalue("only_in_parts")
+    assert same(verify(3000, lines(), wrong), whole)
+
+
+@pytest.mark.parametrize("change", ["left out", "exchanged", "said too early", "ends early"])
+def test_faults_of_millimetres_are_found_in_any_parts(verify: Any, corrected: list[str], change: str) -> None:
+    place, wrong = len(corrected) // 2, list(corrected)
+    if change == "left out":
+        wrong[place : place + 2] = []
+    if change == "exchanged":
+        wrong[place : place + 2] = wrong[place : place + 2][::-1]
+    if change == "said too early":
+        wrong.insert(place - 2, wrong[place])
+    if change == "ends early":
+        wrong[-6:-3] = []
+    whole = verify(1 << 20, lines(), wrong)
+    assert not whole["within"]
+    assert same(verify(3000, lines(), wrong), whole)
