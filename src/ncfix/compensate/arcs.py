@@ -14,6 +14,7 @@ import numpy as np
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rows import vector_product
 from ncfix.compensate.segments import Segments, sweep_between
 
 LOOKS = 12
@@ -120,7 +121,7 @@ def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Ar
 def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array, fraction: Array) -> Array:
     """Centres moved along the bisector so that the arcs come closest to the wanted points, by least squares."""
     chord = across(ends[1] - ends[0], arcs.normal)
-    way = np.cross(arcs.normal, chord)
+    way = vector_product(arcs.normal, chord)
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
     here = _points(arcs, ends, centre, fraction)
     slope = (_points(arcs, ends, centre + NUDGE * way, fraction) - here) / NUDGE

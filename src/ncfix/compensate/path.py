@@ -25,7 +25,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import beside, deviations, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.round import may_be_round
-from ncfix.compensate.rows import every, finite
+from ncfix.compensate.rows import every, finite, vector_product
 from ncfix.compensate.sampling import too_long
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
@@ -194,7 +194,7 @@ def _pieces(intent: Intent, real: Segments, rows: Index, deviation: Array, toler
     if arcs.size:
         on = rows[arcs]
         spoke = real.start[on[:, None], intent.columns] - moves.centre[on]
-        radius = np.linalg.norm(np.cross(moves.normal[on], spoke), axis=1)
+        radius = np.linalg.norm(vector_product(moves.normal[on], spoke), axis=1)
         angle = 2 * np.arccos(np.clip(1 - tolerance / np.maximum(radius, tolerance), 0.0, 1.0))
         count[arcs] += np.abs(moves.sweep[on]) / angle
     return count

@@ -70,3 +70,11 @@ def lengths(vectors: Array) -> Array:
     """The lengths (n,) of vectors (n, k)."""
     size: Array = np.sqrt(sum((column * column for column in vectors.T), np.zeros(len(vectors))))
     return size
+
+
+def vector_product(first: Array, second: Array) -> Array:
+    """Vector products (n, 3): as `np.cross`, which takes several times as long over few of them."""
+    (a, b, c), (d, e, f) = first.T, second.T
+    product = np.empty(first.shape)
+    product[:, 0], product[:, 1], product[:, 2] = b * f - c * e, c * d - a * f, a * e - b * d
+    return product

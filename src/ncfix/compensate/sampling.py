@@ -8,7 +8,7 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
-from ncfix.compensate.rows import picked
+from ncfix.compensate.rows import picked, vector_product
 from ncfix.compensate.segments import Segments
 from ncfix.machine import Machine
 
@@ -78,7 +78,7 @@ def _arc_ways(intent: Intent, rows: Index) -> Array:
 def arc_radii(intent: Intent, rows: Index) -> Array:
     """The radii of arcs where they start, (k,) mm."""
     start = intent.segments.start[rows[:, None], intent.columns] - intent.moves.centre[rows]
-    radius: Array = np.linalg.norm(np.cross(intent.moves.normal[rows], start), axis=1)
+    radius: Array = np.linalg.norm(vector_product(intent.moves.normal[rows], start), axis=1)
     return radius
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.rows import picked, spread
+from ncfix.compensate.rows import picked, spread, vector_product
 from ncfix.program.moves import Kind, Moves
 
 
@@ -77,13 +77,14 @@ class Segments:
 
     def _on_arc(self, rows: Index, fraction: Array) -> Array:
         """X Y Z at fractions of arcs, (k, 3)."""
-        start, end = (points[rows[:, None], self.columns] - self.centre[rows] for points in (self.start, self.end))
-        normal, sweep, f = self.normal[rows], self.sweep[rows], fraction[:, None]
+        centre, normal = picked(self.centre, rows), picked(self.normal, rows)
+        sweep, f = self.sweep[rows], fraction[:, None]
+        start, end = (picked(points, rows).take(self.columns, axis=1) - centre for points in (self.start, self.end))
         low, high = _height(start, normal), _height(end, normal)
         from_start = _turned(start - low * normal, normal, fraction * sweep)
         from_end = _turned(end - high * normal, normal, (fraction - 1) * sweep)
         height = (1 - f) * low + f * high
-        result: Array = self.centre[rows] + height * normal + (1 - f) * from_start + f * from_end
+        result: Array = centre + height * normal + (1 - f) * from_start + f * from_end
         return result
 
 
@@ -94,7 +95,7 @@ def _height(points: Array, normal: Array) -> Array:
 
 def _turned(radius: Array, normal: Array, angle: Array) -> Array:
     """Radius vectors turned about the normal that they are perpendicular to."""
-    across = np.cross(normal, radius)
+    across = vector_product(normal, radius)
     result: Array = np.cos(angle)[:, None] * radius + np.sin(angle)[:, None] * across
     return result
 
@@ -105,7 +106,7 @@ def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: 
     For where the ends of an arc were moved a little: of all angles that fit, the one next to `like`.
     """
     first, last = start - centre, end - centre
-    sine = np.einsum("ij,ij->i", np.cross(first, last), normal)
+    sine = np.einsum("ij,ij->i", vector_product(first, last), normal)
     cosine = np.einsum("ij,ij->i", first, last) - _height(first, normal)[:, 0] * _height(last, normal)[:, 0]
     change = np.arctan2(sine, cosine) - like
     result: Array = like + change - 2 * np.pi * np.round(change / (2 * np.pi))

@@ -75,7 +75,7 @@ class Reading:
     @classmethod
     def of(cls, moves: Moves, pieces: Pieces) -> Reading:
         """From the motions that were read where `pieces` were written (same rows)."""
-        last = _last_pieces(pieces)
+        last = np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
         first = np.append(0, last[:-1] + 1)
         return cls(moves.frame[last], moves.frames, moves.start[first], moves.end[last])
 
@@ -131,7 +131,6 @@ class _Emitter:
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
-        self.eol = program.line_end.decode()
         self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
@@ -139,10 +138,10 @@ class _Emitter:
         self.cycle_end: FloatArray | None = None
         self.levels = LevelBook(moves, pieces)
         self.written: dict[int, Rendered] = {}
+        self.latest: list[int] = []
+        self.added = 0
         self.conflicts: dict[int, str] = {}
-        self.end = pieces.end.copy()
-        self.centre = pieces.centre.copy()
-        self.start = moves.start.copy()
+        self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
         self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
 
     def run(self, done: FloatArray | None, row: int) -> Emission:
@@ -167,9 +166,8 @@ class _Emitter:
                 self.cycle_end = None
                 self.levels.forget()
             row += 1
-        edits, added = self._edits()
-        splices = Splices.joined([*self.bulk.parts, Splices.of(edits)])
-        return Emission(splices, self.end, self.centre, self.start, self.conflicts, added + self.bulk.added)
+        splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
+        return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
 
     @property
     def moved(self) -> NDArray[np.bool_]:
@@ -182,10 +180,12 @@ class _Emitter:
         """Write the stretch of plain motions that begins here all at once; the number of motions written."""
         if self.replaced is not None:
             return 0
-        frame = self.reading.frame[row]
+        frame, before = self.reading.frame[row], len(self.bulk.parts)
         ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
         if ends is None:
             return 0
+        if self.latest:
+            self.bulk.parts.insert(before, Splices.of(self._edits()))
         first = self.first_piece[row]
         stop = int(np.searchsorted(self.first_piece, first + len(ends)))
         self.end[first : first + len(ends)] = ends
@@ -281,8 +281,10 @@ class _Emitter:
         self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
         self._note_code(row, target.last_code)
-        earlier = self.written.setdefault(block, rendered)
-        if earlier is not rendered and earlier.text != rendered.text:
+        if block not in self.written:
+            self.written[block] = rendered
+            self.latest.append(block)
+        elif self.written[block].text != rendered.text:
             self.conflicts.setdefault(block, SEVERAL_STATES)
 
     def _target(self, row: int, rows: slice) -> Target:
@@ -347,22 +349,26 @@ class _Emitter:
         return self.position
 
     def _layout(self, block: int) -> BlockLayout | None:
-        if block not in self.layouts:
-            self.layouts[block] = self.language.layout(self.program, block)
-        return self.layouts[block]
+        key = int(self.program.template[block]) if self.language.alike else block
+        if key not in self.layouts:
+            self.layouts[key] = self.language.layout(self.program, block)
+        return self.layouts[key]
 
     # -- the result ---------------------------------------------------------------------------------------------------
 
-    def _edits(self) -> tuple[tuple[Edit, ...], int]:
-        edits: list[Edit] = []
-        added = 0
-        for block, rendered in sorted(self.written.items()):
+    def _edits(self) -> list[Edit]:
+        """What was written one by one since this was last asked."""
+        edits, end_of_line = list[Edit](), self.program.line_end.decode()
+        for block in sorted(self.latest):
+            rendered = self.written[block]
             edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
             if rendered.lines:
                 at = int(self.program.blocks[block, 1])
-                edits.append(Edit(at, at, "".join(self.eol + line for line in rendered.lines).encode("latin-1")))
-                added += len(rendered.lines)
-        return tuple(edits), added
+                text = "".join(end_of_line + line for line in rendered.lines)
+                edits.append(Edit(at, at, text.encode("latin-1")))
+                self.added += len(rendered.lines)
+        self.latest = []
+        return edits
 
 
 def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> FloatArray:
@@ -377,11 +383,6 @@ def _plane(normal: FloatArray) -> tuple[int, int, int]:
     """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
     across = int(np.argmax(np.abs(normal)))
     return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
-
-
-def _last_pieces(pieces: Pieces) -> NDArray[np.intp]:
-    """(n,) index of the last piece of each motion."""
-    return np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
 
 
 def _jumps(moves: Moves) -> NDArray[np.bool_]:

@@ -100,6 +100,7 @@ class Language:
     lenient   a block that cannot be read, and that the control may never get to, is no error until it does
     follow    the program's motions; raises what `trace` does
     layout    (program, block) -> the parts of a motion block that may be written; None where nothing may
+    alike     those of all blocks of a shape are the same
     render    (program, block, layout, target) -> its edits, and the lines that come after it
     arc_pieces  `render` can write an arc as several (`Target.arcs`)
     bulk      (program, block) -> what `render` would need to know to write motions like this one many at a time; None
@@ -119,6 +120,7 @@ class Language:
     follow: Callable[[Program, Run], Trace]
     layout: Callable[[Program, int], BlockLayout | None]
     render: Callable[[Program, int, Any, Target], Rendered]
+    alike: bool = False
     lenient: bool = False
     arc_pieces: bool = False
     bulk: Callable[[Program, int], BulkLayout | None] | None = None

@@ -75,6 +75,7 @@ FANUC: Language = replace(
     parse=parse_block,
     follow=follow,
     layout=layout,
+    alike=False,
     render=render,
     bulk=in_bulk,
     unroll=unroll,

@@ -71,6 +71,7 @@ RS274 = Language(
     parse=parse_block,
     follow=follow,
     layout=writable,
+    alike=True,
     render=render,
     lenient=True,
     unroll=unroll,
