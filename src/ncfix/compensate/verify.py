@@ -136,17 +136,11 @@ def samples(
 
 def _counts(written: Written, which: Index, density: float) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
-    move = written.pieces.move[which]
-    if (np.diff(move) > 0).all():
-        wished = bends(written.intent, move) * written.span[which]
-    else:
-        motions, place = np.unique(move, return_inverse=True)
-        wished = bends(written.intent, motions)[place] * written.span[which]
-    kind = written.intent.moves.kind[move]
-    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (written.span[which] > 2 * INSTANT)
-    along &= written.intent.moving[move]
-    for begins, rows in ((written.segments.start, which), (written.start, move), (written.intent.moves.start, move)):
-        along &= finite(picked(begins, rows))
+    intent, move, span = written.intent, written.pieces.move[which], written.span[which]
+    wished, kind = bends(intent, move) * span, intent.moves.kind[move]
+    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (span > 2 * INSTANT) & intent.moving[move]
+    begun = picked(written.segments.start, which) + picked(written.start, move) + picked(intent.moves.start, move)
+    along &= finite(begun)
     counts = np.minimum(np.nan_to_num(np.ceil(density * wished)), MOST_SHOWN)
     return np.where(along & (wished >= STRAIGHT), counts, 0).astype(np.intp), along
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.machine.axis import Axis, Tool, Vector
+from ncfix.machine.axis import Axis, Tool
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of, slot_of
 from ncfix.machine.se3 import Array
@@ -80,10 +80,9 @@ class Bow:
         return bow, angle
 
 
-def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...], offset: Vector) -> Bow | None:
+def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> Bow | None:
     """The bounds of a machine; None if one of its effects does not say its own, or depends on more than one axis."""
     sizes, slopes, curvatures = np.zeros(2), np.zeros((2, len(axes))), np.zeros((2, len(axes)))
-    points = [np.asarray(slot_of(axes, tool, effect).reference) for effect in effects if effect.active]
     for effect in effects:
         if not effect.active:
             continue
@@ -101,6 +100,14 @@ def bow_of(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...], offs
             rate = 1 / abs(signal.scale * signal.unit)
             slopes[kind, signal.axis] += bounds[1] * rate
             curvatures[kind, signal.axis] += bounds[2] * rate * rate
-    places = [*points, np.asarray(tool.point), np.asarray(offset), *(np.asarray(axis.point) for axis in axes)]
-    reach = 2 * sum(float(np.linalg.norm(place)) for place in {tuple(place.tolist()) for place in places})
-    return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, reach)
+    return Bow(float(sizes[0]), float(sizes[1]), slopes, curvatures, _reach(axes, tool, effects))
+
+
+def _reach(axes: tuple[Axis, ...], tool: Tool, effects: tuple[Effect, ...]) -> float:
+    """`Bow.reach`: from a reference point over the rotary axes between it and the tool, along the chain.
+
+    However an axis turns what is behind it, it keeps its distance from that axis.
+    """
+    slots = {slot_of(axes, tool, effect) for effect in effects if effect.active}
+    ways = [[slot.reference, *(axis.point for axis in axes[slot.joint :] if axis.rotary), tool.point] for slot in slots]
+    return max((sum(float(np.linalg.norm(step)) for step in np.diff(way, axis=0)) for way in ways), default=0.0)

@@ -158,7 +158,7 @@ class Machine:
     @cached_property
     def bow(self) -> Bow | None:
         """How far the error of the tip may bow on straight motions; None if not known."""
-        return bow_of(self.axes, self.tool, self.effects, self.workpiece_offset)
+        return bow_of(self.axes, self.tool, self.effects)
 
     @cached_property
     def linear_ways(self) -> Array | None:
