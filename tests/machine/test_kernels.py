@@ -62,6 +62,20 @@ def test_gaps_are_the_difference_of_tips(name: str, compiled: bool, root: Path) 
         found = each.gaps(meant, (meant, shifted, turned), state)
         for q, gap in zip((meant, shifted, turned), found, strict=True):
             assert np.array_equal(gap, each.actual_tip(q, state) - each.tip(meant, state.tool_length))
+        assert np.array_equal(each.gaps(shifted, (turned,), state, each.tip(meant, state.tool_length)), [found[2]])
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_axes_led_to_a_point(name: str, root: Path) -> None:
+    machine = load(root / "examples" / "machines" / f"{name}.toml")
+    q, lengths = poses(machine, 300), np.linspace(20, 90, 300)
+    axes = tuple(machine.axis_names.index(axis) for axis in "XYZ")
+    found = []
+    for compiled in (False, True):
+        fast.disengage()
+        assert not compiled or fast.engage()
+        found.append(machine.placed(q, axes, poses(machine, 301)[:300, :3], lengths))
+    assert np.array_equal(*found)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -186,10 +186,8 @@ class Intent:
 
         All (k, n_axes), of motions `rows` (k,).
         """
-        if not self.moves.tcp[rows].any():
-            return self.machine.gaps(programmed, done, states)
-        tip = self.meant(rows, programmed)
-        return [self.machine.actual_tip(q, states) - tip for q in done]
+        tip = self.meant(rows, programmed) if self.moves.tcp[rows].any() else None
+        return self.machine.gaps(programmed, done, states, tip)
 
     def follows(self, rows: Index, commands: Array) -> Array:
         """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""

@@ -1,4 +1,4 @@
-"""Newton's method for many poses, as loops: what `kernels` compiles, as `loops` are."""
+"""Linear axes that bring the tip to a point, for many poses, as loops: what `kernels` compiles, as `loops` are."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ncfix.machine.loops import (
     unpacked,
     work_out,
 )
-from ncfix.machine.steps import SHIFT, TURN, Steps, dot, has_arrived, twice_crossed, volume
+from ncfix.machine.steps import SHIFT, TURN, Steps, dot, has_arrived, turned, twice_crossed, volume
 
 
 class Goal(NamedTuple):
@@ -157,5 +157,74 @@ def follow(steps: Steps, column: int, hand: Hand, count: int, way: Array) -> Non
                 way[0, k], way[1, k], way[2, k] = x + ex, y + ey, z + ez
 
 
-HELPERS = (set_out, step_closer, follow)
+def placed(
+    perfect: Packed, columns: Columns, axes: Ints, ways_back: Array, target: Array, work: Array, out: Array
+) -> None:
+    """Where linear axes have to be for all tips to be at `target` (3, n) mm, out (3, n): as `Route.placed`.
+
+    axes       the columns of X, Y and Z; no rotary axis stands between them
+    ways_back  (3, 3) what takes a way of the tip to one of the axes
+    """
+    steps, functions = unpacked(perfect[0], perfect[1])
+    hand, spare = laid_out(work, columns, len(functions.order), len(steps.kind))
+    first, point, n = first_of(steps, axes), spare[:3], columns.q.shape[1]
+    before = Steps(
+        steps.start,
+        steps.kind[:first],
+        steps.axis,
+        steps.direction,
+        steps.point,
+        steps.center,
+        steps.small,
+        steps.rotates,
+        steps.screws,
+    )
+    for begin in range(0, n, HANDFUL):
+        count = min(HANDFUL, n - begin)
+        take_up(columns, begin, count, hand)
+        carry(before, hand, count, hand.tip)
+        for i in range(3):
+            for k in range(count):
+                point[i, k] = target[i, np.uint64(begin + k)]
+        bring_back(steps, first, axes, hand, count, point)
+        for i in range(3):
+            a, b, c = ways_back[i, 0], ways_back[i, 1], ways_back[i, 2]
+            for k in range(count):
+                way = point[0, k] - hand.tip[0, k], point[1, k] - hand.tip[1, k], point[2, k] - hand.tip[2, k]
+                out[i, np.uint64(begin + k)] = dot((a, b, c), way)
+
+
+def first_of(steps: Steps, axes: Ints) -> int:
+    """The first step along one of these axes."""
+    for i in range(len(steps.kind)):
+        if steps.kind[i] == SHIFT and is_one_of(steps.axis[i], axes):
+            return i
+    return len(steps.kind)
+
+
+def is_one_of(axis: int, axes: Ints) -> bool:
+    """Whether a column is that of X, Y or Z."""
+    return bool(axis == axes[0] or axis == axes[1] or axis == axes[2])
+
+
+def bring_back(steps: Steps, first: int, axes: Ints, hand: Hand, count: int, point: Array) -> None:
+    """Bring points (3, .) back before the steps from the first one on, but for those along X, Y and Z."""
+    d, p = steps.direction, steps.point
+    for i in range(len(steps.kind) - 1, first - 1, -1):
+        axis, j = steps.axis[i], 3 * i
+        dx, dy, dz, px, py, pz = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
+        if steps.kind[i] == TURN:
+            for k in range(count):
+                turn = -hand.sine[axis, k], hand.versine[axis, k]
+                point[0, k], point[1, k], point[2, k] = turned(
+                    point[0, k], point[1, k], point[2, k], dx, dy, dz, px, py, pz, turn[0], turn[1]
+                )
+        elif not is_one_of(axis, axes):
+            for k in range(count):
+                way = hand.q[axis, k]
+                point[0, k], point[1, k] = point[0, k] - dx * way, point[1, k] - dy * way
+                point[2, k] = point[2, k] - dz * way
+
+
+HELPERS = (set_out, step_closer, follow, first_of, is_one_of, bring_back)
 """Loops that others are made of."""

@@ -20,6 +20,7 @@ COLUMNS = loops.Columns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
 
 tips = LIBRARY.kernel(*ROUTE, COLUMNS, "f8[:,:]", "f8[:,:]")(loops.tips)
 aim = LIBRARY.kernel(ROUTE, ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:,:]")(aim_loops.aim)
+placed = LIBRARY.kernel(ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]")(aim_loops.placed)
 
 
 @LIBRARY.helper

@@ -190,10 +190,10 @@ class Machine:
         """Where the tip really is in the workpiece frame, shape (..., 3) [mm]."""
         return self._tip(q, state, None if self.is_perfect else self._model)
 
-    def gaps(self, meant: Array, done: Sequence[Array], state: State = State()) -> list[Array]:  # noqa: B008
+    def gaps(self, meant: Array, done: Sequence[Array], state: State, tip: Array | None = None) -> list[Array]:
         """Where the tip really is with the axes at each of `done`, minus where a perfect machine has it at `meant`.
 
-        All (n, n_axes); (n, 3) mm each. What `actual_tip` and `tip` say, with sines worked out once if they can be.
+        All (n, n_axes); (n, 3) mm each, and `tip`: where that is, if known. Sines are worked out once if they can be.
         """
         model, perfect = None if self.is_perfect else self._model, self._perfect_route
         assert perfect is not None
@@ -202,7 +202,7 @@ class Machine:
         found = [np.empty((3, goals.positions.shape[1])) for _ in done]
         for part, goal in goals.chunks():
             turns = (route or perfect).turns(goal)
-            target = self._tips_along(perfect, goal, None, turns)
+            target = self._tips_along(perfect, goal, None, turns) if tip is None else tip[part].T
             for out, here in zip(found, (each.part(part) for each in others), strict=True):
                 alike = np.array_equal(here.positions[self.rotary], goal.positions[self.rotary])
                 out[:, part] = self._tips_along(route, here, model, turns if alike else None) - target
@@ -287,8 +287,7 @@ class Machine:
 
         Shape (n, 3). Only with `linear_ways` that span space.
         """
-        assert self.linear_ways is not None
-        assert self._perfect_route is not None
+        assert self.linear_ways is not None and self._perfect_route is not None  # noqa: PT018
         _, poses = flatten(q, State(tool_length), self.axes, frozenset())
         goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
         back: Array = np.linalg.inv(self.linear_ways).astype(np.float64)

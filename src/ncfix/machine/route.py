@@ -73,6 +73,13 @@ class Route:
 
         back  (3, 3) what takes a way of the tip to one of the axes: the inverse of `ways_together`
         """
+        if _are_many(target.shape[1]):
+            from ncfix.machine import kernels
+
+            given, out = self.columns(poses, self.turns(poses)), np.empty(target.shape)
+            goal, columns = np.ascontiguousarray(target), np.array(axes, dtype=np.int64)
+            kernels.placed(self.compiled, given, columns, back, goal, room(self.compiled, given), out)
+            return out
         x, y, z = target
         way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))
         out = np.empty(target.shape)
