@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
+from ncfix.records import dataclass
 from ncfix.tables.control import Least, Request
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_even_nodes, of_functions

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from ncfix.records import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
 from ncfix_isg.leadscrew import MARK, bare

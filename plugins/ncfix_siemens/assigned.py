@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.lines import Remarks
 from ncfix_siemens.syntax import Assignment

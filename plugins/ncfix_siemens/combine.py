@@ -6,10 +6,11 @@ Only one factor of a pair carries sign and unit: the table that points, the base
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from ncfix.records import dataclass
 from ncfix.tables.axes import unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.neutral import Compensation, Term

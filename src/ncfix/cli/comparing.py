@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import fast
@@ -11,6 +10,7 @@ from ncfix.cli.options import dialect_of, read_program, subprograms
 from ncfix.cli.parts import Source, part_bytes, source_of
 from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import DifferenceError, NcfixError, SourceError
+from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.side_by_side import Along, SideBySide

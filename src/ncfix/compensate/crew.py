@@ -16,12 +16,13 @@ import os
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic, Protocol, TypeVar
 
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
 from ncfix.compensate.settle import Before
+from ncfix.records import dataclass
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)

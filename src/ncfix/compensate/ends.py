@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ncfix.compensate.rows import chosen, finite, picked, put
 from ncfix.compensate.standing import standing
 from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
+from ncfix.records import dataclass
 
 BATCH = 32_768
 """Ends corrected at a time."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
@@ -11,6 +9,7 @@ from ncfix.compensate.rows import greatest, picked
 from ncfix.compensate.wordless import lacking
 from ncfix.compensate.written import Written
 from ncfix.program.moves import Kind
+from ncfix.records import dataclass
 
 TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from ncfix.compensate.findings import Array, Mask
 from ncfix.diagnostics import Message, Place
 from ncfix.program.tree import Program
+from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.settle import Settled

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from ncfix.machine.basis import Basis
 from ncfix.machine.smooth import Fourier, Polynomial
 from ncfix.machine.units import Unit, units
 from ncfix.measure.measurement import Array
+from ncfix.records import dataclass
 
 Mask = NDArray[np.bool_]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from ncfix.machine import se3
 from ncfix.machine.se3 import Array
+from ncfix.records import dataclass
 
 Vector = tuple[float, float, float]
 Triad = tuple[Vector, Vector, Vector]

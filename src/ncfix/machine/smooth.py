@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
 
 from ncfix.machine.basis import Array, Basis, key
+from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

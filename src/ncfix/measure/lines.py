@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.diagnostics import ConfigError, Message, Place
+from ncfix.records import dataclass
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""

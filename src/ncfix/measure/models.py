@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.effect import SPINDLE
 from ncfix.machine.smooth import Backlash, Polynomial
+from ncfix.records import dataclass
 
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
 RADIAN = 180 / np.pi

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from ncfix.diagnostics import Place
 from ncfix.measure.measurement import Array, Index
 from ncfix.measure.observation import Mask
+from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.measure.calibrate import Estimate, Problem

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 from lark import Token, Tree
 
@@ -32,6 +31,7 @@ from ncfix.program.tree import (
     Unary,
     Word,
 )
+from ncfix.records import dataclass
 
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from ncfix.program.language import BulkLayout, Language
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.moves import Moves
 from ncfix.program.tree import START, Program
+from ncfix.records import dataclass
 
 IntArray = NDArray[np.int64]
 

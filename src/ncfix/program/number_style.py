@@ -7,7 +7,8 @@ One rule for all output: a value is printed with a fixed number of decimals, cor
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
+
+from ncfix.records import dataclass
 
 MOST_BLOCKS = 1_000_000
 """Blocks that are executed beyond those of a program's own text before it counts as endless: under half a minute."""

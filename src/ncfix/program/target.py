@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.pointing import Pointing
+from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 

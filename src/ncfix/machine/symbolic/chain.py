@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import sympy as sp
 
 from ncfix.machine.symbolic.steps import UNITS, Step, Translation, Vector
 from ncfix.machine.symbolic.variables import Variable
+from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from ncfix.records import dataclass
 
 LETTERS = "XYZABCUVW"
 """The axis letters of RS274NGC in the order of its parameters; every position here is a list in this order."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.klartext.plans import LETTERS, Plan
 from ncfix.program.tree import Constant, Literal, Template
+from ncfix.records import dataclass
 
 STRAIGHT = frozenset({"", "l", "ln"})
 IDLE = frozenset({"F", "S", "NX", "NY", "NZ"})

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ncfix.program.number_style import NumberStyle
+from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

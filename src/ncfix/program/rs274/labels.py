@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.unit import Unit
+from ncfix.records import dataclass
 
 BAD_FLOW = "NCF230"
 
