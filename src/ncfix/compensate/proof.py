@@ -92,6 +92,8 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
     meant = emission.end if own is None else picked(emission.end, rows)
     differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
+    if not arcs.size:
+        return differs
     off = again.centre[arcs] - emission.centre[rows[arcs]]
     off[np.isnan(again.centre[arcs]) & np.isnan(emission.centre[rows[arcs]])] = 0.0
     off = across(off, again.normal[arcs])  # the height of a centre means nothing
@@ -111,9 +113,9 @@ def _sweeps(settled: Settled) -> Array:
 def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
     """Motions that are kept, and that the new text leads elsewhere: what they rely on was not kept."""
     pieces, ends = settled.plan.pieces, settled.moves.end
+    if not pieces.kept.any():
+        return np.zeros(len(rows), dtype=bool)
     kept = pieces.kept[rows]
-    if not kept.any():
-        return kept
     own = np.flatnonzero(kept)
     off = np.abs(again.end[own] - ends[pieces.move[rows[own]]])
     if not (off > STRAY).any():
@@ -128,7 +130,8 @@ def _strayed(settled: Settled, again: Moves, rows: Index) -> Mask:
 def differ(found: Array, meant: Array) -> Mask:
     """Rows of commands (m, n_axes) that are not the same but for noise."""
     with np.errstate(invalid="ignore"):
-        same = np.asarray(np.abs(found - meant) <= SAME)
+        off = found - meant
+        same = np.asarray(np.abs(off, out=off) <= SAME)
     if not same.all():
         same = same | (found == meant) | (np.isnan(found) & np.isnan(meant))
     return ~every(same)

@@ -138,15 +138,16 @@ class PartReader:
 
     def last_cut(self, program: Program) -> int:
         """The last block before which a part may end; 0 if there is none."""
-        for shape, block in zip(*np.unique(program.template, return_index=True), strict=True):
-            if int(shape) not in self.plain:
-                self.plain[int(shape)] = self._is_plain(program, int(block))
-        plain = np.array([self.plain.get(shape, False) for shape in range(len(self.templates))], dtype=np.bool_)
-        fine = plain[program.template]
-        cuts = np.flatnonzero(fine[1:] & fine[:-1])
-        return int(cuts[-1]) + 1 if len(cuts) else 0
+        pairs = ((block, block - 1) for block in range(len(program) - 1, 0, -1))
+        return next((pair[0] for pair in pairs if all(self._is_plain(program, each) for each in pair)), 0)
 
     def _is_plain(self, program: Program, block: int) -> bool:
+        shape = int(program.template[block])
+        if shape not in self.plain:
+            self.plain[shape] = self._has_plain_shape(program, block)
+        return self.plain[shape]
+
+    def _has_plain_shape(self, program: Program, block: int) -> bool:
         template = program.templates[int(program.template[block])]
         if self.language.bulk is None or template.m_codes or any(isinstance(item, Skip) for item in template.items):
             return False

@@ -244,7 +244,7 @@ class Builder:
         )
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles = self._style_columns(style)
-        programmed, counted = named.take(mask, axis=0), self._counted_column(styles["incremental"])
+        programmed, counted = named.take(mask, axis=0), self._mask_column(self._counted, styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
@@ -262,11 +262,11 @@ class Builder:
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
-            placed=(~named).take(adrift, axis=0),
+            placed=(~named).take(adrift, axis=0) if adrift.any() else None,
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
             angles=angles,
-            resting=self._mask_column(self._resting, np.zeros(programmed.shape, dtype=np.bool_)),
+            resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
             **styles,
         )
 
@@ -342,21 +342,20 @@ class Builder:
         column[rows] = True
         return column
 
-    def _counted_column(self, incremental: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        return self._mask_column(self._counted, np.repeat(incremental[:, None], len(self.columns), axis=1))
-
     def _mask_column(self, masks: dict[int, int], otherwise: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
-        """(n, n_axes) from bit masks of some motions; None if there are none."""
+        """(n, n_axes) from bit masks of some motions, and what holds for the others (n,); None if there are none."""
         if not masks:
             return None
+        column = np.repeat(otherwise[:, None], len(self.columns), axis=1)
         bits = np.array([1 << column for column in self.columns], dtype=np.int64)
-        otherwise[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
-        return otherwise
+        column[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
+        return column
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        centre, normal, sweep = np.full((count, 3), np.nan), np.full((count, 3), np.nan), np.full(count, np.nan)
-        rows = list(self._arcs)
+        rows, nowhere, none = list(self._arcs), np.broadcast_to(np.nan, (count, 3)), np.broadcast_to(np.nan, count)
+        centre, normal, sweep = nowhere, nowhere, none
         if rows:
+            centre, normal, sweep = nowhere.copy(), nowhere.copy(), none.copy()
             centre[rows] = [arc.centre for arc in self._arcs.values()]
             normal[rows] = [arc.normal for arc in self._arcs.values()]
             sweep[rows] = [arc.sweep for arc in self._arcs.values()]

@@ -29,10 +29,10 @@ def check_reach(program: Program, moves: Moves) -> None:
 
 def _are_far(places: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(n,) which of (n, k) places are too far away."""
-    far = np.abs(places) > FAR
     rows = np.zeros(len(places), dtype=np.bool_)
-    if far.any():
-        rows[np.flatnonzero(far) // places.shape[1]] = True
+    if not places.size or max(places.max(), -places.min()) <= FAR:
+        return rows
+    rows[np.flatnonzero(np.abs(places) > FAR) // places.shape[1]] = True
     return rows
 
 
