@@ -1,24 +1,27 @@
 """The tip errors of a part of plain motions, before and after: mostly from what is known of their ends.
 
-Where a motion is so short that its error cannot bend, it is looked at where it ends only. What the tip is off there was
-found when the end was corrected, and what is left is what the numbers that were written differ from those that were
-meant (see `known`). All other motions are looked at along their way, as `verify` does.
+What the tip is off at an end was found when the end was corrected, and what is left is what the numbers that were
+written differ from those that were meant (see `known`). Motions over which the error may bend are looked at inside,
+too, in the places at which `verify` would look; the few that are made of pieces, or pass a kink, it looks at itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.findings import Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
-from ncfix.compensate.ragged import owners, places
-from ncfix.compensate.rows import greatest, lengths
-from ncfix.compensate.sampling import features, passed
-from ncfix.compensate.verify import STRAIGHT, FigureTally, PathError, Samples, samples
+from ncfix.compensate.ragged import batches, owners, places
+from ncfix.compensate.rows import greatest, lengths, picked
+from ncfix.compensate.sampling import MOST_SHOWN, even, features, passed
+from ncfix.compensate.segments import Segments
+from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.written import Written
 from ncfix.program.emit import Emission
 from ncfix.program.moves import Kind
@@ -27,75 +30,80 @@ from ncfix.program.pieces import Pieces
 
 def figures(course: Course, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
-    moves, start, end = course.part.moves, text.start, course.last(text.end)
+    moves, written = course.part.moves, replace(course.real, start=text.start, end=course.last(text.end))
     shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
-    tally, along = FigureTally(len(moves)), _in_pieces_or_kinked(course, start, end)
-    along |= ~course.plain | course.behind_dwells
-    (_compiled if fast.engaged() else _by_columns)(course, text, (start, end), (shown, along), tally)
-    rows = np.flatnonzero(along & shown)
+    apart = ~course.plain | course.behind_dwells | (np.diff(course.first) > 1)
+    apart[passed(course.intent, written.start, written.end)[0]] = True
+    tally = FigureTally(len(moves))
+    counts = (_compiled if fast.engaged() else _by_columns)(course, text, written, (shown, apart), tally)
+    inside = np.flatnonzero(counts)
+    for part in batches(counts[inside], BATCH):
+        tally.add(_inside(course, written, inside[part], counts[inside[part]]))
+    rows = np.flatnonzero(apart & shown)
     if rows.size:
-        for part in _along(course, text, rows):
-            tally.add(part)
+        for found in _along(course, text, rows):
+            tally.add(found)
     return tally.result()
 
 
-def _in_pieces_or_kinked(course: Course, start: Array, end: Array) -> Mask:
-    """(n,) motions in several pieces, or with a kink of the error on their way."""
-    found: Mask = np.diff(course.first) > 1
-    found[passed(course.intent, start, end)[0]] = True
-    return found
-
-
 def _by_columns(
-    course: Course, text: Emission, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
-) -> None:
-    """Count the errors at the ends of motions that need no more; the others are marked."""
-    shown, along = masks
-    along |= _to_be_followed(course, ends[1])
-    rows = np.flatnonzero(shown & ~along)
+    course: Course, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally
+) -> Index:
+    """Count the errors at the ends of motions that are shown, and not apart; at how many places inside to look, (n,).
+
+    Those at the end of which the error is not known are put apart.
+    """
+    (shown, apart), moves, machine = masks, course.part.moves, course.intent.machine
+    apart |= greatest(np.abs(written.end - course.real.end)[:, machine.rotary]) > TURNED
+    bends = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1)
+    bent = shown & ~apart & (moves.kind == Kind.FEED) & (bends >= STRAIGHT)
+    counts = np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
+    rows = np.flatnonzero(shown & ~apart)
     if rows.size:
-        tally.add(_at_ends(course, *ends, rows))
+        tally.add(_at_ends(course, written, rows, counts))
+    return counts
 
 
-def _compiled(
-    course: Course, text: Emission, ends: tuple[Array, Array], masks: tuple[Mask, Mask], tally: FigureTally
-) -> None:
+def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Mask, Mask], tally: FigureTally) -> Index:
     """As `_by_columns`."""
     from ncfix.compensate import plain_kernels
 
     moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
     assert machine.linear_ways is not None
-    places[0] = 0
+    places[0], counts = 0, np.zeros(len(moves), dtype=np.intp)
     plain_kernels.at_ends(
         (moves.start, moves.end),
         (text.start[0], text.end, course.first),
         (course.real.end, course.before),
         (features(machine), np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
-        (STRAIGHT, TURNED),
-        masks,
-        (sums, places),
+        (STRAIGHT, TURNED, DENSITY, MOST_SHOWN),
+        (*masks, moves.kind == Kind.FEED),
+        (sums, places, counts),
     )
     way, *squares = sums[:3].tolist()
     count, *rows = places.tolist()
     tally.take(way, count, squares, [(most, row, 1.0) for most, row in zip(sums[3:].tolist(), rows, strict=True)])
+    return counts
 
 
-def _to_be_followed(course: Course, end: Array) -> Mask:
-    """(n,) motions along which the error may bend, or at the end of which it is not known."""
-    moves, machine = course.part.moves, course.intent.machine
-    found: Mask = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1) >= STRAIGHT
-    found |= greatest(np.abs(end - course.real.end)[:, machine.rotary]) > TURNED
-    return found
-
-
-def _at_ends(course: Course, start: Array, end: Array, rows: Index) -> Samples:
-    """The errors at the ends of motions `rows` (k,), each for its whole way."""
+def _at_ends(course: Course, written: Segments, rows: Index, counts: Index) -> Samples:
+    """The errors at the ends of motions `rows` (k,), each for its share of the way; `counts` (n,) places are inside."""
     ways, columns = course.intent.machine.linear_ways, course.intent.columns
     assert ways is not None
-    chosen = slice(None) if len(rows) == len(end) else rows
-    off = (end[chosen] - course.real.end[chosen])[:, columns] @ ways.T
-    way = lengths((end[chosen] - start[chosen])[:, ~course.intent.machine.rotary])
+    chosen = slice(None) if len(rows) == len(counts) else rows
+    off = (written.end[chosen] - course.real.end[chosen])[:, columns] @ ways.T
+    way = lengths((written.end[chosen] - written.start[chosen])[:, ~course.intent.machine.rotary]) / (
+        counts[chosen] + 1
+    )
     return Samples(rows, np.ones(len(rows)), course.before[chosen], lengths(off), way, 0.0, 0.0)
+
+
+def _inside(course: Course, written: Segments, rows: Index, counts: Index) -> Samples:
+    """The errors inside of motions `rows` (k,), at `counts` (k,) places each."""
+    intent, move, fraction = course.intent, np.repeat(rows, counts), even(counts)
+    chord = (picked(written.end, rows) - picked(written.start, rows))[:, ~intent.machine.rotary]
+    weight = np.repeat(lengths(chord) / (counts + 1), counts)
+    return Samples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
 
 
 def _along(course: Course, text: Emission, rows: Index) -> Iterator[Samples]:

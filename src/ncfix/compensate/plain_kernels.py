@@ -94,34 +94,36 @@ def bounds(
     ("f8[:]", "f8[:,:]", "i8[:]"),
     ("f8[:,:]", "f8[:]"),
     ("f8[:]", "f8[:,:]", "i8[:]", "b1[:]"),
-    ("f8", "f8"),
-    ("b1[:]", "b1[:]"),
-    ("f8[:]", "i8[:]"),
+    ("f8", "f8", "f8", "f8"),
+    ("b1[:]", "b1[:]", "b1[:]"),
+    ("f8[:]", "i8[:]", "i8[:]"),
 )
 def at_ends(
     moves: tuple[Array, Array],
     text: tuple[Array, Array, Ints],
     known: tuple[Array, Array],
     machine: tuple[Array, Array, Ints, Mask],
-    limits: tuple[float, float],
-    masks: tuple[Mask, Mask],
-    found: tuple[Array, Ints],
+    limits: tuple[float, float, float, float],
+    masks: tuple[Mask, Mask, Mask],
+    found: tuple[Array, Ints, Ints],
 ) -> None:
-    """Add up the errors at the ends of motions that need no look along their way; mark the others in `along`.
+    """Add up the errors at the ends of motions; mark in `apart` those at the end of which they are not known.
 
     moves    their starts and ends (n, axes), as programmed
     text     where the control stood before, commands at the ends of all pieces as written (m, axes), and the first
              piece of each motion (n + 1,)
     known    commands at which the tip is where it should be (n, axes), and how far off it is without correction (n,) mm
     machine  ways over which errors bend (axes,), the ways of X, Y and Z as columns, their columns, linear axes
-    limits   `verify.STRAIGHT` and `known.TURNED`
-    masks    motions that figures are of, and those to be looked at along their way
-    found    way, squares times way and largest error before and after, mm; how many ends, and where the largest are
+    limits   `verify.STRAIGHT`, `known.TURNED`, and how many places inside: per bend, at most
+    masks    motions that figures are of, those not to be counted here (`apart`), and those to be looked at inside
+    found    way, squares times way and largest error before and after, mm; how many ends, and where the largest are;
+             at how many places inside each motion has to be looked at (n,)
     """
     (start, end), (before_all, written, first), (wanted, before) = moves, text, known
-    (features, ways, columns, linear), (shown, along), (sums, places) = machine, masks, found
+    (features, ways, columns, linear), (shown, apart, followed), (sums, places, counts) = machine, masks, found
+    straight, turned, density, most = limits
     for row in range(len(end)):
-        if not shown[row] or along[row]:
+        if not shown[row] or apart[row]:
             continue
         bends, turns, chord, piece = 0.0, 0.0, 0.0, first[row]
         for axis in range(len(linear)):
@@ -132,16 +134,18 @@ def at_ends(
                 chord += step * step
             else:
                 turns = max(turns, abs(written[piece, axis] - wanted[row, axis]))
-        if bends >= limits[0] or turns > limits[1]:
-            along[row] = True
+        if turns > turned:
+            apart[row] = True
             continue
+        if followed[row] and bends >= straight:
+            counts[row] = int(min(np.ceil(density * bends), most))
         square = 0.0
         for i in range(3):
             off = 0.0
             for j in range(3):
                 off += (written[piece, columns[j]] - wanted[row, columns[j]]) * ways[i, j]
             square += off * off
-        way, after = np.sqrt(chord), np.sqrt(square)
+        way, after = np.sqrt(chord) / (counts[row] + 1), np.sqrt(square)
         sums[0] += way
         sums[1] += way * before[row] * before[row]
         sums[2] += way * square

@@ -183,18 +183,19 @@ def _errors(written: Written, piece: Index, fraction: Array, known: Known | None
         unknown[ends[here]] = False
     rows = np.flatnonzero(unknown)
     if rows.size:
-        before[rows], after[rows] = _looked_at(written, piece[rows], fraction[rows])
+        commands = written.segments.at(piece[rows], fraction[rows])
+        before[rows], after[rows] = errors_at(written.intent, move[rows], at[rows], commands)
     tilted = _tilts(written, piece[ends]) if tilts else (0.0, 0.0)
     return Samples(move, at, before, after, _way(written, piece), *tilted)
 
 
-def _looked_at(written: Written, piece: Index, fraction: Array) -> list[Array]:
-    """The errors before and after at fractions of pieces, (k,) mm each."""
-    intent, move, at = written.intent, written.pieces.move[piece], written.fraction_of_motion(piece, fraction)
-    commands, programmed = written.segments.at(piece, fraction), intent.segments.at(move, at)
+def errors_at(intent: Intent, move: Index, fraction: Array, commands: Array) -> tuple[Array, Array]:
+    """The errors at fractions of motions (k,) as programmed, and under `commands` (k, n_axes) instead, mm."""
+    programmed = intent.segments.at(move, fraction)
     done = [intent.joints(move, each) for each in (programmed, commands)]
-    gaps = intent.gaps(move, programmed, done, intent.states(move, at))
-    return [lengths(correctable(intent, move, commands, gap)) for gap in gaps]
+    gaps = intent.gaps(move, programmed, done, intent.states(move, fraction))
+    before, after = (lengths(correctable(intent, move, commands, gap)) for gap in gaps)
+    return before, after
 
 
 def _tilts(written: Written, piece: Index) -> tuple[float, float]:
