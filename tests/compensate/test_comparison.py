@@ -24,8 +24,8 @@ DENSE = 0.06
 """mm from point to point on a path, at most."""
 LEVER = 250.0
 """mm from the axes to the tip, at most."""
-AGREED = 6e-5
-"""mm: the parabolas are within 0.05 um of the path, and the distance between lines
+AGREED = 3e-5
+"""mm: the parabolas are within 0.02 um of the path, and the distance between lines
 from point to point, 0.06 mm apart on circles of 200 mm, and what they stand for, is less than 3e-6 mm."""
 
 

@@ -12,7 +12,7 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
-from ncfix.compensate.rows import every, finite, picked
+from ncfix.compensate.rows import every, finite, picked, some
 from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
 from ncfix.compensate.simulation import batches
 from ncfix.program.moves import Kind
@@ -20,10 +20,12 @@ from ncfix.records import dataclass
 
 Tip = Callable[[Index, Array], Array]
 
-NEAR_ENOUGH = 5e-5
-"""mm; so far a parabola may be from the path of a tip that turns round an axis."""
-CUBIC = 3**0.5 / 216
-"""A parabola through begin, middle and end of an arc of radius r and angle a is this times r a^3 from it, at most."""
+ROUND, TWISTED = 1e-6, 2e-5
+"""mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""
+QUARTIC, CUBIC = 1 / 512, 3**0.5 / 72
+"""A parabola through begin, middle and end of an arc of angle a and radius r is r a^4 / 512 from it, along it up to
+r a^3 sqrt(3) / 216, which does not matter. A way b besides, by another axis, adds no more than b a^2 sqrt(3) / 72: the
+third derivative of a point that turns and is moved is -a^2 times the first, and at most 3 a^2 b."""
 JUMP = 1e-6
 """Fraction of a motion on both sides of a kink or jump of the errors where a parabola ends."""
 
@@ -226,17 +228,27 @@ def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:
 
 def _round_axes(intent: Intent, rows: Index) -> Array:
     """How many parabolas it takes for motions (k,) that lead the tip round an axis, (k,)."""
-    moves, rotary = intent.moves, intent.machine.rotary
-    angle, radius = np.zeros(len(rows)), np.zeros(len(rows))
+    moves, machine = intent.moves, intent.machine
+    angle, radius, besides = (np.zeros(len(rows)) for _ in range(3))
+    way = picked(moves.end, rows) - picked(moves.start, rows)
     arcs = np.flatnonzero(intent.segments.arc[rows])
-    angle[arcs], radius[arcs] = np.abs(moves.sweep[rows[arcs]]), arc_radii(intent, rows[arcs])
-    if rotary.any():
-        way = np.abs(picked(moves.end, rows) - picked(moves.start, rows))[:, rotary].sum(axis=1)
-        swung = np.flatnonzero((way > 0) & ~moves.tcp[rows])
-        angle[swung] += way[swung]
+    if arcs.size:
+        angle[arcs], radius[arcs] = np.abs(moves.sweep[rows[arcs]]), arc_radii(intent, rows[arcs])
+        besides[arcs] = np.abs(np.einsum("ij,ij->i", way[arcs[:, None], intent.columns], moves.normal[rows[arcs]]))
+    turned = np.abs(way[:, machine.rotary])
+    swung = np.flatnonzero(some(turned > 0) & ~moves.tcp[rows])
+    if swung.size:
+        turned = turned[swung]
         radius[swung] = np.maximum(radius[swung], reach(intent, rows[swung]))
-    count: Array = np.ceil(angle * np.cbrt(CUBIC * radius / NEAR_ENOUGH))
-    return count
+        besides[swung] += radius[swung] * (angle[swung] + turned.sum(axis=1) - turned.max(axis=1))
+        besides[swung] += np.abs(way[swung][:, ~machine.rotary]).sum(axis=1)
+        angle[swung] += turned.sum(axis=1)
+    squared = angle**2
+    count = np.maximum(
+        np.cbrt(CUBIC * besides * squared / TWISTED), np.sqrt(squared * np.sqrt(QUARTIC * radius / ROUND))
+    )
+    found: Array = np.ceil(count)
+    return found
 
 
 def _opening(intent: Intent, rows: Index, start: Array) -> Mask:

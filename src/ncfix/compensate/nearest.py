@@ -27,6 +27,10 @@ STRAIGHT = 0.1
 """rad: a path that turns by less leads no nearer to a point than 1 - cos of it, half a per cent, of its distance."""
 TOGETHER = 4096
 """Points for which the difference of the two lengths of path is taken as the same, at first."""
+SUDDEN = 0.5
+"""mm by which one path is longer than the other on the way of these: there is something wrong, and it is looked for."""
+FEWEST = 16
+"""Points for which the difference is taken as the same at last."""
 PAIRS = 1 << 18
 """Points and parabolas that are looked at together."""
 
@@ -75,20 +79,23 @@ class Search:
     def all(self, points: Array, lengths: Array) -> Nearest:
         """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `LostError`."""
         found = [
-            self._together(points[at : at + TOGETHER], lengths[at : at + TOGETHER])
+            each
             for at in range(0, len(points), TOGETHER)
+            for each in self._together(points[at : at + TOGETHER], lengths[at : at + TOGETHER])
         ]
         columns = ([getattr(each, name) for each in found] for name in ("piece", "share", "gap"))
         none = (np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
         return Nearest(*(np.concatenate([empty, *each]) for empty, each in zip(none, columns, strict=True)))
 
-    def _together(self, points: Array, lengths: Array) -> Nearest:
-        """For points of a short way."""
-        found = self.around(points, lengths + self.ahead)
-        last = len(points) * 3 // 4
-        surest = last + int(np.argmin(found.gap[last:]))
-        self.ahead = float(self.curve.way(found.piece, found.share)[surest] - lengths[surest])
-        return found
+    def _together(self, points: Array, lengths: Array) -> list[Nearest]:
+        """For points of a short way; of ever shorter ones where one path suddenly is longer than the other."""
+        found, half = self.around(points, lengths + self.ahead), len(points) // 2
+        surest = half + int(np.argmin(found.gap[half:]))
+        ahead = float(self.curve.way(found.piece, found.share)[surest] - lengths[surest])
+        if abs(ahead - self.ahead) > SUDDEN and half >= FEWEST:
+            return self._together(points[:half], lengths[:half]) + self._together(points[half:], lengths[half:])
+        self.ahead = ahead
+        return [found]
 
     def around(self, points: Array, expected: Array) -> Nearest:
         """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`."""
