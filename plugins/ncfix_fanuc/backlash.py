@@ -9,10 +9,10 @@ into the grid.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.control import Assumption, Files, Option, Request
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
-from ncfix.records import dataclass
 from ncfix.tables.control import Least, Request
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.least import of_even_nodes, of_functions

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.records import dataclass
 from ncfix.tables.lines import Remarks
 
 LARGEST = 7

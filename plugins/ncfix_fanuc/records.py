@@ -6,13 +6,13 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from string import Formatter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.records import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks

@@ -10,13 +10,12 @@ second lattice over the rotary axes of a table, whose angles turn the workpiece 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.records import dataclass
 from ncfix.tables.axes import DEGREE, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid

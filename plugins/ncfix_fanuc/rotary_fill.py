@@ -7,13 +7,12 @@ and the turn times the distance from where it is said to be about: six numbers f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.control import Request
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array, Grid

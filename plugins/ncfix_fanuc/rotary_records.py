@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.diagnostics import RefusedError
-from ncfix.records import dataclass
 from ncfix.tables.axes import DEGREE, unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -15,7 +16,6 @@ import numpy as np
 from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.diagnostics import Message, NcfixError, UsageError
 from ncfix.machine import Machine, State, dumps, loads
-from ncfix.records import dataclass
 from ncfix.tables.control import Control, Files, Option, Properties, Request, Written
 from ncfix.tables.exact import exact_correction
 from ncfix.tables.grid import Array, Grid

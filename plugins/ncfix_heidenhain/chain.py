@@ -8,10 +8,10 @@ as in `A..C2`. Rows `MachAxis` move. The chain runs from the machine base along 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.axes import TURNING, unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks

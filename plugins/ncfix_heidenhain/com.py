@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.lines import Remarks
 from ncfix_heidenhain.table_text import Column, TextTable, number, read_table

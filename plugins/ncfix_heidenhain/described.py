@@ -8,11 +8,11 @@ it has gained.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.machine import Axis, Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.axes import DEGREE
 from ncfix.tables.fit import projector
 from ncfix.tables.grid import Array

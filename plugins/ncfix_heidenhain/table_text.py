@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from ncfix.records import dataclass
 from ncfix.tables.lines import Remarks, as_number
 
 END = "[END]"

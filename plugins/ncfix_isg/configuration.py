@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from ncfix.records import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
 from ncfix_isg.leadscrew import MARK, bare

@@ -10,10 +10,10 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 from ncfix.diagnostics import Message, RefusedError
-from ncfix.records import dataclass
 from ncfix.tables.axes import in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.faces import faces, searched

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.records import dataclass
 from ncfix.tables.axes import ORDER, TURNING, unit_of
 from ncfix.tables.control import Files
 from ncfix.tables.grid import Array, Grid

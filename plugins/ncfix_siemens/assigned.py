@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.lines import Remarks
 from ncfix_siemens.syntax import Assignment

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.lines import Remarks
 from ncfix_siemens.assigned import Assigned
 from ncfix_siemens.syntax import Assignment, Line, assignments

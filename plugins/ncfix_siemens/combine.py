@@ -6,11 +6,10 @@ Only one factor of a pair carries sign and unit: the table that points, the base
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.axes import unit_of
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.neutral import Compensation, Term

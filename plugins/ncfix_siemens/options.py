@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from ncfix.machine import Machine
-from ncfix.records import dataclass
 from ncfix.tables.axes import in_order
 from ncfix.tables.control import Option
 from ncfix.tables.scheme import Limits

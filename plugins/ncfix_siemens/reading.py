@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
-from ncfix.records import dataclass
 from ncfix.tables.control import Files
 from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array, Grid
 
 DIGITS = 7

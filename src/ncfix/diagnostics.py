@@ -7,10 +7,9 @@ stays an ordinary exception, and the command line reports it as a fault of ncfix
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar, Self
-
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,11 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from ncfix.diagnostics import Place, SourceError, UsageError
-from ncfix.records import dataclass
 
 READING = {errno.EACCES: "get the right to read it", errno.EISDIR: "name a file, not a folder"}
 WRITING = {

@@ -15,15 +15,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-
-from ncfix.records import dataclass
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Argument = Any

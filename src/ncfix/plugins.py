@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
@@ -22,7 +22,6 @@ import pluggy
 from ncfix import hookspecs
 from ncfix.diagnostics import Message, PluginError
 from ncfix.hookspecs import GROUP
-from ncfix.records import dataclass
 
 HOOKS = tuple(sorted(name for name in vars(hookspecs) if name.startswith("register_")))
 

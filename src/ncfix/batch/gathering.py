@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
 
 from ncfix import files
 from ncfix.diagnostics import Place, UsageError
 from ncfix.plugins import registry
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,10 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from ncfix import files
-from ncfix.records import dataclass
 
 NAME = ".ncfix-journal.jsonl"
 SCHEMA = 1

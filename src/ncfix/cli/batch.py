@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from ncfix.batch.journal import Journal, Record, digest_of
 from ncfix.batch.work import Staff, each
@@ -11,7 +12,6 @@ from ncfix.cli.job import Job, Outcome
 from ncfix.cli.options import subprograms
 from ncfix.cli.targets import STREAM, Target, shown
 from ncfix.diagnostics import ExitCode, FaultError, Place
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

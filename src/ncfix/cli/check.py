@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import click
@@ -13,7 +14,6 @@ from ncfix.cli.options import dialect_option, json_option, optional_machine_opti
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import ExitCode, Message, NcfixError
-from ncfix.records import dataclass
 
 
 @click.command()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ncfix import fast
@@ -10,7 +11,6 @@ from ncfix.cli.options import dialect_of, read_program, subprograms
 from ncfix.cli.parts import Source, part_bytes, source_of
 from ncfix.cli.targets import STREAM, shown
 from ncfix.diagnostics import DifferenceError, NcfixError, SourceError
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.side_by_side import Along, SideBySide

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ncfix.cli.options import load_machine, read_program, subprograms
 from ncfix.cli.setup_options import SetupOptions
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Fixed, Outlet, Source, compiled_from, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.options import FixOptions

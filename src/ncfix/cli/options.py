@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,7 +13,6 @@ import click
 from ncfix import fast
 from ncfix.cli.parts import compiled_from
 from ncfix.cli.targets import STREAM, read, shown
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.machine import Machine

@@ -7,14 +7,13 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
 
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, Target, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.account import FixReport

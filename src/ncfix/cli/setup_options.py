@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
-
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup

@@ -7,6 +7,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
@@ -14,7 +15,6 @@ from ncfix import files
 from ncfix.batch.gathering import Gathered, gathered
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
-from ncfix.records import dataclass
 
 STREAM = "-"
 """Standard input or output as a file name."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ncfix.compensate.left import Left
 from ncfix.diagnostics import Message, Place
 from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.records import dataclass
 
 CLEARLY = 1.5
 """What is left is said to be beyond the tolerance from that many times on: below, it may be the control's digits."""

@@ -7,7 +7,7 @@ centre moved by the mean correction.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import vector_product
 from ncfix.compensate.segments import Segments, sweep_between
-from ncfix.records import dataclass
 
 LOOKS = 12
 """Places on each arc, ends left out, at which the corrected path is looked at to find the centre."""

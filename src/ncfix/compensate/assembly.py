@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,6 @@ from ncfix.compensate.ragged import offsets, owners, places, sums
 from ncfix.compensate.rows import lengths, picked
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.grids import Split

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.records import dataclass
+from dataclasses import dataclass
 
 SAMPLED = 0.02
 """Share of the tolerance held back for what happens between samples. Samples stand at least `DENSITY` to the shortest

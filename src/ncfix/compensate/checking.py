@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.assembly import untouched
@@ -17,7 +19,6 @@ from ncfix.program.moves import Kind, Moves, Rule, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 SUSPECTED = "NCF438"
 """A program that seems to have been corrected: what nobody needs to guess of one that says so."""

@@ -8,6 +8,8 @@ breadth beside it, is not taken for the one that is meant.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.curve import Curve, Samples
@@ -19,7 +21,6 @@ from ncfix.compensate.simulation import actual_tip
 from ncfix.diagnostics import DifferenceError
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
-from ncfix.records import dataclass
 
 UNLIKE = 0.02
 """Paths whose lengths differ by more than this share are not the same cut."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError, PartReader
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, left_alone, spliced
-from ncfix.records import dataclass
 
 FRAMES = "the program takes frames or values from where the machine stands"
 

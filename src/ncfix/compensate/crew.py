@@ -16,13 +16,12 @@ import os
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
 from ncfix.compensate.settle import Before
-from ncfix.records import dataclass
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,6 @@ from ncfix.compensate.rows import every, finite, picked, some
 from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
 from ncfix.compensate.simulation import batches
 from ncfix.program.moves import Kind
-from ncfix.records import dataclass
 
 Tip = Callable[[Index, Array], Array]
 

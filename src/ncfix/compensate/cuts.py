@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.compensate.comparison import as_made
 from ncfix.compensate.crew import Read
@@ -21,7 +21,6 @@ from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 from ncfix.program.parts import NotInPartsError, PartReader
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from ncfix.compensate.rows import chosen, finite, picked, put
 from ncfix.compensate.standing import standing
 from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
-from ncfix.records import dataclass
 
 BATCH = 32_768
 """Ends corrected at a time."""

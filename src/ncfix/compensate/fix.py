@@ -8,7 +8,7 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from ncfix.program.moves import Moves, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
-from ncfix.records import dataclass
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""

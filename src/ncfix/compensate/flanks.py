@@ -7,6 +7,8 @@ close to a turn both sides are possible.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.curve import Curve, Samples
@@ -16,7 +18,6 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.nearest import Nearest, Search
 from ncfix.compensate.rows import some
 from ncfix.machine import State
-from ncfix.records import dataclass
 
 NEAR = 0.01
 """mm or rad; so close to its turn an axis may be on either side of its play."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from ncfix.program.moves import Kinematics, Moves, Rule, TcpState, Trace
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 Resolve = Callable[[str], bytes | None]
 

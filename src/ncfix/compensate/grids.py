@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.ends import as_commands, path_of
@@ -16,7 +18,6 @@ from ncfix.compensate.sampling import MOST, bends, crossed, merged, reversals
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import Grid, fewest
 from ncfix.compensate.strategies import Strategy
-from ncfix.records import dataclass
 
 PER_BEND = 8
 """Nodes for each time that the error may bend."""

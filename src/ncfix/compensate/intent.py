@@ -12,6 +12,7 @@ nearest point of the intended path.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -33,7 +34,6 @@ from ncfix.compensate.segments import Segments
 from ncfix.compensate.steer import rows_of, steer
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
-from ncfix.records import dataclass
 
 INSTANT, WHILE = 1e-4, 1e-3
 """Fractions of a motion over which it is looked at which way its axes go: around an instant, and for a while before."""

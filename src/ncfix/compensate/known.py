@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
@@ -9,7 +11,6 @@ from ncfix.compensate.rows import greatest, picked
 from ncfix.compensate.wordless import lacking
 from ncfix.compensate.written import Written
 from ncfix.program.moves import Kind
-from ncfix.records import dataclass
 
 TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from ncfix.compensate.findings import Array, Mask
 from ncfix.diagnostics import Message, Place
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.compensate.settle import Settled

@@ -7,13 +7,14 @@ the point, all of it is looked at that could be nearer.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.curve import Curve, length
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import picked
-from ncfix.records import dataclass
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""

@@ -6,6 +6,8 @@ somewhere else than it would behind a plain motion.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.findings import Index, Mask
@@ -17,7 +19,6 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.parts import taken
 from ncfix.program.pieces import Pieces
-from ncfix.records import dataclass
 
 FEW = 16
 """Of so many motions at most one may be other than plain."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ncfix.program.parts import Remains
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

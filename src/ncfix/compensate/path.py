@@ -10,7 +10,7 @@ are split only if asked. Canned cycles are corrected at their end. Nothing is sp
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from ncfix.compensate.strategies import Strategy
 from ncfix.compensate.wordless import crooked
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

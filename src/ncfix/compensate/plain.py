@@ -9,7 +9,7 @@ together.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,7 +39,6 @@ from ncfix.machine.bow import MORE
 from ncfix.program.emit import Emission
 from ncfix.program.moves import FeedMode, Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
-from ncfix.records import dataclass
 
 NEARLY = 1 - 1e-6
 """Of a limit; what comes so close to one is for the long way to judge."""

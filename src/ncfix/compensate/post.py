@@ -8,13 +8,11 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations
 from queue import SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any
-
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ncfix.program.emit import Reading
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.reader import read
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 SAME = 1e-6
 """mm and rad; the emitter's book and a second reading differ by floating-point noise only."""

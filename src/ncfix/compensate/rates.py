@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.records import dataclass
 
 APART = 1.0
 """rad of allowance between stretches that have nothing to do with each other; above any rotary correction."""

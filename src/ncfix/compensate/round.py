@@ -8,6 +8,8 @@ the nodes between. Pieces too short for a control to tell their centre are strai
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.arcs import APART, NUDGE, across
@@ -18,7 +20,6 @@ from ncfix.compensate.ragged import largest, owners, places, sums
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.compensate.split import Grid
 from ncfix.program.target import TANGENTIAL
-from ncfix.records import dataclass
 
 WIDEST = 0.95 * np.pi
 """A piece turns by less than this: ends on opposite sides of a circle would not tell where its centre is."""

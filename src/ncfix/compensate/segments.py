@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import picked, spread, vector_product
 from ncfix.program.moves import Kind, Moves
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ take turns until nothing more has to be kept; motions are only ever added to tho
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,7 +31,6 @@ from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pinning import LED, PINNED, closure_of_refusals
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
 ARM_CHANGE_MM = 5.0

@@ -11,7 +11,7 @@ both programs have to be at hand as a whole.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -22,7 +22,6 @@ from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.nearest import Search
-from ncfix.records import dataclass
 
 KEPT = 100.0
 """mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""

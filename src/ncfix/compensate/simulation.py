@@ -6,6 +6,8 @@ out, because how a control moves between their ends is its own affair, and so ar
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.budget import DENSITY
@@ -15,7 +17,6 @@ from ncfix.compensate.ragged import owners
 from ncfix.compensate.sampling import MOST_SHOWN, interior, merged
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
-from ncfix.records import dataclass
 
 LEAST = 4
 """Fewest samples between the ends of a motion."""

@@ -13,6 +13,7 @@ farthest is between two that were tried; then the gap is halved.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -21,7 +22,6 @@ import numpy as np
 from ncfix import fast
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import largest, offsets, owners, places
-from ncfix.records import dataclass
 
 STRETCH = 1024
 """Nodes of a motion after which a piece ends in any case."""

@@ -7,6 +7,8 @@ where the program believes it to be, and which motions take it away.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
@@ -16,7 +18,6 @@ from ncfix.compensate.rows import every
 from ncfix.compensate.wordless import stays
 from ncfix.machine import Machine
 from ncfix.program.moves import Kind, Moves
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ Several processes can work on a program (see `crew`): each corrects parts in tur
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 
 from ncfix.compensate.account import FixReport
@@ -25,7 +25,6 @@ from ncfix.compensate.task import Task
 from ncfix.diagnostics import Message
 from ncfix.program import stamp
 from ncfix.program.parts import NotInPartsError
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

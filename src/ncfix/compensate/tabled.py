@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ncfix.compensate.simulation import TipError, batches, samples
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves, Rule
-from ncfix.records import dataclass
 
 Correct = Callable[[Array, Array, float], Array]
 """Positions of all axes (k, n_axes) [mm, rad], ways (k, n_axes), tool length [mm] -> what the control adds to them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from ncfix.compensate.verify import Figures, PathError
 from ncfix.diagnostics import Message
 from ncfix.program.moves import Moves
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 ORDER = ("NCF408", "NCF414", "NCF402", "NCF403", "NCF415", "NCF413", "NCF409", "NCF410")
 """Findings of a plan in the order in which it reports them."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
 from ncfix.compensate.options import FixOptions
@@ -12,7 +12,6 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.language import Run, language_of
 from ncfix.program.parts import Follower, NotInPartsError
 from ncfix.program.setup import Setup
-from ncfix.records import dataclass
 
 PART_BYTES = 3 << 19
 """How much text is a part: the columns of a part take about thirty times as much memory."""

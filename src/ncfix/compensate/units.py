@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.program.moves import Kind, Moves, Rule, Trace
 from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, last_of, stretch
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 MOST_PENDING = 64
 """Parts that may be put together before one of them ends where it may."""

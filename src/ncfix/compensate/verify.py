@@ -7,6 +7,7 @@ rapids are looked at where they end, all others along the way: as densely as the
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
-from ncfix.records import dataclass
 
 BATCH = 50_000
 """Samples worked on at a time."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,6 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import finite, picked, put
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.program.pieces import Pieces
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True)

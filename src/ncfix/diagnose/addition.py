@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +16,6 @@ from ncfix.machine.basis import Basis
 from ncfix.machine.smooth import Fourier, Polynomial
 from ncfix.machine.units import Unit, units
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 Mask = NDArray[np.bool_]
 

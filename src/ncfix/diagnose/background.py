@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import lapack, qr
@@ -19,7 +19,6 @@ from ncfix.diagnose.groups import Group, apart
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal
-from ncfix.records import dataclass
 
 SHARES = (0.05, 0.2, 0.4, 0.8, 2.5)
 """Size of everything else together, against the noise of one value."""

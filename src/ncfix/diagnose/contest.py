@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,6 @@ from scipy.special import ndtr
 
 from ncfix.diagnose.selection import ALIKE
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 COUNT = 12
 """Poses that are chosen."""

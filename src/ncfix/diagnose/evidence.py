@@ -9,7 +9,7 @@ log odds -1/2 ln|1 + s^2 B| - n/2 ln(1 - gain) with B = Z'V^-1 Z (MacKay 1992).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +19,6 @@ from scipy.special import logsumexp
 from ncfix.diagnose.background import PRIOR, SHARES, Background, marginal
 from ncfix.diagnose.groups import Group
 from ncfix.measure.measurement import Array, Index
-from ncfix.records import dataclass
 
 SIZES = (1.5, 3.0, 6.0, 12.0, 24.0)
 """um: sizes of an effect at the tool tip that are considered."""

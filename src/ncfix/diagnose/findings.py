@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,6 @@ from ncfix.diagnose.verdict import Rest
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, repr=False)

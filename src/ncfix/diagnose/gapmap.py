@@ -7,6 +7,7 @@ that grows along an axis, time, a temperature, a tool. They only show; they do n
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -15,7 +16,6 @@ from ncfix.diagnose.background import Background
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
-from ncfix.records import dataclass
 
 SHOWN = 6
 UNLIKELY = 1e-3

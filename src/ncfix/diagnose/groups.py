@@ -7,6 +7,7 @@ effects compete on one scale, that of the tool tip.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,7 +17,6 @@ from ncfix.diagnose.catalogue.candidate import stacked
 from ncfix.diagnose.view import HARDLY, View
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import orthonormal, without
-from ncfix.records import dataclass
 
 VISIBLE = 0.05
 """Share of an effect's squares that must be left beside what is free."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.fields import scaled
 from ncfix.diagnose.outliers import ASIDE
 from ncfix.measure.measurement import Array, Index
-from ncfix.records import dataclass
 
 CELLS = 16
 FOLDS = 4

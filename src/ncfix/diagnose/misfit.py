@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ncfix.machine import Effect, Machine
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
-from ncfix.records import dataclass
 
 TIGHT_UM = 4.0
 """How far each constant of a machine file may have moved since, at the tool tip."""

@@ -8,7 +8,7 @@ does.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.diagnose.verdict import AMBIGUOUS, FOUND, NOTHING
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axis import Axis
 from ncfix.measure.measurement import Measurement
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.diagnose.findings import Diagnosis

@@ -9,7 +9,7 @@ on offer, no measurement of this kind tells it from that name, and that is said.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import compress
 
 import numpy as np
@@ -27,7 +27,6 @@ from ncfix.measure.kinds import STATES
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
-from ncfix.records import dataclass
 
 OFFERED = 320
 DRAWN, FEW = 10, 60

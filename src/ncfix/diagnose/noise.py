@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
@@ -9,7 +11,6 @@ from scipy.special import chdtrc, fdtrc
 from ncfix.diagnose.background import Background
 from ncfix.diagnose.view import View
 from ncfix.measure.measurement import Array, groups
-from ncfix.records import dataclass
 
 TAILS = 2.0
 """Variance of a standard deviation from repeats, times their freedom, over its square: Student's t with 5 degrees."""

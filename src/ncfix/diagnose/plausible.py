@@ -8,6 +8,7 @@ taken back, but it is said: a collision, a wrong unit, or another effect that th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ncfix.diagnose.catalogue import Candidate
 from ncfix.diagnose.view import View
 from ncfix.machine import Effect
 from ncfix.machine.smooth import Backlash
-from ncfix.records import dataclass
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),

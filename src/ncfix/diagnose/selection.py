@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.diagnose.evidence import Court, Member
 from ncfix.diagnose.twins import acts_alike
 from ncfix.diagnose.weighing import Members, Scale, margin
-from ncfix.records import dataclass
 
 MOST = 5
 """Effects that are taken to be there at most."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ncfix.diagnose.noise import Floor
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.diagnose.findings import Finding

@@ -7,6 +7,7 @@ the set-ups, and the constants of the machine file (lines, squareness, gains), w
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +21,6 @@ from ncfix.machine.smooth import Constant, Polynomial
 from ncfix.measure.calibrate import Problem
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.selection import Selection
-from ncfix.records import dataclass
 
 UM = 1e3
 STEPS = 6

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, eigh, solve_triangular
@@ -20,7 +21,6 @@ from ncfix.diagnose.groups import Group
 from ncfix.diagnose.view import View
 from ncfix.diagnose.weighing import MISSHAPEN, margin
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 LASTING = 900.0
 """s: how long an instrument's wandering lasts."""

@@ -18,7 +18,7 @@ what it shows. What such a change explains is no reason for another name, nor fo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,6 @@ from ncfix.diagnose.background import SHARES
 from ncfix.diagnose.evidence import SIZES, Court, Heard, Member
 from ncfix.diagnose.fields import slow
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 Members = Mapping[str, Member]
 

@@ -7,7 +7,7 @@ as many digits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +18,6 @@ from ncfix.machine.loops import room
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.machine.route import Route

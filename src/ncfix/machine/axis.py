@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.machine import se3
 from ncfix.machine.se3 import Array
-from ncfix.records import dataclass
 
 Vector = tuple[float, float, float]
 Triad = tuple[Vector, Vector, Vector]

@@ -10,6 +10,8 @@ has room for them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,6 @@ from ncfix.machine.axis import Axis, Tool
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import signals_of, slot_of
 from ncfix.machine.se3 import Array
-from ncfix.records import dataclass
 
 MORE = 1.1
 """For products of errors."""

@@ -7,11 +7,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from ncfix.machine.axis import Vector
 from ncfix.machine.basis import Basis
 from ncfix.machine.smooth import Constant
-from ncfix.records import dataclass
 
 COMPONENTS = "XYZABC"
 """X Y Z: translations along the error axes, mm. A B C: rotations about them, rad."""
@@ -42,7 +42,7 @@ class Effect:
 
     name: str
     coefficients: tuple[float, ...]
-    basis: Basis = Constant()
+    basis: Basis = Constant()  # noqa: RUF009
     center: float = 0.0
     scale: float = 1.0
     covariance: Matrix | None = None

@@ -8,7 +8,7 @@ reference point.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -19,7 +19,6 @@ from ncfix.machine.effect import SPINDLE, Effect
 from ncfix.machine.se3 import Array
 from ncfix.machine.signals import Signal, axis_signal, inputs_of
 from ncfix.machine.state import Poses
-from ncfix.records import dataclass
 
 
 class Sort(Enum):

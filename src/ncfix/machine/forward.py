@@ -8,6 +8,7 @@ tool branch is the product of its joints from the foundation outward, then the s
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from ncfix.machine.error_model import ErrorModel, Slot, Sort
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import SmallMotion, Weight, advance, columns, composed, cross, dot
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

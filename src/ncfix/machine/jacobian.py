@@ -7,13 +7,14 @@ the tool tip relative to the workpiece, in the workpiece frame: what `Machine.er
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import advance, columns, cross
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

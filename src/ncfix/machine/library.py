@@ -9,6 +9,7 @@ section 2.5, rule 1).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import nan
 from typing import Protocol
 
@@ -19,7 +20,6 @@ from ncfix.machine.effect import SPINDLE, Effect
 from ncfix.machine.machine import Machine
 from ncfix.machine.smooth import Backlash, Periodic, Polynomial
 from ncfix.plugins import registry
-from ncfix.records import dataclass
 
 WARM = 20.0
 """Degree C at which thermal effects are zero."""

@@ -7,6 +7,7 @@ nearer to the foundation at zero; the joint's Jacobian wants it at its reference
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.signals import Signal, inputs_of
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import advance, columns, cross
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -24,7 +25,6 @@ from ncfix.machine.signals import Signal, inputs_of, with_lags
 from ncfix.machine.state import Poses, State, flatten, poses_first
 from ncfix.machine.steps import SMALL
 from ncfix.machine.transport import columns
-from ncfix.records import dataclass
 
 POSE_COLUMNS = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 POSE_WEIGHTS = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
@@ -56,14 +56,14 @@ class Machine:
     name: str
     topology: str
     axes: tuple[Axis, ...]
-    tool: Tool = Tool()
+    tool: Tool = Tool()  # noqa: RUF009
     effects: tuple[Effect, ...] = ()
     control: str | None = None
     least_increment: tuple[float, float] = DEFAULT_INCREMENT
     max_correction: tuple[float, float] = DEFAULT_CORRECTION
     workpiece_offset: Vector = ORIGIN
-    provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    conditions: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
     # -- what it is ---------------------------------------------------------------------------------------------------
 

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ncfix.machine import bspline
 from ncfix.machine.basis import Array, Basis, key
-from ncfix.records import dataclass
 
 BOTH, POSITIVE, NEGATIVE = "both", "positive", "negative"
 

@@ -8,7 +8,7 @@ then on, until it has arrived at the tip of the tool. So a pose costs little mor
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from ncfix.machine.state import Poses
 from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Steps
 from ncfix.machine.terms import Place, Terms, terms_of
 from ncfix.machine.transport import SmallMotion, columns, turn
-from ncfix.records import dataclass
 
 Turns = tuple[Array, Array]
 """Sines and versines (1 - cosine) of rotary axes, see `Route.turns`."""

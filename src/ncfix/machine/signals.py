@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
-from ncfix.records import dataclass
 
 TIME = "time_s"
 

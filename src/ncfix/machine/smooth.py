@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 
 from ncfix.machine.basis import Array, Basis, key
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

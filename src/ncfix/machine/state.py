@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,6 @@ from ncfix import fast
 from ncfix.diagnostics import UsageError
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
-from ncfix.records import dataclass
 
 CHUNK = 4096
 """Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""

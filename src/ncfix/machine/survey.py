@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.machine.effect import Effect
@@ -11,7 +13,6 @@ from ncfix.machine.machine import Machine
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import State, flatten
 from ncfix.machine.summary import travel
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

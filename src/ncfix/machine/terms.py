@@ -7,6 +7,7 @@ columns, whatever they are, and are added up with the rest.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from ncfix.machine.signals import Signal
 from ncfix.machine.smooth import Constant, Fourier, Polynomial
 from ncfix.machine.state import Poses
 from ncfix.machine.steps import GIVEN, PARTS, POWERS, WAVES, Functions
-from ncfix.records import dataclass
 
 SUMS = (Table, Spline, Step)
 """Bases that add up their functions themselves, each sum on its own."""

@@ -7,6 +7,7 @@ direction, shape () or (m, 1). A pose is carried as four columns, three directio
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from ncfix import fast
 from ncfix.machine import se3
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
-from ncfix.records import dataclass
 
 Weight = float | Array
 

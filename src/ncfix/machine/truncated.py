@@ -8,7 +8,7 @@ J. A. Soons, TU Eindhoven 1993, Eq. 3.2 and 3.8.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from ncfix.machine.basis import Array, Basis, key
 from ncfix.machine.piecewise import ascending
 from ncfix.machine.smooth import distinct, powers
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

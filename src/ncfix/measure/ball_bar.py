@@ -8,13 +8,13 @@ it are told apart, and compared.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.machine import Machine
 from ncfix.measure.lengths import BallBar
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.records import dataclass
 
 FLAT = 1e-3
 """Places whose third extent is this share of the first lie in a plane."""

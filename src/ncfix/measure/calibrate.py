@@ -9,7 +9,7 @@ errors and does not change where the iteration ends).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -22,7 +22,6 @@ from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 from ncfix.measure.selection import Selection, select
 from ncfix.measure.solve import Solution, solve
-from ncfix.records import dataclass
 
 STEPS = 25
 CONVERGED = 1e-5

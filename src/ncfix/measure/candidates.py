@@ -7,7 +7,7 @@ pitch cannot hide (Soons, section 2.3).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from ncfix.machine import Machine
 from ncfix.machine.axis import Axis
 from ncfix.measure.halton import halton
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.records import dataclass
 
 DECIMALS = 3
 CORNERS = 0.4

@@ -7,11 +7,11 @@ the worst variance of what is to be predicted falls (G-optimal).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.measure.measurement import Array, Index
-from ncfix.records import dataclass
 
 ACTIVE = 250
 """Predictions, the worst ones, that an exchange looks at; the rest is looked at again after each pass."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from ncfix.measure import renishaw as rtl
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.renishaw import number_of
 from ncfix.plugins import registry
-from ncfix.records import dataclass
 
 LINEAR = "XYZ"
 SLANTED = 1e-6

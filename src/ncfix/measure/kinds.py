@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-
-from ncfix.records import dataclass
+from dataclasses import dataclass
 
 STATES = re.compile(r"time_s|load_kgm?|feed_mm_min|spindle_rpm|tool_length|spindle_deg|temp_[a-z0-9_]+")
 """Optional columns of the state that are numbers; directions and labels are apart."""

@@ -7,7 +7,7 @@ for, on a coarse scale of times first and then by descent, with all else solved 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -18,7 +18,6 @@ from ncfix.measure import calibrate
 from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.selection import Selection
 from ncfix.measure.solve import orthonormal, without
-from ncfix.records import dataclass
 
 SCALE = 24
 """Time constants tried first, from the shortest step of time to three times the whole."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.diagnostics import ConfigError, Message, Place
-from ncfix.records import dataclass
 
 SHOWN = 25
 """Faults that are named one by one; a file with more has a fault of another sort."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine, State
 from ncfix.measure.kinds import CHOICES, KINDS, STATES, Kind
-from ncfix.records import dataclass
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine
 from ncfix.machine.effect import SPINDLE
 from ncfix.machine.smooth import Backlash, Polynomial
-from ncfix.records import dataclass
 
 TERM = re.compile(r"([XYZABC][A-Z])(\d|b)(?:-(\d))?")
 RADIAN = 180 / np.pi

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Index, Measurement, groups
-from ncfix.records import dataclass
 
 Mask = NDArray[np.bool_]
 

@@ -8,6 +8,7 @@ tell is left out beforehand. To separate two effects, the variances of their coe
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 from ncfix.measure.selection import Selection, form, select
 from ncfix.measure.solve import NUISANCE_RANK, solve
-from ncfix.records import dataclass
 
 CANDIDATES = 800
 POOR = 10.0

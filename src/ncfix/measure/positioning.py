@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.measure.checks import component_of
 from ncfix.measure.measurement import Array, Measurement, groups
-from ncfix.records import dataclass
 
 RUNS = 2
 """With fewer runs at any place there is no repeatability."""

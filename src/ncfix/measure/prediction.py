@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from ncfix.machine.error_model import signals_of
 from ncfix.measure.calibrate import Calibration
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 PLACES = 400
 UM = 1e3

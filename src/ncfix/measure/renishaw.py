@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.diagnostics import ConfigError, Place
-from ncfix.records import dataclass
 
 SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 KEY = re.compile(r"([A-Za-z][\w -]*?)\s*:(.*)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from ncfix.diagnostics import Place
 from ncfix.measure.measurement import Array, Index
 from ncfix.measure.observation import Mask
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.measure.calibrate import Estimate, Problem

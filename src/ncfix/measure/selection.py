@@ -7,7 +7,7 @@ radial and tilt motions of a rotary axis no part once per revolution (that is wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -21,7 +21,6 @@ from ncfix.machine.fields import did_you_mean
 from ncfix.machine.library import library
 from ncfix.machine.smooth import Constant, Fourier, Polynomial
 from ncfix.machine.truncated import Truncated
-from ncfix.records import dataclass
 
 ALL = "all"
 

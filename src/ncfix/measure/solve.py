@@ -5,11 +5,12 @@ Everything here is in units of the noise: rows were divided by their standard de
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
 from ncfix.measure.measurement import Array, Index
-from ncfix.records import dataclass
 
 NUISANCE_RANK = 1e-10
 """Singular values of the scaled nuisance columns below this are zero."""

@@ -9,6 +9,7 @@ from all 24 turns that take coordinate axes to coordinate axes; no turn is more 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -16,7 +17,6 @@ import numpy as np
 from ncfix.machine import se3
 from ncfix.measure.geometry import best_rotation
 from ncfix.measure.measurement import Array, Index
-from ncfix.records import dataclass
 
 STEPS = 40
 """Gauss-Newton steps from one start; a good one takes some ten."""

@@ -6,6 +6,8 @@ at random and nobody is told.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.machine import Machine
@@ -13,7 +15,6 @@ from ncfix.measure.measurement import Array, Measurement
 from ncfix.measure.observation import Observation
 from ncfix.measure.observe import observe
 from ncfix.measure.probing import Probing
-from ncfix.records import dataclass
 
 ROUNDS = 50
 SETTLED = 1e-12

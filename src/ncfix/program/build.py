@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from lark import Token, Tree
 
@@ -31,7 +32,6 @@ from ncfix.program.tree import (
     Unary,
     Word,
 )
-from ncfix.records import dataclass
 
 NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
 """The terminals whose text is a number of the block; every other digit belongs to its shape."""

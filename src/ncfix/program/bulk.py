@@ -8,7 +8,7 @@ not on the digits) ends a stretch, and the emitter takes it by itself.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,6 @@ from ncfix.program.language import BulkLayout, Language
 from ncfix.program.layout import AXIS_LETTERS
 from ncfix.program.moves import Moves
 from ncfix.program.tree import START, Program
-from ncfix.records import dataclass
 
 IntArray = NDArray[np.int64]
 

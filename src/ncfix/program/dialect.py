@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ncfix.records import dataclass
+from dataclasses import dataclass
 
 FOREIGN: tuple[tuple[str, bytes], ...] = (
     ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),

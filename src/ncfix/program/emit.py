@@ -7,6 +7,8 @@ the same each time; where it does not, the block is reported as a conflict, and 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +24,6 @@ from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
 from ncfix.program.writer import Edit, Splices
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ it follows the program; here it is read and followed again, and must make the sa
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -18,7 +19,6 @@ from ncfix.program.moves import Kind, Kinematics, Moves, Rule
 from ncfix.program.reader import read
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup

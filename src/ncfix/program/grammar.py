@@ -10,12 +10,11 @@ import os
 import re
 import sys
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree

@@ -7,12 +7,12 @@ what a block means and how a corrected motion is put into words is a family's ow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ncfix.program.reach import runs_straight_on
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from ncfix.program.language import BulkLayout
 from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
-from ncfix.records import dataclass
 
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"

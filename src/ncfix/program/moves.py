@@ -9,6 +9,7 @@ make axis positions of that, this floor does not.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
 from ncfix.program.pointing import Pointing
-from ncfix.records import dataclass
 
 
 class Kind(IntEnum):

@@ -7,8 +7,7 @@ One rule for all output: a value is printed with a fixed number of decimals, cor
 from __future__ import annotations
 
 import math
-
-from ncfix.records import dataclass
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,12 @@ middle between two outputs that a product of doubles cannot tell which of them i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.numbers import EIGHT, POINT, POWERS, SIGN, digits_of
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -7,7 +7,7 @@ templates, frames and reasons have the same numbers in all parts, so that parts 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,7 +20,6 @@ from ncfix.program.language import Language, language_of
 from ncfix.program.moves import Moves
 from ncfix.program.reader import Reading
 from ncfix.program.tree import Program, Skip, Template
-from ncfix.records import dataclass
 
 TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles"})
 """The fields of `Moves` that are the same for all rows."""

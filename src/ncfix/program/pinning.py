@@ -7,11 +7,12 @@ an end or centre of its own no longer closes, so what is before it must end wher
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.records import dataclass
 
 Mask = NDArray[np.bool_]
 

@@ -8,7 +8,7 @@ block's own text is its shape, and its numbers are the grammar's.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import field
+from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -28,7 +28,6 @@ from ncfix.program.shapes import Scan
 from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.program.writer import line_end
-from ncfix.records import dataclass
 
 PART_BYTES = 1 << 19
 """How much text is scanned at once: the columns of a scan take about a hundred times as much."""

@@ -11,10 +11,9 @@ to a bound on all that is executed.
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.faults import Fault
-from ncfix.records import dataclass
 
 ENDLESS = "NCF233"
 NEVER_ENDS = "the program never ends: it jumps back here again and again, and nothing changes in between"

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
-
-from ncfix.records import dataclass
 
 MOST_BLOCKS = 1_000_000
 """Blocks that are executed beyond those of a program's own text before it counts as endless: under half a minute."""

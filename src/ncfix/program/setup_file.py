@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
@@ -12,7 +12,6 @@ from ncfix.diagnostics import ConfigError, Message
 from ncfix.files import read_bytes
 from ncfix.program.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.program.tool_table import load_tool_table
-from ncfix.records import dataclass
 from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
 
 __all__ = ["load", "load_tool_table", "loads"]

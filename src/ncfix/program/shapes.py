@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
 
@@ -30,7 +30,6 @@ from ncfix.program.numbers import (
     is_numeric,
     table,
 )
-from ncfix.records import dataclass
 
 NUMBER_MARK = 1
 COMMENT_MARK = 2

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.pointing import Pointing
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 

@@ -6,10 +6,11 @@ mean of the correction over all other axes, less the mean over all of them, whic
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.exact import exact_correction, own_rotary_error
 from ncfix.tables.fit import projector
 from ncfix.tables.grid import Array, Grid

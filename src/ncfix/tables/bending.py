@@ -8,11 +8,10 @@ nodes are put as far apart as the bending allows: on the kinks of a table, and c
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 
 STEPS = (128, 256, 512, 1024)

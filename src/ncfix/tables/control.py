@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugins import registry
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
 from ncfix.tables.settings import Form

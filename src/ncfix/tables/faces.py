@@ -11,12 +11,11 @@ middle of their range, the second what it lacks there, and so on: where the sum 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.mesh import search
 from ncfix.tables.poses import random_poses

@@ -7,12 +7,11 @@ A-79351E) in any number of dimensions.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ncfix.records import dataclass
 
 Array = NDArray[np.float64]
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.diagnostics import ConfigError, Message, Place
-from ncfix.records import dataclass
 
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 ALONE = re.compile(r"\r(?!\n)")

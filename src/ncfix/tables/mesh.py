@@ -8,11 +8,11 @@ beforehand; the fewest that really are within the target are then looked for amo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.volume import Volume
 

@@ -8,14 +8,13 @@ kind leaves less at the worst than the weighted root mean square that the weight
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 
 ROUNDS = 40

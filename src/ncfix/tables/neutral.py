@@ -7,11 +7,11 @@ control's own files are the business of its plugin, which turns them into this a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array, Grid
 
 

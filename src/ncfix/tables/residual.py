@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
 from ncfix.tables.poses import random_poses, random_ways

@@ -7,11 +7,11 @@ ways belongs into the tables that do not know the way.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.neutral import NOTHING, Compensation, Term

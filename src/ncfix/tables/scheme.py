@@ -9,11 +9,11 @@ tip is right whatever the rotary tables miss. What changes with the way an axis 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.grid import Array
 from ncfix.tables.minimax import Remainder, least_worst

@@ -8,12 +8,12 @@ positions. The functions so found are the exact ones where the layout is exact, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.scheme_layout import Layout, Star
 

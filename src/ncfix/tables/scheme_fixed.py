@@ -15,12 +15,12 @@ The coefficients are the least squares of the exact correction over the working 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
-from ncfix.records import dataclass
 from ncfix.tables.exact import linear_axes
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Compensation

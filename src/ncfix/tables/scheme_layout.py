@@ -8,12 +8,11 @@ as a multiple of another, and hiding a sum in a factor, (a + f(q)) g(p) = a g(p)
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 from ncfix.tables.separable import Part, Product, Single
 

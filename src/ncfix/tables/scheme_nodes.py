@@ -6,9 +6,10 @@ among the positions that are known.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 
 SCALE = 10**4

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
-from ncfix.records import dataclass
 from ncfix.tables.scheme_layout import Layout, absorbed, arranged, tables_of
 from ncfix.tables.separable import Part, Parts
 

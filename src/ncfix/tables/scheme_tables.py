@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.poses import random_poses, random_ways

@@ -10,11 +10,11 @@ in the mean square that sums and products of pairs can make. What is left over i
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from ncfix.records import dataclass
 from ncfix.tables.grid import Array
 
 NOISE = 2e-6

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from ncfix.diagnostics import UsageError
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.machine import Machine, State
-from ncfix.records import dataclass
 from ncfix.tables.bending import Bending
 from ncfix.tables.exact import exact_correction, linear_axes
 from ncfix.tables.fit import WITHIN, between, fitted

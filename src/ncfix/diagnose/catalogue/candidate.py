@@ -8,7 +8,7 @@ curve is, how harmonics decay, which rotation comes with a deflection. Several l
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ import numpy as np
 from ncfix.machine import Effect, Machine
 from ncfix.machine.axis import Axis
 from ncfix.measure.measurement import Array
-from ncfix.records import dataclass
 
 LETTERS = "XYZ"
 TURNS = "ABC"

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from ncfix.machine.symbolic.steps import UNITS, Step, Translation, Vector
 from ncfix.machine.symbolic.variables import Variable
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ R_actual R_nominal^T, rad, as `Machine.error` has it.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -16,7 +17,6 @@ from ncfix.machine.symbolic.algebra import Algebra
 from ncfix.machine.symbolic.chain import Chain
 from ncfix.machine.symbolic.series import Expansion, Series, compose, logarithm, multiply
 from ncfix.machine.symbolic.steps import Monomial
-from ncfix.records import dataclass
 
 POSITION = ("x", "y", "z")
 DIRECTION = ("i", "j", "k")

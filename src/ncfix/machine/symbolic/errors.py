@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
 
@@ -12,7 +13,6 @@ from ncfix.machine.axis import Vector
 from ncfix.machine.effect import COMPONENTS, SPINDLE, Effect
 from ncfix.machine.machine import Machine
 from ncfix.machine.symbolic.variables import Size, Variable
-from ncfix.records import dataclass
 
 DEFAULT = ("motions", "locations", "spindle")
 GROUPS = ("motions", "locations", "spindle", "machine")

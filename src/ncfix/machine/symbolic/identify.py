@@ -9,6 +9,7 @@ formulas only have one.
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import sympy as sp
@@ -17,7 +18,6 @@ from numpy.typing import NDArray
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.dependence import Columns
 from ncfix.machine.symbolic.derivation import Derivation
-from ncfix.records import dataclass
 
 TIP = ("dx", "dy", "dz")
 

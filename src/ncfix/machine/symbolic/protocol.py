@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
 
@@ -16,7 +17,6 @@ import sympy as sp
 from ncfix.machine.symbolic.algebra import Algebra, Poly
 from ncfix.machine.symbolic.dependence import Columns
 from ncfix.machine.symbolic.derivation import POSITION, Derivation
-from ncfix.records import dataclass
 
 RIGHT_ANGLES = (0, 90, 180, 270)
 Pose = tuple[int, ...]

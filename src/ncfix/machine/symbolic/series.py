@@ -8,6 +8,7 @@ sin t = t and cos t = 1, which leaves second-order terms out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import sympy as sp
 from sympy.polys.matrices import DomainMatrix
@@ -27,7 +28,6 @@ from ncfix.machine.symbolic.steps import (
     rodrigues,
     skew,
 )
-from ncfix.records import dataclass
 
 Series = dict[Monomial, DomainMatrix]
 

@@ -8,14 +8,12 @@ coefficient matrices (4, 4). Freeman and Ford (2003), sections 2 and 4, who take
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
 from math import prod
 from typing import TypeAlias
 
 import sympy as sp
-
-from ncfix.records import dataclass
 
 Expr: TypeAlias = sp.Expr
 Vector = tuple[Expr, Expr, Expr]

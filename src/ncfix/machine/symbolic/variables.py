@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import keyword
 import re
+from dataclasses import dataclass
 from enum import Enum
 
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError
-from ncfix.records import dataclass
 
 TAKEN = (
     "np",

@@ -6,6 +6,7 @@ Source: Fanuc 30i operator's manual, "Custom macro", "Branch and repetition", "M
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from ncfix.program.fanuc import builder
 from ncfix.program.fanuc.arithmetic import number
@@ -16,7 +17,6 @@ from ncfix.program.rs274.flow import NO_SUBPROGRAM, TOO_DEEP
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine, has_words
 from ncfix.program.rs274.unit import Unit
-from ncfix.records import dataclass
 
 MAX_CALLS = 15
 """Calls that may be nested: ten of subprograms, five of macros."""

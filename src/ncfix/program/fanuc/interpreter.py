@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from ncfix.program.fanuc import dynamic, polar, scaling, system, vectors
 from ncfix.program.fanuc.arithmetic import variable_number
@@ -26,7 +27,6 @@ from ncfix.program.rs274.order import DWELL, MACHINE
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
-from ncfix.records import dataclass
 
 G15, G16, G20, G21, G90, G91 = 150, 160, 200, 210, 900, 910
 G65, G66, G66_1, G67 = 650, 660, 661, 670

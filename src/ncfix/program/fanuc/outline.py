@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Comment, Flow, Literal, Opaque, Span, Template
-from ncfix.records import dataclass
 
 
 def named_programs(unit: Unit) -> dict[int, str]:

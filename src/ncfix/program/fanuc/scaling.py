@@ -7,12 +7,12 @@ programming manual, where it acts on the axes that the block names only.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX, LETTERS, Vector, X, Y, Z
 from ncfix.program.rs274.groups import CONTROL, CUTTER, DISTANCE, FEED_MODE, MOTION, PLANE, RETRACT, SPINDLE_MODE
 from ncfix.program.rs274.settings import unfollowed
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

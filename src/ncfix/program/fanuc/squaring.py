@@ -5,6 +5,7 @@ This floor knows no kinematics; it is told how a command is said with tool-centr
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,6 @@ import numpy as np
 from ncfix.program.follow.coordinates import DEGREE, Vector, X, Y, Z
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import SQUARE
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl

@@ -8,12 +8,11 @@ Source: Fanuc 30i operator's manual, "Custom macro", "System variables".
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.fanuc.arithmetic import VACANT
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.parameters import OUT_OF_RANGE, READ_ONLY_FAULT, Key, Parameters, Store
-from ncfix.records import dataclass
 
 LOCAL = range(1, 34)
 """#1 to #33 belong to the call level."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.stage import LONGEST, Mask, Stage, Text, feed_unit, stage_of
-from ncfix.records import dataclass
 
 
 @dataclass(slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.program.follow.rollover import Winding, doubtful, extremes, overturned
 from ncfix.program.moves import Frame, Kind, Moves, Rule
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

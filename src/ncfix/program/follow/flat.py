@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ncfix.program.flatten import TOO_LONG, FlatLine
 from ncfix.program.follow.faults import Fault
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 
 class Change(NamedTuple):

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.diagnostics import Message, Place
 from ncfix.program.setup import Setup
-from ncfix.records import dataclass
 
 WORK_OFFSET = "NCF201"
 TOOL_LENGTH = "NCF202"

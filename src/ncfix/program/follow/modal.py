@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.coordinates import IDENTITY, PLANES, Plane, Rotation, Vector, zeros
-from ncfix.records import dataclass
 
 NO_MOTION = 800
 """G80: no motion code is in force; the state at the start of a program."""

@@ -11,10 +11,9 @@ length offset, or of the work offset.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.setup import Setup
-from ncfix.records import dataclass
 
 
 @dataclass(slots=True)

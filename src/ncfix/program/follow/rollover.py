@@ -12,6 +12,7 @@ Siemens, "SINUMERIK 840D sl, axes and spindles", R2: modulo axes, MD30455 (bit 2
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,6 @@ from numpy.typing import NDArray
 
 from ncfix.diagnostics import Message
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.follow.control import Control

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -13,7 +14,6 @@ from ncfix.program.follow.coordinates import N_LETTERS
 from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.moves import FeedMode
 from ncfix.program.tree import Program
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -5,13 +5,13 @@ does not (near a half circle, and full circles), CP for helices and for more tha
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.follow.arcs import sweep_angle
 from ncfix.program.klartext.number_text import Style, value_of
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 

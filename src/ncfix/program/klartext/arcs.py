@@ -5,6 +5,7 @@ turns round, as on the control.
 """
 
 import math
+from dataclasses import dataclass
 
 from ncfix.program.follow.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
 from ncfix.program.follow.builder import Arc
@@ -26,7 +27,6 @@ from ncfix.program.klartext.targets import (
     starts_unknown,
 )
 from ncfix.program.moves import Kind
-from ncfix.records import dataclass
 
 BAD_ARC = "NCF220"
 

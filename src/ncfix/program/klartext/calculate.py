@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.arithmetic import ARITHMETIC
 from ncfix.program.follow.faults import Fault
 from ncfix.program.tree import Binary, Call, Constant, Expression, Literal, NamedParameter, Text, Unary
-from ncfix.records import dataclass
 
 EQUAL = 1e-9
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import control as base
@@ -20,7 +20,6 @@ from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule
 from ncfix.program.setup import Setup, Tool
-from ncfix.records import dataclass
 
 START = "PRESET"
 """The name in the setup of the preset that is active when the program starts; G54 is taken for it."""

@@ -7,13 +7,12 @@ been executed once; LBL 0 returns from a subprogram and means nothing elsewhere.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.klartext.calculate import Parameters
 from ncfix.program.klartext.units import Unit
 from ncfix.program.recurrence import Budget
-from ncfix.records import dataclass
 
 NO_LABEL = "NCF276"
 NO_PROGRAM = "NCF231"

@@ -7,6 +7,7 @@ are the same to the last bit; a test holds the two together. What it cannot take
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,6 @@ from ncfix.program.klartext.layout import CORNERS
 from ncfix.program.klartext.lines import FLAT
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import FeedMode, Kind
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,6 @@ from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.klartext.plans import LETTERS, Plan
 from ncfix.program.tree import Constant, Literal, Template
-from ncfix.records import dataclass
 
 STRAIGHT = frozenset({"", "l", "ln"})
 IDLE = frozenset({"F", "S", "NX", "NY", "NZ"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from ncfix.program.klartext.plans import opens_block, own_words
@@ -25,7 +25,6 @@ from ncfix.program.tree import (
     Template,
     Word,
 )
-from ncfix.records import dataclass
 
 CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.program.number_style import NumberStyle
-from ncfix.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 
 from ncfix.program.klartext.calculate import Parameters
-from ncfix.records import dataclass
 
 ON_CIRCLE, ON_LINES = 220, 221
 MOST_HOLES = 100_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.program.klartext.calculate import Evaluate, compiled
 from ncfix.program.reach import UNREAD
@@ -21,7 +21,6 @@ from ncfix.program.tree import (
     Text,
     Word,
 )
-from ncfix.records import dataclass
 
 FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
 OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")

@@ -7,6 +7,7 @@ shorter one is the direction of the tool; the tip with an axis moved less the ti
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import SQUARE, within
-from ncfix.records import dataclass
 
 FloatArray = NDArray[np.float64]
 

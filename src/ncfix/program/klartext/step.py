@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.coordinates import Vector, X, Y
 from ncfix.program.follow.motion import Unknown
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.targets import Words
 from ncfix.program.moves import Kind
-from ncfix.records import dataclass
 
 IN_PLANE = 1 << X | 1 << Y
 

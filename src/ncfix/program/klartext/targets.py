@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 
 from ncfix.program.follow import tcp
@@ -16,7 +17,6 @@ from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vec
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import AT_START, Unknown
 from ncfix.program.klartext.control import SPATIAL, Control
-from ncfix.records import dataclass
 
 BAD_POLE = "NCF271"
 POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"

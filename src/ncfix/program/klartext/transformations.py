@@ -8,7 +8,7 @@ the manuals leave open, or make depend on the order, is `doubtful`: nothing is c
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.coordinates import (
     IDENTITY,
@@ -22,7 +22,6 @@ from ncfix.program.follow.coordinates import (
     rotated,
     zeros,
 )
-from ncfix.records import dataclass
 
 SHIFT_IN_ROTATION = "a datum shift while mirror, rotation or scale is active: whether it turns along is not sure"
 SHIFT_UNDER_TILT = "a datum shift on both sides of a tilted plane: how the control adds them up is not sure"

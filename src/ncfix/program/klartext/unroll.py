@@ -7,7 +7,7 @@ stays as it is; a jump that depends on it cannot be written out.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.flat import Change, FlatLines, changed
@@ -22,7 +22,6 @@ from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.units import Unit
 from ncfix.program.number_style import decimals_for
 from ncfix.program.tree import Assignment, Constant, Expression, Literal, Opaque, Program, Span, Text, Word
-from ncfix.records import dataclass
 
 LEAST = 4
 """Digits after the point of positions, as the control takes them; more where the least increment asks for it."""

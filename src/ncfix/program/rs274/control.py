@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import control as shared
@@ -13,7 +14,6 @@ from ncfix.program.language import Run
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.groups import ISO, LINUXCNC, Rules
 from ncfix.program.rs274.parameters import Parameters
-from ncfix.records import dataclass
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
 

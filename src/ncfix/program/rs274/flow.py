@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from ncfix.program.follow.faults import Fault
@@ -21,7 +21,6 @@ from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import FlowLine
 from ncfix.program.rs274.settings import restore
 from ncfix.program.rs274.unit import Unit
-from ncfix.records import dataclass
 
 MAX_CALLS = 10
 """How deep subprograms may be nested, the main program included (LinuxCNC)."""

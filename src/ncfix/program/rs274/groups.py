@@ -7,12 +7,11 @@ and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any
 
 from ncfix.program.rs274.expressions import Evaluate, compiled
 from ncfix.program.tree import Expression
-from ncfix.records import dataclass
 
 NON_MODAL = "non-modal"
 MOTION = "motion"

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.unit import Unit
-from ncfix.records import dataclass
 
 BAD_FLOW = "NCF230"
 

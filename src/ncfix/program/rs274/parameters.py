@@ -7,10 +7,9 @@ and is marked: whatever is computed from it is marked too.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.faults import Fault
-from ncfix.records import dataclass
 
 N_PARAMETERS = 5603
 """Numbered parameters are 1 up to here."""

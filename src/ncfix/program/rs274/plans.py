@@ -6,7 +6,7 @@ Everything that does not depend on numbers is settled once per shape, so that a 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.faults import Fault
@@ -32,7 +32,6 @@ from ncfix.program.tree import (
     Template,
     Word,
 )
-from ncfix.records import dataclass
 
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from ncfix.program.follow.lane_tables import LaneTables
 from ncfix.program.rs274.groups import Rules
 from ncfix.program.rs274.plans import Plan, plan_of
 from ncfix.program.tree import Comment, Flow, Program, view
-from ncfix.records import dataclass
 
 
 @dataclass(slots=True, eq=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ncfix.diagnostics import SourceError
@@ -23,7 +23,6 @@ from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
 from ncfix.program.rs274.plans import POLAR, Codes, Plan
 from ncfix.program.rs274.unit import Unit
 from ncfix.program.tree import Assignment, Comment, Constant, Flow, Item, Literal, Opaque, Parameter, Word
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.rs274.interpreter import Interpreter

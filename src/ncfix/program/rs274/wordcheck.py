@@ -6,12 +6,12 @@ Source: LinuxCNC documentation of the single codes; tried out on `rs274`.
 from __future__ import annotations
 
 from collections.abc import Set
+from dataclasses import dataclass
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.groups import CYCLES, TURNING_CYCLES
 from ncfix.program.rs274.plans import Codes, Plan
-from ncfix.records import dataclass
 
 UNUSED = "NCF209"
 

@@ -7,7 +7,7 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming", frames; `$P_ACTFRAME`.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ncfix.program.follow.coordinates import (
     IDENTITY,
@@ -20,7 +20,6 @@ from ncfix.program.follow.coordinates import (
     product,
     zeros,
 )
-from ncfix.records import dataclass
 
 AROUND = {"X": PLANES[190], "Y": PLANES[180], "Z": PLANES[170]}
 """The plane in which a rotation about an axis turns."""

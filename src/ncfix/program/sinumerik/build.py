@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from lark import Token
 
@@ -27,7 +28,6 @@ from ncfix.program.tree import (
     Unary,
     Word,
 )
-from ncfix.records import dataclass
 
 BRACKET = "("
 """The operator of a `Unary` that is nothing but a pair of brackets."""

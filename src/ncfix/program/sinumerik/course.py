@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.modal import Modal
@@ -15,7 +15,6 @@ from ncfix.program.sinumerik.unit import BROKEN, CLOSING, Unit
 from ncfix.program.sinumerik.values import Evaluate, Key, Value, compiled, number
 from ncfix.program.sinumerik.variables import Local
 from ncfix.program.tree import Expression, NamedParameter, Parameter
-from ncfix.records import dataclass
 
 MAX_CALLS = 16
 TOO_DEEP = "NCF232"

@@ -8,6 +8,7 @@ Source: Siemens, "SINUMERIK, cycles": CYCLE81 to CYCLE89, CYCLE840 (RTP, RFP, SD
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.destination import End, Words, command
@@ -16,7 +17,6 @@ from ncfix.program.sinumerik.plans import Calling
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.values import number
 from ncfix.program.sinumerik.vocabulary import DRILLING
-from ncfix.records import dataclass
 
 DEPTH = "the depth of a cycle ({}) is left as written"
 MADE = "motions that the control makes up ({})"

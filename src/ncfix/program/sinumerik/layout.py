@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ncfix.program.layout import (
     CENTRE_LETTERS,
     CODES_AFTER_MOTION,
@@ -15,7 +17,6 @@ from ncfix.program.sinumerik.orientation import ANGLES, VECTOR
 from ncfix.program.sinumerik.poles import has_partial
 from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS, POLAR
 from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Tape, Word
-from ncfix.records import dataclass
 
 END_OF_SUBPROGRAM = frozenset({17.0})
 """M17."""

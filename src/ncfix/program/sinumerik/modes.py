@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from ncfix.program.sinumerik.affine import WORLD, Affine
-from ncfix.records import dataclass
 
 if TYPE_CHECKING:
     from ncfix.program.sinumerik.cycles import Drilling

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.lane_tables import Lane
@@ -30,7 +30,6 @@ from ncfix.program.tree import (
     Unary,
     Word,
 )
-from ncfix.records import dataclass
 
 LISTS = frozenset({BRACKET, "set", "rep"})
 """What gives several elements their values."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field
+from dataclasses import dataclass, field
 
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.faults import Fault
@@ -30,7 +30,6 @@ from ncfix.program.sinumerik.vocabulary import (
     UNFOLLOWED_MOTIONS,
 )
 from ncfix.program.tree import Call, Expression, NamedParameter
-from ncfix.records import dataclass
 
 CONFLICT = "NCF208"
 FRAMES_STAY = "$mn_frame_geoax_change_mode"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from ncfix.program.flatten import RUNTIME
 from ncfix.program.follow.coordinates import LETTERS
@@ -41,7 +42,6 @@ from ncfix.program.tree import (
     Unary,
     Word,
 )
-from ncfix.records import dataclass
 
 OTHER_DECIMALS = 5
 """Of words that are no axes."""
