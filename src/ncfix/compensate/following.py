@@ -94,6 +94,8 @@ def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: S
     if machine.depends_on_tool_length:
         _require_lengths(program, moves)
     unknown = np.isnan(moves.tool_length)
+    if not unknown.any():
+        return found
     known = replace(found, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
     unknown &= moves.rule == Rule.CORRECT
     if not machine.depends_on_tool_length or not unknown.any():
@@ -108,6 +110,8 @@ def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: S
 
 def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
     """Tool -> the first of the chosen motions (n,) that is made with it."""
+    if not chosen.any():
+        return {}
     tools, rows = np.unique(np.where(chosen, moves.tool, -1), return_index=True)
     return {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
 

@@ -84,8 +84,8 @@ class Intent:
     @cached_property
     def wordless(self) -> Mask | None:
         """(n, n_axes) axes that must get no word in a motion, see `Moves.wordless`; None if there are none."""
-        wordless = None if self.moves.placed is None else self.moves.wordless
-        return wordless if wordless is not None and wordless.any() else None
+        wordless = self.moves.wordless
+        return wordless if wordless.any() else None
 
     @cached_property
     def mute(self) -> Mask | None:

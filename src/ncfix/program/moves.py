@@ -179,9 +179,9 @@ class Moves:
 
         Those that rest have one, which must lead them nowhere else.
         """
-        if self.placed is None:
-            return np.zeros(self.end.shape, dtype=bool)
-        wordless: NDArray[np.bool_] = ~(self.placed | self.programmed)
+        wordless: NDArray[np.bool_] = np.zeros(self.end.shape, dtype=bool)
+        if self.placed is not None:
+            wordless = ~(self.placed | self.programmed)
         return wordless if self.resting is None else wordless | self.resting
 
     @property

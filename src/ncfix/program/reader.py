@@ -219,12 +219,12 @@ class Reading:
     def scan(self, first: int, stop: int) -> Scan:
         """The shapes and numbers of a part; a line that is too long has no shape."""
         blocks = self.blocks[first:stop]
-        start, end = blocks[0, 0], blocks[-1, 1]
+        start, end = blocks[0, 0], blocks[-1, 1] if stop < len(self.blocks) else len(self.source)
         lengths = blocks[:, 1] - blocks[:, 0]
         limit = self.dialect.line_limit
         if limit and len(blocks) == 1 and lengths[0] > limit:
             return ONE_UNSCANNED
-        found = self.language.scan(self.source[start:end], blocks - start)
+        found = self.language.scan(self.source[start:end], moved_by(blocks, -start))
         long = np.flatnonzero(lengths > limit) if limit else ()
         if not len(long):
             return found

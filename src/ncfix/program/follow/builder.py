@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
@@ -61,7 +62,10 @@ class Arc(NamedTuple):
 
 @dataclass(slots=True)
 class Stretch:
-    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9)."""
+    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
+
+    path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
+    """
 
     block: IntArray
     programmed: IntArray
@@ -70,12 +74,22 @@ class Stretch:
     start: FloatArray
     end: FloatArray
     adrift: IntArray
+    path: FloatArray | None = None
 
     def only(self, rows: NDArray[np.bool_]) -> Stretch:
         """Some of the motions, (n,)."""
         if rows.all():
             return self
-        return Stretch(*(getattr(self, each.name).compress(rows, axis=0) for each in fields(self)))
+        names = (each.name for each in fields(self) if each.name != "path")
+        return Stretch(*(getattr(self, name).compress(rows, axis=0) for name in names))
+
+    def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
+        """Where the motions start and end, by some of the letters; views of one path where they go on."""
+        if self.path is None:
+            start, end = (each.take(columns, axis=1, mode="clip") for each in (self.start, self.end))
+            return start, end
+        path = self.path.take(columns, axis=1, mode="clip")
+        return path[:-1], path[1:]
 
 
 @dataclass(slots=True)
@@ -238,12 +252,13 @@ class Builder:
             _joined([getattr(part, name) for part in parts])
             for name in ("block", "programmed", "adrift", "style", "feed")
         )
-        start, end = (
-            _joined([getattr(part, name).take(self.columns, axis=1) for part in parts]) for name in ("start", "end")
-        )
+        start, end = map(_joined, zip(*(part.ends(self.columns) for part in parts), strict=True))
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles = self._style_columns(style)
-        programmed, counted = named.take(mask, axis=0), self._mask_column(self._counted, styles["incremental"])
+        programmed, counted = (
+            named.take(mask, axis=0, mode="clip"),
+            self._mask_column(self._counted, styles["incremental"]),
+        )
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
@@ -261,7 +276,7 @@ class Builder:
             reasons=tuple(self._reasons),
             pointing=None,
             approach=self._approach_column(len(block)),
-            placed=(~named).take(adrift, axis=0) if adrift.any() else None,
+            placed=(~named).take(adrift, axis=0, mode="clip") if adrift.any() else None,
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
             angles=angles,
@@ -367,6 +382,6 @@ def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int |
     return int(block[found[0]]) if known is None and found.size else known
 
 
-def _joined(columns: list[NDArray[Any]]) -> NDArray[Any]:
+def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """Columns one behind the other; a single one as it is."""
     return columns[0] if len(columns) == 1 else np.concatenate(columns)

@@ -109,11 +109,12 @@ def take(control: Control, stage: Stage, block: int, main: bool) -> None:
     plane, adrift = control.still_beside(0), np.full(len(moving), control.places.adrift)
     if plane:
         adrift |= np.where(stage.mask & plane != 0, 0, plane)
-    stretch = Stretch(blocks, stage.mask, styles, stage.feed, stage.path[:-1], stage.path[1:], adrift).only(moving)
+    path = stage.path
+    stretch = Stretch(blocks, stage.mask, styles, stage.feed, path[:-1], path[1:], adrift, path).only(moving)
     if plane:
         control.builder.many_rest(resting_of_many(control, stretch.programmed, stretch.start, stretch.end))
     control.builder.extend(stretch)
-    control.position = stage.path[-1].tolist()
+    control.position = path[-1].tolist()
     modal.cycle.initial = None
 
 
