@@ -59,12 +59,12 @@ def corrected(root: Path, ncfix: Any, tmp_path: Path) -> list[str]:
 @pytest.fixture
 def only_in_parts(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Nothing may be compared as a whole."""
-
-    def never(pair: Pair) -> None:
-        raise AssertionError("compared as a whole")
-
     monkeypatch.setattr(Pair, "_as_wholes", never)
     return monkeypatch
+
+
+def never(pair: Pair) -> None:
+    raise AssertionError("compared as a whole")
 
 
 def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -110,3 +110,21 @@ def test_faults_of_millimetres_are_found_in_any_parts(verify: Any, corrected: li
     whole = verify(1 << 20, lines(), wrong)
     assert not whole["within"]
     assert same(verify(3000, lines(), wrong), whole)
+
+
+def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A zigzag in which axes turn round in each corner, on a machine with play."""
+    original, fixed = tmp_path / "a.ngc", tmp_path / "b.ngc"
+    text = [f"G1 X{20 + 60 * (k % 2)} Y{10 + 0.5 * k + 3 * (k % 3)} Z{-(k % 5)}" for k in range(300)]
+    original.write_text("\n".join(["G21 G90 G94 G17 F900", "G0 X20 Y5 Z5", *text, "M2", ""]))
+    given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc")
+    assert ncfix("fix", original, "-o", fixed, *given).code == ExitCode.DONE
+    wholes = [ncfix("verify", original, each, *given, "--json").json() for each in (fixed, original)]
+    assert wholes[0]["within"]
+    assert not wholes[1]["within"]
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    monkeypatch.setattr(Pair, "_as_wholes", never)
+    for part in (1000, 2500):
+        monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+        for each, whole in zip((fixed, original), wholes, strict=True):
+            assert same(ncfix("verify", original, each, *given, "--json").json(), whole)

@@ -101,7 +101,7 @@ def there(intended: Curve, actual: Curve, flank: Flank | None, near: float) -> G
     found = _nearest(intended, actual, samples, near)
     gap = found.gap
     if flank is not None:
-        gap = flank.there(Search(intended, near), found)
+        gap = flank.there(Search(intended, near), samples, found)
     return Gaps(actual.rows[samples.piece], gap, samples.weight)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 
@@ -129,6 +130,14 @@ class Curve:
         """The way along the path to shares (n,) of parabolas (n,), mm."""
         way: Array = self.lengths[piece] + share * self.ways[piece]
         return way
+
+    def and_then(self, other: Curve) -> Curve:
+        """This path, and then another one."""
+        both = {name: np.concatenate([getattr(each, name) for each in (self, other)]) for name in COLUMNS}
+        curve: Curve = replace(self, **cast(Any, both))
+        if len(self) and len(other):
+            curve.opens[len(self)] = (self.end[-1] != other.begin[0]).any()
+        return curve
 
     def taken(self, which: Mask | slice) -> Curve:
         """Some of the parabolas."""

@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ncfix.compensate.comparison import as_made
 from ncfix.compensate.crew import Read
 from ncfix.compensate.curve import Curve
-from ncfix.compensate.direction import matters
+from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.following import placed
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import unseen
 from ncfix.compensate.task import Task
-from ncfix.compensate.units import Part, Units
+from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
-from ncfix.program.parts import NotInPartsError, PartReader
+from ncfix.program.parts import PartReader, joined_moves, taken
 from ncfix.program.tree import Program
+
+BESIDE = 64
+"""Motions on both sides of one that are looked at to find out whether an axis turns round near it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,23 +48,57 @@ class Cut:
     last: bool
 
     @classmethod
-    def of(cls, machine: Machine, part: Part, meant: bool) -> Cut:
-        """Of a part of a program; `meant`: with what it means."""
-        intent, lines = Intent(machine, part.moves, State()), part.program.lines(part.moves.block)
-        actual = as_made(intent)
+    def of(cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool) -> Cut:
+        """Of motions, of which some `rows` count and others stand before and behind them; `meant`: with what they mean.
+
+        lines  (n,) those of the motions
+        """
+
+        def counted(curve: Curve) -> slice:
+            first, stop, _ = rows.indices(len(intent.moves))
+            return slice(*np.searchsorted(curve.rows, [first, stop]).tolist())
 
         def in_lines(curve: Curve) -> Curve:
-            return replace(curve, rows=lines[curve.rows])
+            found = curve.taken(counted(curve))
+            return replace(found, rows=lines[found.rows])
 
+        def lines_of(found: Index) -> Index:
+            first, stop, _ = rows.indices(len(intent.moves))
+            return lines[found[(found >= first) & (found < stop)]]
+
+        actual = as_made(intent)
         intended = in_lines(Curve.of(intent, intent.tip)) if meant else None
-        left = {axis: lines[rows] for axis, rows in left_in_cuts(part.moves).items()}
         flank = Flank.of(intent, actual)
-        return cls(in_lines(actual), intended, flank, lines[unseen(part.moves)], left, part.last)
+        flank = flank and flank.taken(counted(actual))
+        left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
+        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last)
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:
     """What a program cuts, at once."""
-    yield Cut.of(machine, Part(program, moves, True), meant)
+    yield Cut.of(Intent(machine, moves, State()), program.lines(moves.block), slice(None), True, meant)
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """The last motions of a part, where it matters on which side of their play axes are, and from which they turn next.
+
+    moves      up to twice `BESIDE`; the last `BESIDE` count when the next part is known
+    lines      (n,) those in which they are
+    direction  the way in which the axes came to the first of them
+    """
+
+    moves: Moves
+    lines: Index
+    direction: Signs
+
+    @classmethod
+    def behind(cls, intent: Intent, lines: Index) -> Around:
+        """Those at the end of motions."""
+        start = max(len(lines) - 2 * BESIDE, 0)
+        assert intent.arrival is not None
+        direction = intent.arrival[start - 1] if start else np.asarray(intent.state.direction, dtype=np.int8)
+        return cls(taken(intent.moves, np.arange(start, len(lines))), lines[start:], direction)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +114,28 @@ class Cuts:
     meant: bool
 
     def __iter__(self) -> Iterator[Cut]:
-        """The parts. Raises what reading and following do, `NotInPartsError`, and UsageError for what is not given."""
+        """The parts. Raises what reading and following do, and UsageError for what is not given."""
         task = self.task
-        if matters(task.machine):
-            raise NotInPartsError("which side of its play an axis is on is found out for the whole path")
         machine, reader = placed(task.machine, task.setup), PartReader(task.path, task.dialect)
         units = Units(task.machine, machine, task.setup, task.options, reader, task.follower(), self.read, task.size)
+        around = None
         for unit in units:
-            yield Cut.of(machine, unit.part, self.meant)
+            moves, lines = unit.part.moves, unit.part.program.lines(unit.part.moves.block)
+            if not matters(machine):
+                yield Cut.of(Intent(machine, moves, State()), lines, slice(None), unit.part.last, self.meant)
+                continue
+            intent, lines, counted = _with(around, machine, moves, lines)
+            yield Cut.of(intent, lines, slice(counted, None if unit.part.last else -BESIDE), unit.part.last, self.meant)
+            around = Around.behind(intent, lines)
         if error := units.missing():
             raise error
+
+
+def _with(around: Around | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:
+    """Motions behind those before them, the lines of all, and how many of them have been counted."""
+    if around is None:
+        return Intent(machine, moves, State()), lines, 0
+    both = joined_moves([around.moves, moves], [0, 0])
+    counted = max(len(around.lines) - BESIDE, 0)
+    intent = Intent(machine, both, State(direction=around.direction))
+    return intent, np.concatenate([around.lines, lines]), counted

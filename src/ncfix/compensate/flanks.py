@@ -7,7 +7,7 @@ close to a turn both sides are possible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,55 +27,76 @@ WINDOW = 24
 
 @dataclass(frozen=True, slots=True)
 class Flank:
-    """A path with axes that turn round on the other side of their play, where they may be.
+    """A path of k parabolas with axes that turn round on the other side of their play, where they may be.
 
-    samples  (j,) the samples of the path at which it is another
-    points   (j, 3) mm, where it is then
-    motions  (n,) the motions on which it is
-    curve    the path with all of these on the other side
+    turned  (k, 3) whether it may be another where each begins, half-way, and where it ends
+    points  (k, 3, 3) mm, where it is there then
+    motion  (k,) whether an axis turns round on the motion
+    curve   the path with all axes that turn round on a motion on the other side, all along it
     """
 
-    samples: Index
+    turned: Mask
     points: Array
-    motions: Mask
+    motion: Mask
     curve: Curve
 
     @classmethod
     def of(cls, done: Intent, actual: Curve) -> Flank | None:
-        """Of a path on the real machine; None if no axis turns round."""
+        """Of a path on the real machine; None if it does not depend on the side."""
         if not matters(done.machine):
             return None
         at = Samples.of(actual)
-        rows = actual.rows[at.piece]
+        rows, place = actual.rows[at.piece], (2 * at.share).astype(np.intp)
         fraction = (1 - at.share) * actual.start[at.piece] + at.share * actual.stop[at.piece]
         turning = uncertain(done, rows, fraction)
-        samples = np.flatnonzero(turning.any(axis=1))
-        if not samples.size:
-            return None
         motions = np.zeros((len(done.moves), turning.shape[1]), dtype=bool)
         np.logical_or.at(motions, rows, turning)
-        curve = Curve.of(done, lambda rows, fraction: other_side(done, rows, fraction, motions[rows]))
-        points = other_side(done, rows[samples], fraction[samples], turning[samples])
-        return cls(samples, points, some(motions), curve)
+        some_turn, motion = np.flatnonzero(some(turning)), some(motions)[actual.rows]
+        turned, points = np.zeros((len(actual), 3), dtype=bool), np.zeros((len(actual), 3, 3))
+        turned[at.piece[some_turn], place[some_turn]] = True
+        points[turned] = other_side(done, rows[some_turn], fraction[some_turn], turning[some_turn])
+        return cls(turned, points, motion, _all_aside(done, actual, motions, motion))
 
-    def there(self, search: Search, found: Nearest) -> Array:
-        """The gaps (k,) from what is made to what is meant, with this path at its samples where that is nearer."""
-        expected = search.curve.way(found.piece, found.share)[self.samples]
-        other = search.around(self.points, expected)
+    def taken(self, which: slice) -> Flank:
+        """That of some of the parabolas."""
+        return Flank(self.turned[which], self.points[which], self.motion[which], self.curve.taken(which))
+
+    def and_then(self, other: Flank) -> Flank:
+        """That of two parts of a path that follow each other."""
+        turned = np.concatenate([self.turned, other.turned])
+        points, motion = np.concatenate([self.points, other.points]), np.concatenate([self.motion, other.motion])
+        return Flank(turned, points, motion, self.curve.and_then(other.curve))
+
+    def there(self, search: Search, samples: Samples, found: Nearest) -> Array:
+        """The gaps (k,) from samples of what is made to what is meant, with this path where that is nearer."""
+        place = (2 * samples.share).astype(np.intp)
+        turned = np.flatnonzero(self.turned[samples.piece, place])
+        expected = search.curve.way(found.piece, found.share)[turned]
+        other = search.around(self.points[samples.piece[turned], place[turned]], expected)
         gap = found.gap.copy()
-        gap[self.samples] = np.minimum(gap[self.samples], other.gap)
+        gap[turned] = np.minimum(gap[turned], other.gap)
         return gap
 
     def back(self, near: float, points: Array, found: Nearest) -> Array:
         """The gaps (k,) from points (k, 3) of what is meant to what is made, with this path where that is nearer."""
-        curve = self.curve
-        beside = [curve.rows[np.clip(found.piece + way, 0, len(curve) - 1)] for way in (-1, 0, 1)]
-        rows = np.flatnonzero(np.logical_or.reduce([self.motions[each] for each in beside]) & (found.gap > near))
-        expected = curve.way(found.piece, found.share)[rows]
-        other = Search(curve, near).around(points[rows], expected)
+        beside = [self.motion.take(found.piece + way, mode="clip") for way in (-1, 0, 1)]
+        rows = np.flatnonzero(np.logical_or.reduce(beside) & (found.gap > near))
+        other = Search(self.curve, near).around(points[rows], self.curve.way(found.piece, found.share)[rows])
         gap = found.gap.copy()
         gap[rows] = np.minimum(gap[rows], other.gap)
         return gap
+
+
+def _all_aside(done: Intent, actual: Curve, motions: Mask, motion: Mask) -> Curve:
+    """The path with axes `motions` (n, n_axes) on the other side of their play on some of its parabolas (k,)."""
+    which = np.flatnonzero(motion)
+    rows, columns = actual.rows[which], {}
+    half = (actual.start + actual.stop) / 2
+    for name, fraction in (("begin", actual.start), ("middle", half), ("end", actual.stop)):
+        columns[name] = getattr(actual, name).copy()
+        columns[name][which] = other_side(done, rows, fraction[which], motions[rows])
+    opens = actual.opens | motion | np.append(False, motion[:-1])
+    return replace(actual, **columns, opens=opens)
 
 
 def uncertain(intent: Intent, rows: Index, fraction: Array) -> Mask:

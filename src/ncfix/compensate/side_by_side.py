@@ -12,12 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
 
 import numpy as np
 
 from ncfix.compensate.comparison import check_alike
-from ncfix.compensate.curve import COLUMNS, Curve, Samples
+from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
@@ -40,7 +39,7 @@ class Track:
     dropped   parabolas before it
     complete  nothing comes behind it
     cut       the length of all that was cut, mm
-    flank     the other side of the play, if there is any: of a path that is at hand as a whole
+    flank     the same on the other side of the play, if there is any
     """
 
     curve: Curve
@@ -69,14 +68,10 @@ class Track:
 
     def add(self, more: Curve, last: bool, flank: Flank | None = None) -> None:
         """Go on along the path; `last`: to its end."""
-        self.complete, self.flank = last, flank
+        self.complete = last
         self.cut += more.total
-        old = self.curve
-        columns = {name: np.concatenate([getattr(each, name) for each in (old, more)]) for name in COLUMNS}
-        new: Curve = replace(old, **cast(Any, columns))
-        if len(old) and len(more):
-            new.opens[len(old)] = (old.end[-1] != more.begin[0]).any()
-        self.curve = new
+        self.curve = self.curve.and_then(more)
+        self.flank = flank if self.flank is None or flank is None else self.flank.and_then(flank)
 
     def drop(self, before: float) -> None:
         """Forget what lies before a way along the path."""
@@ -84,6 +79,7 @@ class Track:
         count = int(np.searchsorted(curve.lengths + curve.ways, before))
         if count:
             self.curve = self.part(count, len(curve))
+            self.flank = self.flank and self.flank.taken(slice(count, None))
             self.dropped += count
 
     def part(self, start: int, stop: int) -> Curve:
@@ -169,7 +165,7 @@ class Match:
         self.ahead = search.ahead
         gap = found.gap
         if self.path.flank is not None:
-            gap = self.path.flank.there(search, found)
+            gap = self.path.flank.taken(slice(start, stop)).there(search, samples, found)
         if other.flank is not None:
             gap = other.flank.back(search.near, samples.points, found)
         self.along.add(part.rows[samples.piece], gap, samples.weight)
