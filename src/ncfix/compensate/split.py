@@ -58,27 +58,24 @@ class Grid:
 
     def deviations(self, first: Index, last: Index) -> Array:
         """The largest deviation of straight pieces from nodes `first` to nodes `last` (flat indices), (p,) mm."""
-        inner = last - first - 1
-        begin = offsets(inner)
-        node = np.arange(int(begin[-1])) + np.repeat(first + 1 - begin[:-1], inner)
-        fraction = self.fraction
-        begun, way = (np.repeat(each, inner) for each in (fraction[first], fraction[last] - fraction[first]))
-        share = (fraction[node] - begun) / way
+        inner, fraction, (commands, follows) = last - first - 1, self.fraction, self._columns
+        begun, ended = np.repeat(first, inner), np.repeat(last, inner)
+        node = begun + 1 + places(inner)
+        share = (fraction[node] - fraction[begun]) / (fraction[ended] - fraction[begun])
+        start = commands.take(begun, axis=1)
+        short = start + share * (commands.take(ended, axis=1) - start) - commands.take(node, axis=1)
         off = np.zeros((3, len(node)))
-        for command, follow in self._columns:
-            start, way = (np.repeat(each, inner) for each in (command[first], command[last] - command[first]))
-            short = start + share * way - command[node]
-            for row, each in zip(off, follow, strict=True):
-                if each.any():
-                    row += (each[node] if len(each) > 1 else each) * short
+        for axis, row, follow in follows:
+            off[row] += (follow[node] if len(follow) > 1 else follow) * short[axis]
         square: Array = largest(off[0] * off[0] + off[1] * off[1] + off[2] * off[2], inner)
         return np.sqrt(square)
 
     @cached_property
-    def _columns(self) -> list[tuple[Array, Array]]:
-        """Commands (k,) of the axes that the tip follows at all, and how it follows them (3, k or 1)."""
-        axes = np.flatnonzero(self.follow.any(axis=(0, 1))).tolist()
-        return [(self.command[:, j].copy(), np.ascontiguousarray(self.follow[:, :, j].T)) for j in axes]
+    def _columns(self) -> tuple[Array, list[tuple[int, int, Array]]]:
+        """Commands (n_axes, k), and axis, direction and how the tip follows (k or 1,), wherever it follows at all."""
+        axes, rows = np.nonzero(self.follow.any(axis=0).T)
+        follows = [(j, i, self.follow[:, i, j].copy()) for j, i in zip(axes.tolist(), rows.tolist(), strict=True)]
+        return np.ascontiguousarray(self.command.T), follows
 
     def shape(self, first: Index, last: Index) -> tuple[Mask, Array]:
         """No piece is an arc."""
