@@ -125,8 +125,9 @@ class _Emitter:
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [frame.decimals(least_increment) for frame in self.frames]
-        self.first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         self.jumps = _jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
+        self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
+        self.first_piece = self.bulk.first_piece
         self.wordless, self.increments = moves.wordless, moves.increments
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
@@ -142,7 +143,6 @@ class _Emitter:
         self.added = 0
         self.conflicts: dict[int, str] = {}
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
-        self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
 
     def run(self, done: FloatArray | None, row: int) -> Emission:
         """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
@@ -189,7 +189,10 @@ class _Emitter:
         first = self.first_piece[row]
         stop = int(np.searchsorted(self.first_piece, first + len(ends)))
         self.end[first : first + len(ends)] = ends
-        self.start[row], self.start[row + 1 : stop] = self.position, self.end[self.first_piece[row + 1 : stop] - 1]
+        self.start[row], self.start[row + 1 : stop] = (
+            self.position,
+            ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0),
+        )
         self.position = ends[-1].copy()
         self.cycle_end = None
         return stop - row

@@ -165,13 +165,18 @@ def stretch(program: Program, start: int, stop: int) -> Program:
         dialect=program.dialect,
         templates=program.templates,
         template=program.template[start:stop],
-        blocks=program.blocks[start:stop] - ends[0],
-        first_number=program.first_number[start : stop + 1] - program.first_number[start],
-        number_spans=program.number_spans[numbers] - ends[0],
+        blocks=_behind(program.blocks[start:stop], ends[0]),
+        first_number=_behind(program.first_number[start : stop + 1], int(program.first_number[start])),
+        number_spans=_behind(program.number_spans[numbers], ends[0]),
         numbers=program.numbers[numbers],
         first_line=program.first_line + program.lines_ended_before(ends[0]),
         line_end=program.line_end,
     )
+
+
+def _behind(places: NDArray[np.int64], origin: int) -> NDArray[np.int64]:
+    """Places as they count from an origin: the same array where they do already."""
+    return places - origin if origin else places
 
 
 def joined(parts: list[Program]) -> Program:

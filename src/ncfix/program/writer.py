@@ -70,13 +70,12 @@ class Splices:
     @classmethod
     def joined(cls, parts: Sequence[Splices]) -> Splices:
         """Several, sorted by place; at one place in the order given."""
+        parts = [part for part in parts if len(part)] or [cls.of(())]
         if len(parts) == 1:
             start, stop, length, data = parts[0].start, parts[0].stop, parts[0].length, parts[0].data
         else:
-            start, stop, length = (
-                np.concatenate([getattr(part, name) for part in parts] or [np.empty(0, np.int64)])
-                for name in ("start", "stop", "length")
-            )
+            columns = ([getattr(part, name) for part in parts] for name in ("start", "stop", "length"))
+            start, stop, length = map(np.concatenate, columns)
             data = b"".join(part.data for part in parts)
         if not (np.diff(2 * start + (stop > start)) < 0).any():
             return cls(start, stop, length, data)
