@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ncfix import fast
 from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
-from ncfix.program.bulk_missing import missing, with_those_before
+from ncfix.program.bulk_missing import last_told, missing, with_those_before
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
 from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
-from ncfix.program.number_text import Styles, in_style, is_plain, plain, rounded, styles_of
+from ncfix.program.number_text import Spelling, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices
@@ -274,39 +274,42 @@ class Stretch:
         program = bulk.program
         rows = slice(bulk.first_piece[row], bulk.first_piece[stop])
         move = bulk.pieces.move[rows]
-        block = bulk.moves.block[move].astype(np.int64)
+        block = bulk.moves.block.take(move).astype(np.int64)
         further = np.diff(move, prepend=-1) == 0
         words = _words(bulk, block, further)
         worded, present = words >= 0, words != NONE
-        wanted = frame.program(bulk.pieces.end[rows].copy())
-        half = _halves(decimals)
-        original = np.where(worded, program.numbers[np.maximum(words, 0)], wanted)
-        rewrite = present & ((np.abs(wanted - original) >= half) | np.append(further[1:], False)[:, None])
-        signed = bulk.layouts.manner.signed
-        anew = worded & rewrite
-        styles = styles_of(bulk.text, program.number_spans[words[anew]], signed=signed)
-        digits = np.broadcast_to(decimals, words.shape).copy()
-        digits[anew] = np.maximum(digits[anew], styles.decimals)
-        clear = is_plain(wanted, digits) | (present & ~rewrite)
-        clear[anew] &= styles.clear
-        values = np.where(present & ~rewrite, original, rounded(wanted, digits))
+        wanted = frame.program(bulk.pieces.end[rows])
+        half, digits = np.tile(_halves(decimals), (len(block), 1)), np.tile(decimals, (len(block), 1))
+        original = np.where(worded, program.numbers.take(words, mode="clip"), wanted)
+        rewrite = np.abs(wanted - original) >= half
+        rewrite[np.flatnonzero(further[1:])] = True
+        rewrite &= present
+        anew = np.flatnonzero(worded & rewrite)
+        spans = program.number_spans.take(words.ravel().take(anew), axis=0)
+        styles = styles_of(bulk.text, spans, signed=bulk.layouts.manner.signed)
+        digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
+        kept = present & ~rewrite
+        clear = is_plain(wanted, digits) | kept
+        clear.ravel()[anew] &= styles.clear
+        values = np.where(kept, original, rounded(wanted, digits))
         add = np.zeros_like(present)
-        lacking = np.flatnonzero(~present.all(axis=1))
-        if len(lacking):
-            near = with_those_before(lacking, len(present))
-            few, fine = present[near], clear[near]
-            stays = ~few & bulk.layouts.nameless(program, block[near])
-            start = frame.program(position.copy())
-            add[near] = missing(start, values[near], few, wanted[near], half, fine, stays)
-            clear[near] = fine
-            clear[further & ~add.any(axis=1)] = False
+        if not present.all():
+            start, stays = frame.program(position), ~present & bulk.layouts.nameless(program, block)
+            for axis in range(len(position)):
+                near = with_those_before(np.flatnonzero(~present[:, axis]), len(block))
+                cells = near, axis
+                add[cells], clear[cells] = missing(
+                    start[axis], values[cells], present[cells], wanted[cells], clear[cells], stays[cells], half[0, axis]
+                )
+            alone = np.flatnonzero(further)
+            clear[alone[~add[alone].any(axis=1)]] = False
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
     def clear_head(self) -> Stretch:
         """The motions up to the first one that is not clear in all its pieces."""
-        fine = np.asarray(self.clear.all(axis=1))
-        if fine.all():
+        if self.clear.all():
             return self
+        fine = np.asarray(self.clear.all(axis=1))
         count = int(np.flatnonzero(~self.further[: int(np.argmin(fine)) + 1])[-1])
         styles = self.styles.rows(np.arange(np.count_nonzero(self.rewrite[:count])))
         columns = ("block", "further", "words", "wanted", "values", "rewrite", "add", "clear")
@@ -318,49 +321,60 @@ class Stretch:
         commands = self.frame.command(self.values)
         if told.all():
             return commands
-        last = np.maximum.accumulate(np.where(told, np.arange(len(told))[:, None], -1), axis=0)
-        commands = np.take_along_axis(commands, np.maximum(last, 0), axis=0)
-        result: FloatArray = np.where(last >= 0, commands, self.position)
-        return result
+        for axis in range(len(self.position)):
+            near = with_those_before(np.flatnonzero(~told[:, axis]), len(told))
+            commands[near, axis] = last_told(commands[near, axis], told[near, axis], self.position[axis])
+        return commands
 
     def splices(self) -> Splices:
         """What changes in the source."""
-        return Splices.joined([self._rewritten(), self._added()])
+        spans, new = self._rewritten()
+        rows, places, added = self._added()
+        start, stop = np.concatenate((spans[:, 0], places)), np.concatenate((spans[:, 1], places))
+        order = np.argsort(2 * start + (stop > start), kind="stable")
+        texts = laid_out(new.and_then(added, order))
+        words = Splices(start.take(order), stop.take(order), texts.length, texts.data)
+        lined = self.bulk.layouts.manner.lined and self.further.any()
+        return self._in_lines(words, rows, np.argsort(order)[len(spans) :]) if lined else words
 
-    def _rewritten(self) -> Splices:
-        """The words that get another value."""
-        numbers = self.words[self.rewrite]
-        order = np.argsort(numbers, kind="stable")
-        rows, columns = (index[order] for index in np.nonzero(self.rewrite))
-        styles = self.styles.rows(order)
-        texts = in_style(self.wanted[rows, columns], styles, self.decimals[columns])
-        spans = self.bulk.program.number_spans[numbers[order]]
-        return Splices(spans[:, 0], spans[:, 1], texts.length, texts.data)
+    def _rewritten(self) -> tuple[IntArray, Spelling]:
+        """The words that get another value: where they stand, (m, 2), and how they are to be written."""
+        cells = np.flatnonzero(self.rewrite)
+        values, decimals = self.wanted.ravel().take(cells), self.decimals.take(cells % len(self.decimals))
+        spans = self.bulk.program.number_spans.take(self.words.ravel().take(cells), axis=0)
+        return spans, in_style(values, self.styles, decimals)
 
-    def _added(self) -> Splices:
-        """The words that are missing, and those of further pieces, in the order in which programs write them."""
+    def _added(self) -> tuple[IntArray, IntArray, Spelling]:
+        """The words that are missing, and those of further pieces, in the order in which programs write them.
+
+        Returns the row of each, the place where it is put in, and how it is to be written.
+        """
         program, layouts = self.bulk.program, self.bulk.layouts
-        manner = layouts.manner
-        rows, columns = np.nonzero(self.add[:, layouts.by_letter])
-        columns = layouts.by_letter[columns]
-        blocks, further = self.block[rows], self.further[rows]
+        rows, columns = np.divmod(np.flatnonzero(self.add[:, layouts.by_letter]), len(self.decimals))
+        columns = layouts.by_letter.take(columns)
+        blocks, further = self.block.take(rows), self.further.take(rows)
         at = np.where(further, program.blocks[blocks, 1], layouts.places(program, blocks))
         heads = np.zeros((len(rows), 4), dtype=np.uint8)
         heads[:, 2:] = layouts.heads[program.template[blocks], columns]
-        begins = further & (np.diff(rows, prepend=-1) != 0)
-        if not manner.lined:
+        if not layouts.manner.lined:
+            begins = further & (np.diff(rows, prepend=-1) != 0)
             heads[begins, :3] = np.frombuffer(program.line_end.rjust(2, b"\0") + b"\0", dtype=np.uint8)
-        texts = plain(self.wanted[rows, columns], self.decimals[columns], heads, signed=manner.signed)
-        words = Splices(at, at, texts.length, texts.data)
-        if not (manner.lined and begins.any()):
-            return words
-        first, last = np.flatnonzero(begins), np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
-        return with_lines(words, *lines_of(program, layouts, blocks[first], program.line_end), (first, last))
+        values, decimals = self.wanted[rows, columns], self.decimals.take(columns)
+        return rows, at, plain(values, decimals, heads, signed=layouts.manner.signed)
+
+    def _in_lines(self, words: Splices, rows: IntArray, places: IntArray) -> Splices:
+        """Words with what else stands on lines of further pieces; added ones are of `rows`, at `places` among all."""
+        program, further = self.bulk.program, self.further.take(rows)
+        first = np.flatnonzero(further & (np.diff(rows, prepend=-1) != 0))
+        last = np.flatnonzero(further & (np.diff(rows, append=-1) != 0))
+        texts = lines_of(program, self.bulk.layouts, self.block.take(rows.take(first)), program.line_end)
+        return with_lines(words, *texts, (places.take(first), places.take(last)))
 
 
 def _words(bulk: Bulk, block: IntArray, further: Mask) -> IntArray:
     """(k, n_axes) the number of each axis word of pieces; `NONE`, or `LED` for what is led without one."""
-    found = bulk.layouts.slots[bulk.program.template[block]]
-    found[further] = NONE
-    words: IntArray = np.where(found >= 0, bulk.program.first_number[block][:, None] + found, found)
+    found = bulk.layouts.slots.take(bulk.program.template.take(block), axis=0)
+    found[np.flatnonzero(further)] = NONE
+    first = np.repeat(bulk.program.first_number.take(block), found.shape[1]).reshape(found.shape)
+    words: IntArray = np.where(found >= 0, first + found, found)
     return words

@@ -121,8 +121,8 @@ class Layouts:
 
     def nameless(self, program: Program, blocks: IntArray) -> NDArray[np.bool_]:
         """(k, n_axes) axes that get no word where `blocks` have none."""
-        nameless: NDArray[np.bool_] = self.heads[program.template[blocks], :, 1] == 0
-        return nameless
+        nameless: NDArray[np.bool_] = self.heads[:, :, 1] == 0
+        return nameless.take(program.template.take(blocks), axis=0)
 
     def places(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes of `blocks` (k,) at which missing words go."""

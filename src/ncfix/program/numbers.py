@@ -136,7 +136,7 @@ EIGHT = 8
 
 def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """The values of runs of digits and points, exactly rounded; and which are malformed."""
-    found = digits_of(text, runs)
+    found = digits_of(text, runs[:, 0], runs[:, 1])
     values = found.value.astype(np.float64)
     values /= POWERS.take(found.tail)
     broken = np.zeros(len(runs), dtype=np.bool_)
@@ -150,9 +150,11 @@ def convert(text: NDArray[np.uint8], runs: NDArray[np.int64]) -> tuple[NDArray[n
     return values, broken
 
 
-def digits_of(text: NDArray[np.uint8], runs: NDArray[np.int64], *, valued: bool = True) -> Digits:
+def digits_of(
+    text: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
+) -> Digits:
     """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
-    stops, lengths = np.ascontiguousarray(runs[:, 1]), runs[:, 1] - runs[:, 0]
+    lengths = stops - starts
     padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
     padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
     lanes = padded.view("<u8")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
+from ncfix.program.numbers import fill
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +130,7 @@ def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
     return fitting and bool(kernels.left_alone(old, new, *columns))
 
 
-FEW = 4
+FEW = 16
 """Where no more than one in so many edits changes the length of the text, the others are made where they stand."""
 
 
@@ -142,10 +143,10 @@ def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> tupl
         left.append(splices.data[begin:end])
         done = end
     kept.append(splices.data[done:])
-    fitting = np.ones(len(splices), dtype=np.bool_)
-    fitting[other] = False
+    stops = splices.stop.copy()
+    stops[other] = 0
     cells = np.frombuffer(text, dtype=np.uint8)
-    cells[_cover(len(text), splices.start[fitting], splices.stop[fitting])] = np.frombuffer(b"".join(kept), np.uint8)
+    cells[_cover(len(text), splices.start, stops)] = np.frombuffer(b"".join(kept), np.uint8)
     return memoryview(text), left
 
 
@@ -173,9 +174,7 @@ def _laid_out(source: bytes, splices: Splices) -> bytes:
 
 
 def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """A mask over `size` bytes that is True from each start up to its stop; the stretches do not overlap."""
-    full = stops > starts
-    change = np.zeros(size + 1, dtype=np.int8)
-    change[starts[full]] += 1
-    change[stops[full]] -= 1
-    return np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)
+    """A mask over `size` bytes that is True from each start up to its stop."""
+    mask = np.zeros(size, dtype=np.bool_)
+    fill(mask, np.stack((starts, stops), axis=1), True)
+    return mask
