@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import Generic, TypeVar
-
-import numpy as np
 
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
@@ -16,6 +16,12 @@ LENGTHS = frozenset((*CENTRE_LETTERS, "R"))
 
 
 LayoutT = TypeVar("LayoutT")
+
+
+@lru_cache(maxsize=32)
+def columns_of(letters: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
+    """The axes with their columns, in the order in which words are added."""
+    return tuple(sorted(enumerate(letters), key=lambda each: AXIS_LETTERS.index(each[1])))
 
 
 class BlockWriter(Generic[LayoutT]):
@@ -32,7 +38,7 @@ class BlockWriter(Generic[LayoutT]):
         self.target = target
         self.out = Rendered()
         self.added: list[str] = []
-        self.columns = sorted(enumerate(target.letters), key=lambda each: AXIS_LETTERS.index(each[1]))
+        self.columns = columns_of(target.letters)
         self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
 
 
@@ -42,7 +48,7 @@ class WordWriter(BlockWriter[Layout]):
     def __init__(self, program: Program, block: int, layout: Layout, target: Target) -> None:
         super().__init__(program, block, layout, target)
         self.code = TANGENTIAL.get(target.code, target.code)
-        self.dragged = bool(np.isfinite(target.turn_minutes)) and is_dragged(target)
+        self.dragged = math.isfinite(target.turn_minutes) and is_dragged(target)
 
     def _value(self, word: Word, otherwise: float) -> float:
         if isinstance(word.value, Constant):

@@ -7,6 +7,7 @@ the same each time; where it does not, the block is reported as a conflict, and 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,12 +22,13 @@ from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
 from ncfix.program.standstill import passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target
-from ncfix.program.tree import Program
+from ncfix.program.tree import Program, view
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
 from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
 
+NOWHERE = np.full(3, np.nan)
 SEVERAL_STATES = "the block is executed from several states that need different corrections"
 FLOW = "the block is more than words"
 MODE_LOST = "a kept block that follows relies on its motion code"
@@ -116,18 +118,15 @@ class _Emitter:
         kinematics: Kinematics | None,
         bulk: Bulk | None,
     ) -> None:
-        self.program = program
-        self.kinematics = kinematics
-        self.language = language_of(program.dialect)
-        self.moves = moves
-        self.pieces = pieces
-        self.reading = reading
+        self.program, self.language, self.kinematics = program, language_of(program.dialect), kinematics
+        self.moves, self.pieces, self.reading = moves, pieces, reading
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [frame.decimals(least_increment) for frame in self.frames]
         self.jumps = _jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
         self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
         self.first_piece = self.bulk.first_piece
+        self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
         self.wordless, self.increments = moves.wordless, moves.increments
         self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
@@ -139,8 +138,7 @@ class _Emitter:
         self.cycle_end: FloatArray | None = None
         self.levels = LevelBook(moves, pieces)
         self.written: dict[int, Rendered] = {}
-        self.latest: list[int] = []
-        self.added = 0
+        self.latest, self.added = list[int](), 0
         self.conflicts: dict[int, str] = {}
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
 
@@ -159,10 +157,10 @@ class _Emitter:
                 self._keep(row)
             else:
                 self._write(row)
-            if self.moves.kind[row] == Kind.CYCLE:
+            if self.kind[row] == Kind.CYCLE:
                 self.cycle_end = self.position
                 self._retract(row)
-            elif self.moves.kind[row] != Kind.DWELL:
+            elif self.kind[row] != Kind.DWELL:
                 self.cycle_end = None
                 self.levels.forget()
             row += 1
@@ -221,7 +219,7 @@ class _Emitter:
 
     def _keep(self, row: int) -> None:
         moves = self.moves
-        if moves.kind[row] != Kind.DWELL:
+        if self.kind[row] != Kind.DWELL:
             self.levels.forget()
         moved, began, ended = self.moved[row], self.reading.start, self.reading.end
         if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
@@ -229,7 +227,7 @@ class _Emitter:
         passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
         self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
         self.end[self.first_piece[row]] = self.position
-        if moves.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
+        if self.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
             return
         self._check_code(row)
 
@@ -265,22 +263,22 @@ class _Emitter:
             return
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
-        if np.isinf(target.turn_minutes) and is_dragged(target):
+        if math.isinf(target.turn_minutes) and is_dragged(target):
             self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.render(self.program, block, layout, target)
         if rendered.conflict:
             self.conflicts.setdefault(block, rendered.conflict)
+        ends, frame = np.array(rendered.ends), self.frames[self.reading.frame[row]]
         slow = target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0
-        if slow and crawls(target, float(self.moves.feed[row]), np.array(rendered.ends)):
+        if slow and crawls(target, float(self.moves.feed[row]), ends):
             self.conflicts.setdefault(block, CRAWLS)
-        frame = self.frames[self.reading.frame[row]]
-        self.end[rows] = frame.command(np.array(rendered.ends))
+        self.end[rows] = frame.command(ends)
         if rendered.centre is not None:
-            self.centre[rows.start] = frame.command_point(rendered.centre, self.moves.axes)
+            self.centre[rows.start] = frame.command_point(rendered.centre)
         for piece, centre in rendered.centres.items():
-            self.centre[rows.start + piece] = frame.command_point(centre, self.moves.axes)
+            self.centre[rows.start + piece] = frame.command_point(centre)
         self.levels.note(int(self.reading.frame[row]), frame, target, rendered)
-        still = frame.still(np.array(rendered.ends)[-1] == target.start)
+        still = frame.still(ends[-1] == target.start)
         self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
         self._note_code(row, target.last_code)
@@ -298,10 +296,12 @@ class _Emitter:
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
         arc = bool(pieces.arc[rows.start])
-        modal = int(moves.modal[row])
-        straight = modal if modal in (0, 10) or moves.kind[row] == Kind.CYCLE else 10
+        modal, kind = int(moves.modal[row]), self.kind[row]
+        straight = modal if modal in (0, 10) or kind == Kind.CYCLE else 10
         fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
-        ends[:, wordless] = start[wordless]
+        if wordless.any():
+            ends[:, wordless] = start[wordless]
+        shares = np.diff(fractions, prepend=0.0) if len(fractions) > 1 else fractions
         arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
         return Target(
             letters=moves.axes,
@@ -311,26 +311,26 @@ class _Emitter:
             original=nominal - nominal_start if moves.incremental[row] else nominal,
             ends=ends,
             arc=arc,
-            centre=frame.program_point(pieces.centre[rows.start], moves.axes),
-            original_centre=as_programmed.program_point(moves.centre[row], moves.axes),
+            centre=frame.program_point(pieces.centre[rows.start]) if arc else NOWHERE,
+            original_centre=as_programmed.program_point(moves.centre[row]) if kind == Kind.ARC else NOWHERE,
             origin=_spatial(nominal_start, moves.axes, as_programmed),
-            plane=_plane(frame.frame.rotation.T @ moves.normal[row]) if moves.kind[row] == Kind.ARC else (0, 1, 2),
+            plane=_plane(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
             spatial=self.spatial,
             diameter=frame.frame.diameter,
             incremental=bool(moves.incremental[row]),
             centre_absolute=bool(moves.arc_absolute[row]),
-            shares=np.diff(fractions, prepend=0.0) if pieces.share is None else pieces.share[rows],
-            inverse_time=moves.feed_mode[row] == FeedMode.INVERSE_TIME and modal != 0,
+            shares=shares if pieces.share is None else pieces.share[rows],
+            inverse_time=int(moves.feed_mode[row]) == FeedMode.INVERSE_TIME and modal != 0,
             code=modal if arc else straight,
             active_code=modal if self.replaced is None else self.replaced,
             feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
             turn_minutes=self._turn_minutes(row),
             turn_by_feed=self.program.dialect.feed_of == "linear",
             arcs=arcs,
-            centres=None if arcs is None else frame.program_point(pieces.centre[rows], moves.axes),
+            centres=None if arcs is None else frame.program_point(pieces.centre[rows]),
             arc_code=TANGENTIAL.get(modal, modal),
             increments=frame.frame.increments,
-            rotary=tuple(moves.rotary.tolist()),
+            rotary=self.rotary,
             pointing=moves.pointing,
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
@@ -347,7 +347,7 @@ class _Emitter:
 
     def _before(self, row: int) -> FloatArray:
         """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
-        if self.moves.kind[row] == Kind.CYCLE and self.cycle_end is not None:
+        if self.cycle_end is not None and self.kind[row] == Kind.CYCLE:
             return self.cycle_end
         return self.position
 
@@ -367,8 +367,7 @@ class _Emitter:
             edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
             if rendered.lines:
                 at = int(self.program.blocks[block, 1])
-                text = "".join(end_of_line + line for line in rendered.lines)
-                edits.append(Edit(at, at, text.encode("latin-1")))
+                edits.append(Edit(at, at, "".join(end_of_line + line for line in rendered.lines).encode("latin-1")))
                 self.added += len(rendered.lines)
         self.latest = []
         return edits

@@ -24,6 +24,7 @@ class FrameMap:
         self.rotation = frame.rotation[np.ix_(keep, keep)]
         self.rotated = not np.array_equal(frame.rotation, np.eye(3))
         self.unit = frame.unit
+        self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
 
     def program(self, command: FloatArray) -> FloatArray:
         """Program numbers of a command."""
@@ -54,15 +55,13 @@ class FrameMap:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation.T)
         return values + self.frame.offset
 
-    def program_point(self, point: FloatArray, axes: tuple[str, ...]) -> FloatArray:
+    def program_point(self, point: FloatArray) -> FloatArray:
         """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
-        offset = np.array([self.frame.offset[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
-        return np.asarray((point - offset) @ self.frame.rotation / self.unit)
+        return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
 
-    def command_point(self, point: FloatArray, axes: tuple[str, ...]) -> FloatArray:
+    def command_point(self, point: FloatArray) -> FloatArray:
         """The inverse of `program_point`."""
-        offset = np.array([self.frame.offset[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
-        return np.asarray((point * self.unit) @ self.frame.rotation.T + offset)
+        return np.asarray((point * self.unit) @ self.frame.rotation.T + self.origin)
 
 
 def _turned(points: FloatArray, rotation: FloatArray) -> FloatArray:

@@ -7,6 +7,8 @@ much. What is returned as emitted is what the control will understand, digits an
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,7 +66,7 @@ class BlockRenderer(TurnWriter):
                 self._absent_axis(position, column, end[column])
             else:
                 self._present_axis(position, column, end[column], word)
-        if np.isfinite(self.target.original_centre).any() and not (self.target.arc or self.layout.axes or self.added):
+        if not (self.target.arc or self.layout.axes or self.added) and np.isfinite(self.target.original_centre).any():
             self.added += [self.layout.blank + word for word in self._named(position)]
         self._arc_words(base, position)
         self._level()
@@ -100,8 +102,10 @@ class BlockRenderer(TurnWriter):
         An output step beside it, a control would make an arc of a thousandth of a degree of it.
         """
         target, closed = self.target, np.zeros(len(position), dtype=bool)
+        if not target.arc or len(target.ends) > 1:
+            return closed
         plane = [target.spatial[index] for index in target.plane[:2]]
-        if target.arc and len(target.ends) == 1 and -1 not in plane:
+        if -1 not in plane:
             chord = (self._xyz(target.nominal) - target.origin)[list(target.plane[:2])]
             near = np.abs(end - position)[plane] < NEAR * self.half[plane]
             closed[plane] = bool((np.abs(chord) < CLOSED).all() and near.all())
@@ -135,7 +139,7 @@ class BlockRenderer(TurnWriter):
     def _level(self) -> None:
         """The level R of a canned cycle: its word, or one more where another level is in force."""
         target, word = self.target, self.layout.radius
-        if not np.isfinite(target.level):
+        if not math.isfinite(target.level):
             return
         decimals, half = int(target.decimals[target.across]), self.half[target.across]
         level, least = target.level, target.least_level
@@ -157,10 +161,10 @@ class BlockRenderer(TurnWriter):
         if self.target.arc:
             self._kept_arc(start, end)
             return
-        if np.isfinite(self.target.original_centre).any():
-            for word in (*self.layout.centre.values(), self.layout.radius, self.layout.turns):
-                if word is not None:
-                    self._remove(word)
+        words = [*self.layout.centre.values(), self.layout.radius, self.layout.turns]
+        if any(words) and np.isfinite(self.target.original_centre).any():
+            for word in filter(None, words):
+                self._remove(word)
 
     def _kept_arc(self, start: FloatArray, end: FloatArray) -> None:
         """Centre words of an arc that stays one; an R that no longer says which centre is meant gives way to I J K."""

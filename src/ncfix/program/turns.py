@@ -33,8 +33,10 @@ DIGITS = 6
 
 def turn_alone(moves: Moves, row: int) -> float:
     """The angle of a motion at feed that turns rotary axes alone, in degrees; 0 for others."""
+    if moves.kind[row] != Kind.FEED:
+        return 0.0
     way = moves.end[row] - moves.start[row]
-    if moves.kind[row] != Kind.FEED or not np.all(way[~moves.rotary] == 0):
+    if (way[~moves.rotary] != 0).any():
         return 0.0
     return float(np.rad2deg(np.linalg.norm(way[moves.rotary])))
 
@@ -57,8 +59,8 @@ def minutes(moves: Moves, row: int, own_feed: bool) -> float:
     An F that stood before a change between inch and mm keeps its degrees, but no longer shows them: with two units in
     a program, only an F of the motion's own block is known (`own_feed`).
     """
-    mode, turn = moves.feed_mode[row], turn_alone(moves, row)
-    if mode == FeedMode.INVERSE_TIME or not turn:
+    turn, mode = turn_alone(moves, row), moves.feed_mode[row]
+    if not turn or mode == FeedMode.INVERSE_TIME:
         return float("nan")
     if not own_feed and len({frame.unit for frame in moves.frames}) > 1:
         return float("inf")
