@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from compensate import streaming
+from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
 from ncfix import fast
 from ncfix.compensate import corrector
@@ -112,6 +114,29 @@ def test_arcs_and_dwells_among_plain_motions(seed: int, machine: Machine, monkey
     found = streamed(source, machine, 6000, options)
     assert sum(plainly) >= 2
     assert_as_by_the_long_way(found, source, machine, 6000, options, monkeypatch)
+
+
+LED = {
+    "short": (rb"^", rb""),
+    "long": (rb"(?m)^(N\d*50 G1 X)1(.*) C[\d.]+", rb"\g<1>2\2 C140."),
+    "turning": (rb"(?m)^(N\d*[37]00 G1 .*) C[\d.]+", rb"\1 C300."),
+}
+"""Changes to a program under TCP: none, long motions, and some that a control with roll-over may do otherwise."""
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize("siemens", [False, True], ids=["fanuc", "sinumerik"])
+@pytest.mark.parametrize("change", list(LED))
+def test_led_tips(change: str, siemens: bool, machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = re.sub(*LED[change], others.program(3, 200, 0.0, siemens=siemens))
+    given = (source, machine, "siemens") if siemens else (source, machine, "fanuc")
+    plainly, setup = counted(monkeypatch), streaming.SETUP if siemens else others.CALCULATOR
+    found = streaming.streamed(*given, 8000, setup=setup)
+    assert sum(plainly) >= 2
+    assert ("must not be split" in str(found[1])) == (change == "turning")
+    assert (found[1]["inserted_blocks"] > 9) == (change == "long")
+    monkeypatch.setattr(corrector.Planner, "of", lambda *given: None)
+    streaming.assert_alike(found, streaming.streamed(*given, 8000, setup=setup))
 
 
 def assert_as_by_the_long_way(

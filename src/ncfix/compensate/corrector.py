@@ -134,7 +134,7 @@ class Corrector:
         settled = course.settled(plain)
         _check(differences(settled, self._read_again(text, part, plain.splices)))
         tally = Tally()
-        tally.add_plain(settled, largest_shift(course, plain))
+        tally.add_plain(part.program, settled, largest_shift(course, plain))
         if self.task.options.verify:
             tally.figures(figures(course, plain, self.task.options.split_rapids), part.program, moves)
         return Done(text, tally)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ncfix.compensate import arcs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
@@ -13,10 +14,11 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.ragged import slices
 from ncfix.compensate.rates import Path
-from ncfix.compensate.rows import chosen, finite, picked, put
+from ncfix.compensate.rows import chosen, every, finite, picked, put
 from ncfix.compensate.standing import standing
 from ncfix.compensate.steer import Correction
 from ncfix.compensate.strategies import Strategy
+from ncfix.machine import Machine
 
 BATCH = 32_768
 """Ends corrected at a time."""
@@ -119,9 +121,16 @@ def as_commands(intent: Intent, rows: Index, programmed: Array, nominal: Array, 
     tcp, lengths = intent.moves.tcp[rows], intent.moves.tool_length[rows]
     if not tcp.any():
         return corrected
-    here = commands_from_joints(intent.machine, nominal, tcp, lengths)
-    there = commands_from_joints(intent.machine, corrected, tcp, lengths)
-    still = (nominal == corrected).all(axis=1)[:, None]
+    return led_as_commands(intent.machine, programmed, (nominal, corrected), tcp, lengths)
+
+
+def led_as_commands(
+    machine: Machine, programmed: Array, positions: tuple[Array, Array], tcp: Mask, lengths: ArrayLike
+) -> Array:
+    """As `as_commands`; `positions` are those of the program and the corrected ones, `tcp` and lengths as there."""
+    nominal, corrected = positions
+    here, there = (commands_from_joints(machine, q, tcp, lengths) for q in positions)
+    still = every(nominal == corrected)[:, None]
     result: Array = programmed + np.where(still, 0.0, there - here)
     return result
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import linear_columns
-from ncfix.compensate.rows import lengths
+from ncfix.compensate.rows import every, lengths
 from ncfix.machine import Machine
 
 
@@ -26,10 +26,15 @@ def surely_within(machine: Machine, begin: Array, end: Array, tool_length: float
     acceleration = accelerations(machine, begin, end, tool_length)
     if acceleration is None:
         return np.zeros(len(begin), dtype=bool)
+    return stays_within(machine, begin, end, acceleration)
+
+
+def stays_within(machine: Machine, begin: Array, end: Array, acceleration: Array) -> Mask:
+    """As `surely_within`, of motions with these accelerations at most (k,), see below."""
     turning, stray = machine.rotary, acceleration / 8
     low, high = machine.ranges.T
     room = np.minimum(np.minimum(begin, end) - low, high - np.maximum(begin, end))
-    return np.asarray((room[:, ~turning] > stray[:, None]).all(axis=1) & (room[:, turning] >= 0).all(axis=1))
+    return every((room >= 0) & ((room > stray[:, None]) | turning))
 
 
 def accelerations(

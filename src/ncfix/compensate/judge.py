@@ -94,10 +94,7 @@ def _bounds_of_axes(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Ar
 
 
 def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Array:
-    """As `bounds`, of motions under tool-centre-point control.
-
-    What is added to X Y Z goes straight in the workpiece, so that only the tip's error can leave its chord.
-    """
+    """As `bounds`, of motions under tool-centre-point control."""
     machine, longest = intent.machine, float(np.abs(intent.lengths(rows)).max())
     commands = picked(real.start, rows), picked(real.end, rows)
     start, end = (intent.joints(rows, each) for each in commands)
@@ -105,10 +102,21 @@ def _bounds_of_tip(intent: Intent, real: Segments, rows: Index, bow: Bow) -> Arr
     acceleration = accelerations(machine, start, end, longest, way)
     if acceleration is None or intent.arrival is not None:
         return np.full(len(rows), np.inf)
-    most_far = np.maximum(farthest(start), farthest(end))
-    most = bow.of(np.abs(end - start), most_far, longest, machine.rotary, acceleration)[0] + CLOSE
-    stray = np.where(machine.rotary, 0.0, acceleration[:, None] / 8)
-    most[passed(intent, np.minimum(start, end) - stray, np.maximum(start, end) + stray)[0]] = np.inf
+    return led_bounds(intent, bow, start, end, acceleration, longest)
+
+
+def led_bounds(intent: Intent, bow: Bow, start: Array, end: Array, acceleration: Array, tool_length: float) -> Array:
+    """As `bounds`, of motions under tool-centre-point control between corrected axis positions (k, n_axes).
+
+    acceleration  (k,) of linear axes, as `accelerations` has it
+
+    What is added to X Y Z goes straight in the workpiece, so that only the tip's error can leave its chord.
+    """
+    rotary, most_far = intent.machine.rotary, np.maximum(farthest(start), farthest(end))
+    most = bow.of(np.abs(end - start), most_far, tool_length, rotary, acceleration)[0] + CLOSE
+    if intent.kinks:
+        stray = np.where(rotary, 0.0, acceleration[:, None] / 8)
+        most[passed(intent, np.minimum(start, end) - stray, np.maximum(start, end) + stray)[0]] = np.inf
     return most
 
 

@@ -217,6 +217,12 @@ def _too_long(rows: Index) -> Finding:
     return Finding("NCF417", rows, np.zeros(len(rows)), text, hint="make several motions of it")
 
 
+def not_split(rows: Index, deviation: Array) -> Finding:
+    """NCF413: motions (k,) that would have to be split, and must not be; `deviation` in mm."""
+    text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
+    return Finding("NCF413", rows, deviation * 1e3, text)
+
+
 def _remarks(
     intent: Intent, deviation: Array, oriented: Mask, kept: Mask, strategy: Strategy, demands: Demands
 ) -> list[Finding]:
@@ -225,8 +231,7 @@ def _remarks(
     budget = demands.budget
     over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
     if over.size:
-        text = "the tool tip leaves the intended path by {value:.1f} um, and this motion must not be split"
-        remarks.append(Finding("NCF413", over, deviation[over] * 1e3, text))
+        remarks.append(not_split(over, deviation[over]))
     done = np.flatnonzero(~kept)
     if not budget.met and done.size:
         text = "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um"

@@ -1,10 +1,10 @@
 """Parts of plain straight motions, which is what long programs are made of: planned in few passes.
 
 The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no cycles in it,
-no tool-centre-point control, no axes without words, nothing that is refused, and every motion begins where the one
-before ended. The few arcs and dwells in it are planned as the long way does (see `others`). Whatever turns out to need
-more than that, or comes near to a limit, is for the long way. Both ways write the same bytes; a test holds them
-together.
+no axes without words, nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and every
+motion begins where the one before ended. The few arcs and dwells in it are planned as the long way does (see `others`).
+Whatever turns out to need more than that, or comes near to a limit, is for the long way. Both ways write the same
+bytes; a test holds them together.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Budget, Closure
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.direction import REST, matters
-from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Split
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.judge import CORNER, SURE, looked_at, straight_bounds
+from ncfix.compensate.judge import CORNER, SURE, led_bounds, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.others import Others, planned
-from ncfix.compensate.path import Demands, in_pieces
+from ncfix.compensate.path import Demands, in_pieces, not_split
+from ncfix.compensate.plain_poses import Poses
 from ncfix.compensate.ragged import distinct, offsets, owners, places
 from ncfix.compensate.rows import extent, lengths, picked, some
 from ncfix.compensate.sampling import passed
@@ -48,13 +49,14 @@ NEARLY = 1 - 1e-6
 class Course:
     """The plan of a part of plain motions.
 
-    part    its text and motions
-    plain   (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
-    intent  the motions on the machine
-    real    where they really start and end, before rounding: there the tip is where it should be, to 1 nm
-    pieces  what is to be written
-    first   (n + 1,) the first piece of each motion, and how many there are
-    before  (n,) mm: how far off it is at their ends without a correction
+    part      its text and motions
+    plain     (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
+    intent    the motions on the machine
+    real      where they really start and end, before rounding: there the tip is where it should be, to 1 nm
+    pieces    what is to be written
+    first     (n + 1,) the first piece of each motion, and how many there are
+    before    (n,) mm: how far off it is at their ends without a correction
+    findings  what there is to say of motions
     """
 
     part: Part
@@ -64,6 +66,7 @@ class Course:
     pieces: Pieces
     first: Index
     before: Array
+    findings: tuple[Finding, ...]
 
     @property
     def single(self) -> bool:
@@ -79,7 +82,7 @@ class Course:
         """The plan and its text as the long way has them."""
         moves = self.part.moves
         untold = np.zeros(len(moves)), np.ones(len(moves), dtype=bool)
-        plan = Plan(self.pieces, self.real.start, *untold, ())
+        plan = Plan(self.pieces, self.real.start, *untold, self.findings)
         return Settled(moves, plan, emission, moves.kind == Kind.DWELL, {}, unmoored=False)
 
     def last(self, of_pieces: Array) -> Array:
@@ -116,9 +119,12 @@ class Planner:
         plain = None if unit.head is None else plain_ones(unit.head.moves, moves)
         if unit.head is None or plain is None:
             return None
-        q = np.concatenate([unit.head.moves.end, moves.end])
-        found = self.strategy.solve(self.machine, q, State(float(moves.tool_length[0])))
-        if found.before is None or not found.converged.all() or not self._within_limits(q, found.q):
+        commands, led = np.concatenate([unit.head.moves.end, moves.end]), bool(moves.tcp[0])
+        poses = Poses.of(self.machine, float(moves.tool_length[0]), commands, led)
+        if poses is None:
+            return None
+        found = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
+        if found.before is None or not found.converged.all() or not self._within_limits(poses.meant, found.q):
             return None
         intent, others, alone = Intent(self.machine, moves, State()), None, plain
         if not plain.all():
@@ -127,36 +133,66 @@ class Planner:
                 return None
             alone = plain.copy()
             alone[others.rows] = False
-        real = replace(intent.segments, start=found.q[:-1], end=found.q[1:])
-        over, parts = self._split(intent, real, (q, found.q), alone)
+        done = poses.corrected(found.q)
+        real = replace(intent.segments, start=done[:-1], end=done[1:])
+        bound = self._bounds_of(poses, intent, real, found.q)
+        if bound is None:
+            return None
+        over, parts, findings = self._split(intent, real, bound, alone)
         if over.size and parts is None:
             return None
         pieces, first = pieces_of(real, over, parts, others)
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
             pieces = on_digits(self.machine, moves, pieces, inner)
-            if not self._fine_inside(intent, pieces, inner, found.q - q):
+            if not self._fine_inside(poses, real, pieces, inner, found.q - poses.meant):
                 return None
-        return Course(part, plain, intent, real, pieces, first, found.before[1:])
+        return Course(part, plain, intent, real, pieces, first, found.before[1:], findings)
+
+    def _bounds_of(self, poses: Poses, intent: Intent, real: Segments, done: Array) -> Array | None:
+        """What the deviation of the tip does not exceed along motions, (n,) mm; None if one leaves a travel on its way.
+
+        done  (n + 1, n_axes) corrected axis positions
+        """
+        begin, end = done[:-1], done[1:]
+        if not poses.led:
+            bound = self._bounds(poses.meant, done, np.asarray(poses.tool_length))
+            bound[passed(intent, begin, end)[0]] = np.inf
+            return bound
+        assert self.machine.bow is not None
+        programmed, meant = intent.segments, (poses.meant[:-1], poses.meant[1:])
+        acceleration = poses.accelerations(real, begin, end)
+        if poses.leave_travel(programmed, *meant, poses.accelerations(programmed, *meant)):
+            return None
+        if poses.leave_travel(real, begin, end, acceleration):
+            return None
+        return led_bounds(intent, self.machine.bow, begin, end, acceleration, poses.tool_length)
 
     def _split(
-        self, intent: Intent, real: Segments, poses: tuple[Array, Array], among: Mask
-    ) -> tuple[Index, Split | None]:
-        """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way."""
+        self, intent: Intent, real: Segments, bound: Array, among: Mask
+    ) -> tuple[Index, Split | None, tuple[Finding, ...]]:
+        """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way.
+
+        bound  (n,) mm: what their deviation does not exceed
+
+        Also what there is to say of those that must not be split.
+        """
         moves, limit = intent.moves, self.demands.budget.path
-        bound = self._bounds(*poses, intent.lengths(np.arange(1)))
-        bound[passed(intent, real.start, real.end)[0]] = np.inf
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
         rows = rows[self._followed(moves, rows)]
         if not rows.size:
-            return rows, None
+            return rows, None, ()
         worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
-        over = worst > limit
-        rows = rows[over]
-        if not rows.size or np.isinf(worst).any():
-            return rows, None
-        parts = in_pieces(intent, real, rows, worst[over], self.strategy, self.demands)
-        return rows, parts if np.isfinite(parts.worst).all() else None
+        if np.isinf(worst).any():
+            return rows, None, ()
+        whole = (worst > limit) & moves.compensated[rows]
+        findings = (not_split(rows[whole], worst[whole]),) if whole.any() else ()
+        over = (worst > limit) & ~whole
+        rows, deviation = rows[over], worst[over]
+        if not rows.size:
+            return rows, None, findings
+        parts = in_pieces(intent, real, rows, deviation, self.strategy, self.demands)
+        return rows, parts if np.isfinite(parts.worst).all() else None, findings
 
     def _followed(self, moves: Moves, rows: Index) -> Mask:
         """Which of motions `rows` (k,) are looked at along their way."""
@@ -200,17 +236,24 @@ class Planner:
         shift = done - meant
         return self._small(shift) and self._steady(shift[1:] - shift[:-1])
 
-    def _fine_inside(self, intent: Intent, pieces: Pieces, inner: Index, shift: Array) -> bool:
-        """The same of pieces that end inside of motions (k,)."""
+    def _fine_inside(self, poses: Poses, real: Segments, pieces: Pieces, inner: Index, shift: Array) -> bool:
+        """The same of pieces that end inside of motions (k,); `shift` (n + 1, n_axes) between motions."""
         near = distinct(np.concatenate([inner, inner + 1]))
-        own, ends = pieces.move[near], pieces.end[near]
-        change = ends - intent.segments.at(own, pieces.fraction[near])
+        own, ends, fraction = pieces.move[near], pieces.end[near], pieces.fraction[near]
         at_start = pieces.move[np.maximum(near - 1, 0)] != own
         at_start[:1] |= near[:1] == 0
+        programmed = replace(real, start=poses.commands[:-1], end=poses.commands[1:])
+        positions = poses.joints(ends)
+        change = positions - poses.joints(programmed.at(own, fraction))
         before = np.concatenate([np.zeros_like(change[:1]), change[:-1]])
         before[at_start] = shift[own[at_start]]
         low, high = self.machine.ranges.T
-        within = bool((low - ends <= FUZZ).all() and (ends - high <= FUZZ).all())
+        within = bool((low - positions <= FUZZ).all() and (positions - high <= FUZZ).all())
+        if within and poses.led:
+            start = np.concatenate([ends[:1], ends[:-1]])
+            start[at_start] = real.start[own[at_start]]
+            along, begin = replace(real.rows(own), start=start, end=ends), poses.joints(start)
+            within = not poses.leave_travel(along, begin, positions, poses.accelerations(along, begin, positions))
         return within and self._small(change) and self._steady(change - before)
 
     def _small(self, shift: Array) -> bool:
@@ -229,8 +272,14 @@ def plain_ones(head: Moves, moves: Moves) -> Mask | None:
 
     None unless all go on from each other, and from the last one before them, and the others are arcs and dwells.
     """
-    tool, frame = moves.tool_length[0], moves.frame[0]
-    alike = (moves.frame == frame).all() and (moves.tool_length == tool).all() and head.tool_length[0] == tool
+    tool, frame, tcp = moves.tool_length[0], moves.frame[0], moves.tcp[0]
+    alike = (
+        (moves.tcp == tcp).all()
+        and head.tcp[0] == tcp
+        and (moves.frame == frame).all()
+        and (moves.tool_length == tool).all()
+        and head.tool_length[0] == tool
+    )
     joined = (head.end[0] == moves.start[0]).all() and (moves.start[1:] == moves.end[:-1]).all()
     rising = (moves.block[1:] > moves.block[:-1]).all()
     able = _may_be_planned(head) and _may_be_planned(moves) and _are_straight(head).all()
@@ -240,8 +289,8 @@ def plain_ones(head: Moves, moves: Moves) -> Mask | None:
 def _may_be_planned(moves: Moves) -> bool:
     """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
     rule = (moves.rule != Rule.CORRECT) & (moves.kind != Kind.DWELL)
-    special = moves.incremental | moves.tcp | moves.compensated | rule | (moves.kind == Kind.CYCLE)
-    columns = moves.approach, moves.counted, moves.held
+    special = moves.incremental | rule | (moves.kind == Kind.CYCLE)
+    columns = moves.approach, moves.counted
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False
     timed = (moves.feed_mode == FeedMode.INVERSE_TIME).any()

@@ -14,12 +14,12 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.budget import DENSITY
-from ncfix.compensate.findings import Index, Mask
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import greatest, lengths, picked
-from ncfix.compensate.sampling import MOST_SHOWN, even, features, passed
+from ncfix.compensate.sampling import MOST_SHOWN, bends, even, features, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.written import Written
@@ -33,7 +33,10 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
     moves, written = course.part.moves, replace(course.real, start=text.start, end=course.last(text.end))
     shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
     apart = ~course.plain | course.behind_dwells | (np.diff(course.first) > 1)
-    apart[passed(course.intent, written.start, written.end)[0]] = True
+    if moves.tcp[0]:
+        apart |= bool(course.intent.kinks)
+    else:
+        apart[passed(course.intent, written.start, written.end)[0]] = True
     tally = FigureTally(len(moves))
     counts = (_compiled if fast.engaged() else _by_columns)(course, text, written, (shown, apart), tally)
     inside = np.flatnonzero(counts)
@@ -56,8 +59,7 @@ def _by_columns(
     (shown, apart), moves, machine = masks, course.part.moves, course.intent.machine
     apart |= greatest(np.abs(written.end - course.real.end)[:, machine.rotary]) > TURNED
     bends = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1)
-    bent = shown & ~apart & (moves.kind == Kind.FEED) & (bends >= STRAIGHT)
-    counts = np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
+    counts = _looks(course, shown & ~apart, _led_bends(course) if moves.tcp[0] else bends)
     rows = np.flatnonzero(shown & ~apart)
     if rows.size:
         tally.add(_at_ends(course, written, rows, counts))
@@ -70,20 +72,34 @@ def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Ma
 
     moves, machine, sums, places = course.part.moves, course.intent.machine, np.zeros(5), np.full(3, -1)
     assert machine.linear_ways is not None
-    places[0], counts = 0, np.zeros(len(moves), dtype=np.intp)
+    places[0], counts, (shown, apart), bending = 0, np.zeros(len(moves), dtype=np.intp), masks, features(machine)
+    if moves.tcp[0]:
+        counts, bending = _looks(course, shown, _led_bends(course)), np.full_like(bending, np.inf)
     plain_kernels.at_ends(
         (moves.start, moves.end),
         (text.start[0], text.end, course.first),
         (course.real.end, course.before),
-        (features(machine), np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
+        (bending, np.ascontiguousarray(machine.linear_ways), course.intent.columns, ~machine.rotary),
         (STRAIGHT, TURNED, DENSITY, MOST_SHOWN),
         (*masks, moves.kind == Kind.FEED),
         (sums, places, counts),
     )
     way, *squares = sums[:3].tolist()
     count, *rows = places.tolist()
+    counts[apart] = 0
     tally.take(way, count, squares, [(most, row, 1.0) for most, row in zip(sums[3:].tolist(), rows, strict=True)])
     return counts
+
+
+def _led_bends(course: Course) -> Array:
+    """About how many times the error may bend along each motion under TCP, (n,)."""
+    return bends(course.intent, np.arange(len(course.part.moves)))
+
+
+def _looks(course: Course, among: Mask, bends: Array) -> Index:
+    """At how many places inside of motions `among` (n,) to look, over which the error may bend so many times, (n,)."""
+    bent = among & (course.part.moves.kind == Kind.FEED) & (bends >= STRAIGHT)
+    return np.where(bent, np.minimum(np.ceil(DENSITY * bends), MOST_SHOWN), 0).astype(np.intp)
 
 
 def _at_ends(course: Course, written: Segments, rows: Index, counts: Index) -> Samples:

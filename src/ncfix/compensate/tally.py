@@ -99,7 +99,7 @@ class Tally:
         for finding in settled.plan.findings:
             self._note(finding, program, moves, own)
 
-    def add_plain(self, settled: Settled, largest: float) -> None:
+    def add_plain(self, program: Program, settled: Settled, largest: float) -> None:
         """Take in a part of dwells and motions that were corrected, each in a block of its own.
 
         largest  shift of a linear command, mm
@@ -109,6 +109,8 @@ class Tally:
         self.inserted += settled.emission.added_blocks
         self.largest = max(self.largest, largest)
         self.changed |= len(settled.emission.splices) > 0
+        for finding in settled.plan.findings:
+            self._note(finding, program, settled.moves, np.ones(len(settled.moves), dtype=bool))
 
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""
