@@ -19,7 +19,7 @@ from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import greatest, lengths, picked
-from ncfix.compensate.sampling import MOST_SHOWN, bends, even, features, passed
+from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.written import Written
@@ -93,7 +93,7 @@ def _compiled(course: Course, text: Emission, written: Segments, masks: tuple[Ma
 
 def _led_bends(course: Course) -> Array:
     """About how many times the error may bend along each motion under TCP, (n,)."""
-    return bends(course.intent, np.arange(len(course.part.moves)))
+    return bends_closely(course.intent, np.arange(len(course.part.moves)))
 
 
 def _looks(course: Course, among: Mask, bends: Array) -> Index:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.excursion import accelerations
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
@@ -49,6 +50,25 @@ def bends(intent: Intent, rows: Index) -> Array:
     count: Array = way.sum(axis=1)
     count[arcs] += np.abs(moves.sweep[rows[arcs]]) / EIGHTH
     return count
+
+
+def bends_closely(intent: Intent, rows: Index) -> Array:
+    """As `bends`, but under tool-centre-point control by what the linear axes have to go, and not by what they might.
+
+    An axis whose acceleration is at most a, per motion squared, goes up and down by no more than a / 3 beside its way.
+    """
+    often, machine = bends(intent, rows), intent.machine
+    led = np.flatnonzero(intent.moves.tcp[rows] & ~intent.segments.arc[rows])
+    if not led.size:
+        return often
+    on = rows[led]
+    begin, end = (intent.joints_at(on, np.full(len(on), place)) for place in (0.0, 1.0))
+    longest = float(np.nanmax(np.abs(intent.lengths(on)), initial=0.0))
+    acceleration = accelerations(machine, begin, end, longest)
+    if acceleration is not None:
+        way = np.abs(end - begin) + np.where(machine.rotary, 0.0, acceleration[:, None] / 3)
+        often[led] = np.fmin(often[led], (way / features(machine)).sum(axis=1))
+    return often
 
 
 def too_long(intent: Intent, rows: Index) -> Mask:

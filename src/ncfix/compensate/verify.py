@@ -19,7 +19,7 @@ from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked
-from ncfix.compensate.sampling import MOST_SHOWN, bends, merged, passed
+from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
@@ -137,7 +137,7 @@ def samples(
 def _counts(written: Written, which: Index, density: float) -> tuple[Index, Mask]:
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     intent, move, span = written.intent, written.pieces.move[which], written.span[which]
-    wished, kind = bends(intent, move) * span, intent.moves.kind[move]
+    wished, kind = bends_closely(intent, move) * span, intent.moves.kind[move]
     along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (span > 2 * INSTANT) & intent.moving[move]
     begun = picked(written.segments.start, which) + picked(written.start, move) + picked(intent.moves.start, move)
     along &= finite(begun)
