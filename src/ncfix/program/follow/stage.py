@@ -82,16 +82,18 @@ def followed(
 ) -> tuple[FloatArray, FloatArray]:
     """The path (n + 1, 9) and the F words (n,) of blocks of some shapes with numbers from `first` on."""
     path = np.empty((len(first) + 1, N_LETTERS))
-    path[0] = control.position
-    for letter in range(N_LETTERS):
-        path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[shapes, letter]))
-    return path, words(numbers, first, tables.feed[shapes])
+    path[:] = control.position
+    for letter in np.flatnonzero((tables.axes >= 0).any(axis=0)).tolist():
+        path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[:, letter].take(shapes)))
+    return path, words(numbers, first, tables.feed.take(shapes))
 
 
 def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
     """The numbers at some slots of blocks, NaN where the slot is -1."""
-    values = np.full(len(slots), np.nan)
-    rows = np.flatnonzero(slots >= 0)
+    given = slots >= 0
+    if given.all():
+        return numbers.take(first + slots)
+    values, rows = np.full(len(slots), np.nan), np.flatnonzero(given)
     values[rows] = numbers[first[rows] + slots[rows]]
     return values
 
