@@ -7,18 +7,28 @@ it, not the batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from ncfix.diagnostics import UsageError
 from ncfix.plugins import nearest, registry
 
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-Staff = Callable[[int], Executor]
+Staff: TypeAlias = "Callable[[int], Executor]"
 """Makes an executor with so many workers."""
 
-BUILT_IN: Mapping[str, Staff] = {"processes": ProcessPoolExecutor}
+
+def processes(workers: int) -> Executor:
+    """Processes of this machine."""
+    from concurrent.futures import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(workers)
+
+
+BUILT_IN: Mapping[str, Staff] = {"processes": processes}
 
 
 def staff(name: str) -> Staff:
@@ -40,6 +50,8 @@ def each(
 
     lost  the result for a task whose worker died over it twice, the second time alone
     """
+    from concurrent.futures import BrokenExecutor
+
     rest = list(tasks)
     while rest:
         with make(min(workers, len(rest))) as executor:
@@ -58,6 +70,8 @@ def each(
 
 
 def _alone(work: Callable[[Task], Result], task: Task, make: Staff, lost: Callable[[Task], Result]) -> Result:
+    from concurrent.futures import BrokenExecutor
+
     try:
         with make(1) as executor:
             return executor.submit(work, task).result()
