@@ -13,15 +13,17 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import lru_cache
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
 
 import pluggy
 
 from ncfix import hookspecs
 from ncfix.diagnostics import Message, PluginError
 from ncfix.hookspecs import GROUP
+
+if TYPE_CHECKING:
+    from importlib.metadata import Distribution, EntryPoint
 
 HOOKS = tuple(sorted(name for name in vars(hookspecs) if name.startswith("register_")))
 
@@ -99,6 +101,8 @@ def load_plugins() -> Plugins:
 
 def installed() -> list[EntryPoint]:
     """The entry points of the group that are not disabled; those of ncfix first, then by distribution and name."""
+    from importlib.metadata import entry_points
+
     disabled = {name.strip() for name in os.environ.get("NCFIX_DISABLE_PLUGINS", "").split(",")}
     points = {(distribution(point), point.name): point for point in entry_points(group=GROUP)}
     order = sorted(points, key=lambda key: (key[0] != "ncfix", key))
@@ -124,8 +128,7 @@ def load_one(point: EntryPoint, earlier: Iterable[Plugin]) -> Plugin:
     module = import_plugin(point)
     things = registrations(point, hooks_of(point, module))
     check_names(point, things, earlier)
-    version = point.dist.version if point.dist else ""
-    return Plugin(point.name, point.value, distribution(point), version, things)
+    return Plugin(point.name, point.value, *described(point.dist), things)
 
 
 def import_plugin(point: EntryPoint) -> object:
@@ -229,7 +232,16 @@ def taken(plugin: str, kind: str, name: str, owner: str) -> Message:
 
 def distribution(point: EntryPoint) -> str:
     """The name of the distribution that an entry point belongs to, empty for none."""
-    return point.dist.name if point.dist else ""
+    return described(point.dist)[0]
+
+
+@cache
+def described(dist: Distribution | None) -> tuple[str, str]:
+    """Name and version of a distribution, empty for none; its metadata is read as a mail is, which takes a while."""
+    if dist is None:
+        return "", ""
+    metadata = dist.metadata
+    return metadata["Name"], metadata["Version"]
 
 
 def describe(error: BaseException) -> str:
