@@ -157,8 +157,8 @@ def signals_of(axes: tuple[Axis, ...], effect: Effect) -> tuple[Signal | None, S
         lag = effect.time_constant_s or 0.0
         plain = _plain(axes, effect.signal)
         low, high = effect.range or (plain.low, plain.high)
-        held = replace(plain, low=max(low, plain.low), high=min(high, plain.high))
-        signal = replace(held, center=effect.center, scale=effect.scale, constant_s=lag)
+        low, high = max(low, plain.low), min(high, plain.high)
+        signal = replace(plain, low=low, high=high, center=effect.center, scale=effect.scale, constant_s=lag)
     if effect.times is not None:
         center = effect.center if effect.times_center is None else effect.times_center
         scale = effect.scale if effect.times_scale is None else effect.times_scale

@@ -1,0 +1,68 @@
+"""What a short program does not wait for: modules that its job has no use for are not imported."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+FAMILIES = {"rs274", "fanuc", "sinumerik", "klartext"}
+ELSEWHERE = {
+    "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures",
+    "ncfix.diagnose", "ncfix.measure", "ncfix.report", "ncfix.machine.symbolic", "ncfix.kernel",
+    "ncfix.compensate.stream",
+}  # fmt: skip
+"""What none of the verbs below needs for a program of a page and a machine with a few errors."""
+
+RUN = """
+import sys
+from ncfix.cli.main import run
+code = run(sys.argv[1:])
+print(*sorted(sys.modules), sep="\\n", file=sys.stderr)
+sys.exit(code)
+"""
+
+
+def imported(arguments: list[str], root: Path) -> set[str]:
+    """The modules that a process has at its end."""
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, *arguments], capture_output=True, text=True, cwd=root, check=False
+    )
+    assert done.returncode in (0, 1), done.stderr
+    return set(done.stderr.splitlines())
+
+
+def families(modules: set[str]) -> set[str]:
+    """The families of controls of which anything is imported."""
+    return {name for name in FAMILIES if f"ncfix.program.{name}" in modules}
+
+
+@pytest.mark.parametrize("verb", ["check", "trace", "verify", "fix"])
+def test_a_short_program_waits_for_nothing_it_does_not_need(verb: str, root: Path, tmp_path: Path) -> None:
+    program, output = tmp_path / "part.ngc", tmp_path / "out.ngc"
+    program.write_text("G21 G90 G17 G94 G54\nG1 X1 Y2 Z3 B4 C5 F500\nG1 X2 Y2 Z3 B4 C6\nM2\n")
+    files = [str(program), str(program)] if verb == "verify" else [str(program)]
+    given = ["-m", "benchmarks/five_axis.toml", "--dialect", "linuxcnc", "--assume-zero"]
+    modules = imported([verb, *files, *given, *(["-o", str(output)] if verb == "fix" else [])], root)
+    assert "ncfix.program.rs274.interpreter" in modules
+    assert not modules & ELSEWHERE
+    assert families(modules) == {"rs274"}
+
+
+@pytest.mark.parametrize(
+    ("program", "needed"),
+    [
+        ("fanuc_tcp.nc", {"fanuc", "rs274"}),
+        ("klartext_tcp.h", {"klartext"}),
+        ("siemens_traori.mpf", {"sinumerik"}),
+    ],
+)
+def test_a_control_does_not_wait_for_the_others(program: str, needed: set[str], root: Path) -> None:
+    modules = imported(["check", f"examples/programs/{program}"], root)
+    assert not modules & ELSEWHERE
+    assert families(modules) == needed
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["fix", "--help"]])
+def test_plugins_are_looked_for_when_one_may_be_asked_for(arguments: list[str], root: Path) -> None:
+    assert not imported(arguments, root) & {"importlib.metadata", "numpy", *ELSEWHERE}
