@@ -293,15 +293,13 @@ class Builder:
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
         """The columns of what styles hold, one row per motion."""
-        rows = list(self._styles)
-        types = {name: DTYPES.get(name, np.bool_) for name in Style._fields}
-        if len(style) and (style == style[0]).all():
-            only = rows[style[0]]
-            return {name: np.full(len(style), value, types[name]) for name, value in only._asdict().items()}
-        return {
-            name: np.array([row[index] for row in rows], dtype=types[name])[style]
-            for index, name in enumerate(Style._fields)
-        }
+        rows, used = list(self._styles), np.flatnonzero(np.bincount(style)).tolist()
+        columns: dict[str, NDArray[Any]] = {}
+        for index, name in enumerate(Style._fields):
+            kind, values = DTYPES.get(name, np.bool_), {rows[each][index] for each in used}
+            of_styles = np.array([row[index] for row in rows], dtype=kind)
+            columns[name] = np.full(len(style), values.pop(), kind) if len(values) == 1 else of_styles.take(style)
+        return columns
 
     def _keep_whole(
         self,
