@@ -187,10 +187,8 @@ class _Emitter:
         first = self.first_piece[row]
         stop = int(np.searchsorted(self.first_piece, first + len(ends)))
         self.end[first : first + len(ends)] = ends
-        self.start[row], self.start[row + 1 : stop] = (
-            self.position,
-            ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0),
-        )
+        self.start[row] = self.position
+        self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
         self.position = ends[-1].copy()
         self.cycle_end = None
         return stop - row
