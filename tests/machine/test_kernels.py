@@ -10,7 +10,8 @@ import pytest
 
 from machine import chains
 from ncfix import fast
-from ncfix.machine import Machine, State, load
+from ncfix.machine import Effect, Machine, State, load
+from ncfix.machine.piecewise import Spline
 
 pytest.importorskip("numba", reason="the `fast` extra is not installed")
 
@@ -83,6 +84,16 @@ def test_random_chains(seed: int) -> None:
     rng = np.random.default_rng(seed)
     machine = chains.random_errors(rng, chains.random_chain(rng, 4), 1e-4)
     for plain, compiled in zip(*both(machine, poses(machine, 300), State(50.0)), strict=True):
+        assert np.array_equal(plain, compiled)
+
+
+def test_curves_that_come_transposed() -> None:
+    knots = (*[-400.0] * 3, *np.linspace(-400, 400, 8).tolist(), *[400.0] * 3)
+    curve = tuple((1e-5 * np.sin(np.arange(len(knots) - 4))).tolist())
+    machine = chains.random_chain(np.random.default_rng(3), 4)
+    effects = [Effect(f"E{c}{axis}", curve, Spline(knots, 3)) for axis in machine.axis_names for c in "XYZABC"]
+    bent = machine.replace(effects=tuple(effects))
+    for plain, compiled in zip(*both(bent, poses(machine, 300), State(50.0)), strict=True):
         assert np.array_equal(plain, compiled)
 
 

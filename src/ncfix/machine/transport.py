@@ -148,11 +148,16 @@ class SmallMotion:
 
     @property
     def _rows(self) -> tuple[Array, Array, Array]:
-        """Rotation, translation and center, (3, n) each."""
+        """Rotation, translation and center, (3, n) each, contiguous."""
         assert self.rotation is not None
         assert self.translation is not None
         center = np.broadcast_to(self.center, self.rotation.shape)
-        return self.rotation[:, 0], self.translation[:, 0], np.ascontiguousarray(center[:, 0])
+        rotation, translation, center = map(_first_row, (self.rotation, self.translation, center))
+        return rotation, translation, center
+
+
+def _first_row(vectors: Array) -> Array:
+    return np.ascontiguousarray(vectors[:, 0])
 
 
 def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array:
