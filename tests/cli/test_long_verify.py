@@ -128,3 +128,26 @@ def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pyte
         monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
         for each, whole in zip((fixed, original), wholes, strict=True):
             assert same(ncfix("verify", original, each, *given, "--json").json(), whole)
+
+
+@pytest.mark.parametrize("part", [1 << 20, 3000])
+def test_a_rapid_in_the_middle_of_a_cut_is_found_however_short_it_is(
+    root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, part: int
+) -> None:
+    """Straight cuts of 200 mm, looked at every few mm: one says `G0` for a way of 0.3 mm that nobody looks at."""
+    original, fixed = tmp_path / "a.ngc", tmp_path / "b.ngc"
+    cuts = [f"G1 Y{20 + 0.5 * k}\nG1 X{10 + 200 * (k % 2)}" for k in range(100)]
+    original.write_text("\n".join(["G21 G90 G94 G54 G17 F900", "G0 X10 Y20 Z5 B0 C0", "G1 Z0", *cuts, "M2", ""]))
+    given = ("-m", root / "benchmarks/five_axis.toml", *GIVEN)
+    assert ncfix("fix", original, "-o", fixed, *given).code == ExitCode.DONE
+    text = fixed.read_text().splitlines()
+    monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    assert ncfix("verify", original, fixed, *given, "--json").json()["within"]
+    place = [at for at, line in enumerate(text) if line.startswith("G1 X2")][30]
+    for begin in (47.3, 132.49):
+        wrong = list(text)
+        wrong[place] = f"G1 X{begin}\nG0 X{begin + 0.3}\n{text[place]}"
+        fixed.write_text("\n".join(wrong) + "\n")
+        found = ncfix("verify", original, fixed, *given, "--json").json()
+        assert found["left_out_um"]["max"] == pytest.approx(150, abs=1), "half of it, from where the cut ends"

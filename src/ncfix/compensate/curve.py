@@ -131,6 +131,12 @@ class Curve:
         way: Array = self.lengths[piece] + share * self.ways[piece]
         return way
 
+    def point(self, piece: Index, share: Array) -> Array:
+        """The points at shares (n,) of parabolas (n,), (n, 3) mm."""
+        at = share[:, None]
+        found: Array = self.begin[piece] + at * (self.slope[piece] + at * self.bend[piece])
+        return found
+
     def and_then(self, other: Curve) -> Curve:
         """This path, and then another one."""
         both = {name: np.concatenate([getattr(each, name) for each in (self, other)]) for name in COLUMNS}
@@ -180,6 +186,11 @@ class Samples:
         if len(curve) and not curve.opens[0]:
             weight[0] += curve.ways[0] / 6
         return cls(piece, share, points, weight)
+
+    def and_more(self, other: Samples) -> Samples:
+        """These, and then others."""
+        names = ("piece", "share", "points", "weight")
+        return Samples(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
 
 
 def distance(one: Array, other: Array) -> Array:

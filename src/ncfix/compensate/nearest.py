@@ -56,6 +56,11 @@ class Nearest:
         """For some of the points."""
         return Nearest(self.piece[which], self.share[which], self.gap[which])
 
+    def and_more(self, other: Nearest) -> Nearest:
+        """For these points, and then for others."""
+        names = ("piece", "share", "gap")
+        return Nearest(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
+
     def put(self, which: Index, other: Nearest) -> None:
         """Take for some of the points what is there instead."""
         self.piece[which], self.share[which], self.gap[which] = other.piece, other.share, other.gap

@@ -20,6 +20,7 @@ from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
+from ncfix.compensate.holes import over_holes
 from ncfix.compensate.nearest import Search
 
 KEPT = 100.0
@@ -161,8 +162,11 @@ class Match:
         part = self.path.part(start, stop)
         samples = Samples.of(part)
         search = Search(other.curve, self.along.limit, self.ahead, other.dropped == 0, other.complete)
+        first = search.around(part.begin[:1], part.lengths[:1] + self.ahead).piece
         found = search.all(samples.points, part.way(samples.piece, samples.share))
         self.ahead = search.ahead
+        if self.path.flank is None:
+            samples, found = over_holes(search, part, samples, first, found)
         gap = found.gap
         if self.path.flank is not None:
             gap = self.path.flank.taken(slice(start, stop)).there(search, samples, found)
