@@ -16,6 +16,7 @@ from ncfix import fast
 from ncfix.diagnostics import NcfixError
 from ncfix.program.follow import lane
 from ncfix.program.moves import Moves
+from ncfix.program.setup import Setup
 from program.tracing import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1
@@ -34,11 +35,11 @@ def stretches_of(shortest: int) -> Iterator[None]:
         fast.disengage()
 
 
-def columns(text: str, shortest: int, dialect: str) -> dict[str, object] | str:
+def columns(text: str, shortest: int, dialect: str, setup: Setup = KNOWN) -> dict[str, object] | str:
     """All columns of the trace, or the error."""
     with stretches_of(shortest):
         try:
-            moves = follow(text, "XYZBC", KNOWN, dialect).moves
+            moves = follow(text, "XYZBC", setup, dialect).moves
         except NcfixError as error:
             return str(error)
     table = {
@@ -106,6 +107,17 @@ def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
 )
 def test_what_is_not_for_the_lane_is_left_alone(text: str) -> None:
     assert_same(text)
+
+
+def test_a_jump_back_to_where_a_stretch_ended_leaves_its_end_alone() -> None:
+    """The blocks that bring Z and B to their places go by themselves, so a stretch ends before N50."""
+    before = [f"X{i}. Y{i}." for i in range(1, 25)]
+    behind = ["N50 X77. Z3.", "X78.", "B1.", *(f"X{i}." for i in range(90, 102))]
+    text = "\n".join(["G90 G1 F100 X0. Y0.", *before, *behind, "#9=#9+1", "IF[#9LT3]GOTO50"])
+    one, other = (columns(f"#9=0\n{text}", shortest, "fanuc", Setup(assume_zero=True)) for shortest in (16, NEVER))
+    assert not isinstance(one, str)
+    assert not isinstance(other, str)
+    np.testing.assert_array_equal(one["end"], other["end"])
 
 
 def test_the_lane_takes_what_it_should() -> None:

@@ -21,7 +21,8 @@ class Ahead:
     begin  the first of these blocks
     stage  what they say, and where they lead
     frame  what their numbers counted from
-    done   the blocks before it may have been taken, and their rows must not change any more
+    done   the blocks before it may have been taken: their rows must not change any more, nor where this one starts,
+           which is where they end; a jump may come back to it from elsewhere
     reach  so many blocks are looked at next time
     """
 
@@ -36,7 +37,7 @@ class Ahead:
         frame = control.modal.incremental, feed_unit(control), *control.offset, *control.scale
         begin, stage = self.begin, self.stage
         known = stage is not None and frame == self.frame and not control.modal.incremental
-        if stage is None or not known or not self.done <= block < stop <= begin + len(stage.mask):
+        if stage is None or not known or not self.done < block < stop <= begin + len(stage.mask):
             begin, stage = block, self._looked(control, unit, block, stop)
             self.begin, self.stage, self.frame = begin, stage, frame
         found = stage.rows(block - begin, stop - begin)
