@@ -109,12 +109,34 @@ def test_what_is_not_for_the_lane_is_left_alone(text: str) -> None:
     assert_same(text)
 
 
-def test_a_jump_back_to_where_a_stretch_ended_leaves_its_end_alone() -> None:
-    """The blocks that bring Z and B to their places go by themselves, so a stretch ends before N50."""
-    before = [f"X{i}. Y{i}." for i in range(1, 25)]
-    behind = ["N50 X77. Z3.", "X78.", "B1.", *(f"X{i}." for i in range(90, 102))]
-    text = "\n".join(["G90 G1 F100 X0. Y0.", *before, *behind, "#9=#9+1", "IF[#9LT3]GOTO50"])
-    one, other = (columns(f"#9=0\n{text}", shortest, "fanuc", Setup(assume_zero=True)) for shortest in (16, NEVER))
+PLACED = "G90 G1 F100 X0. Y0."
+MANY = [f"X{i}. Y{i}." for i in range(1, 25)]
+"""Blocks that bring Z and B to their places go by themselves: behind `MANY` a stretch ends before the first of them."""
+JUMPS = {
+    "to where a stretch ended": [PLACED, *MANY, "N50 X77. Z3.", "X78.", "B1.", *MANY[:14]],
+    "to what was looked at and not taken": [PLACED, "N50 X77. Z3.", *MANY[:5], "B1.", *MANY[:12]],
+    "before what was looked at": [PLACED, "N50 X7. Y9.", *MANY[:9], "M8", "Z1. X3.", *MANY[:9], "B1.", *MANY[:6]],
+}
+
+
+@pytest.mark.parametrize("body", JUMPS.values(), ids=list(JUMPS))
+@pytest.mark.parametrize("shortest", [4, lane.SHORTEST])
+def test_jumps_back_lead_where_they_should(body: list[str], shortest: int) -> None:
+    text = "\n".join(["#9=0", *body, "#9=#9+1", "IF[#9LT3]GOTO50"])
+    one, other = (columns(text, length, "fanuc", Setup(assume_zero=True)) for length in (shortest, NEVER))
+    assert not isinstance(one, str)
+    assert not isinstance(other, str)
+    np.testing.assert_array_equal(one["start"], other["start"])
+    np.testing.assert_array_equal(one["end"], other["end"])
+
+
+def test_a_subprogram_before_what_was_looked_at_is_taken_as_it_is_written() -> None:
+    sub = ["o9 sub", *(f"X{i} Y{i}" for i in range(20)), "o9 endsub"]
+    main = ["G1 F100 X5 Y6", "X1", "Z3 X1", *(f"X{100 + i}" for i in range(14)), "o9 call", "o9 call"]
+    one, other = (
+        columns("\n".join([*sub, *main]), length, "linuxcnc", Setup(assume_zero=True))
+        for length in (lane.SHORTEST, NEVER)
+    )
     assert not isinstance(one, str)
     assert not isinstance(other, str)
     np.testing.assert_array_equal(one["end"], other["end"])

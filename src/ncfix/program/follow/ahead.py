@@ -18,7 +18,7 @@ class Ahead:
     put right where the next stretch begins, up to the next word of an axis, the next F, the next motion code.
     Increments count from where the axes stand: of these each stretch is looked at by itself.
 
-    begin  the first of these blocks
+    begin  the first of these blocks; a jump may lead before it, or to it again from elsewhere
     stage  what they say, and where they lead
     frame  what their numbers counted from
     done   the blocks before it may have been taken: their rows must not change any more, nor where this one starts,
@@ -37,7 +37,7 @@ class Ahead:
         frame = control.modal.incremental, feed_unit(control), *control.offset, *control.scale
         begin, stage = self.begin, self.stage
         known = stage is not None and frame == self.frame and not control.modal.incremental
-        if stage is None or not known or not self.done < block < stop <= begin + len(stage.mask):
+        if stage is None or not known or not max(begin, self.done) < block < stop <= begin + len(stage.mask):
             begin, stage = block, self._looked(control, unit, block, stop)
             self.begin, self.stage, self.frame = begin, stage, frame
         found = stage.rows(block - begin, stop - begin)
