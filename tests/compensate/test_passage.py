@@ -13,9 +13,10 @@ from compensate.test_plain import AMONG, winding
 from compensate.test_stream import OPTIONS, SETUP, program, streamed
 from ncfix.compensate.corrector import Corrector
 from ncfix.compensate.crew import Ahead, Share
+from ncfix.compensate.partition import Part
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.task import Task
-from ncfix.compensate.units import Part, Units
+from ncfix.compensate.units import Units
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
 from ncfix.program import dialects

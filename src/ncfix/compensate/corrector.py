@@ -12,7 +12,7 @@ from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import stamp_of
-from ncfix.compensate.following import placed
+from ncfix.compensate.partition import Part
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
 from ncfix.compensate.plain_text import largest_shift, written
@@ -20,7 +20,7 @@ from ncfix.compensate.proof import SelfCheckError, differences
 from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
-from ncfix.compensate.units import Part, Unit, Units
+from ncfix.compensate.units import Unit, Units
 from ncfix.compensate.verify import path_error
 from ncfix.diagnostics import Message, NcfixError
 from ncfix.files import put_at
@@ -65,11 +65,8 @@ class Corrector:
 
     def __init__(self, task: Task, read: Read) -> None:
         self.task = task
-        self.machine = placed(task.machine, task.setup)
-        reader = PartReader(task.path, task.dialect)
-        self.units = Units(
-            task.machine, self.machine, task.setup, task.options, reader, task.follower(), read, task.size
-        )
+        self.units = Units.of(task, read)
+        self.machine, reader = self.units.placed, self.units.reader
         self.again, self.proof = PartReader(task.path, task.dialect), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)

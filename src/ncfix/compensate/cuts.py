@@ -13,7 +13,6 @@ from ncfix.compensate.curve import Curve
 from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
-from ncfix.compensate.following import placed
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import unseen
 from ncfix.compensate.task import Task
@@ -21,7 +20,7 @@ from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
-from ncfix.program.parts import PartReader, joined_moves, taken
+from ncfix.program.parts import joined_moves, taken
 from ncfix.program.tree import Program
 
 BESIDE = 64
@@ -116,8 +115,8 @@ class Cuts:
     def __iter__(self) -> Iterator[Cut]:
         """The parts. Raises what reading and following do, and UsageError for what is not given."""
         task = self.task
-        machine, reader = placed(task.machine, task.setup), PartReader(task.path, task.dialect)
-        units = Units(task.machine, machine, task.setup, task.options, reader, task.follower(), self.read, task.size)
+        units = Units.of(task, self.read)
+        machine = units.placed
         around = None
         for unit in units:
             moves, lines = unit.part.moves, unit.part.program.lines(unit.part.moves.block)

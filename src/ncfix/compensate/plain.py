@@ -25,6 +25,7 @@ from ncfix.compensate.judge import CORNER, SURE, led_bounds, looked_at, straight
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.others import Others, planned
+from ncfix.compensate.partition import Part
 from ncfix.compensate.path import Demands, in_pieces, not_split
 from ncfix.compensate.plain_poses import Poses
 from ncfix.compensate.ragged import distinct, offsets, owners, places
@@ -33,7 +34,7 @@ from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import Settled, rounding
 from ncfix.compensate.strategies import Strategy, get_strategy
-from ncfix.compensate.units import Part, Unit
+from ncfix.compensate.units import Unit
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.bow import MORE

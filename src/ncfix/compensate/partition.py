@@ -1,0 +1,169 @@
+"""The text of a program in parts that can be worked on: read and followed one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ncfix.compensate.crew import Read, Share
+from ncfix.compensate.fix import refuse_stamped
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.passage import Passage
+from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, stretch
+from ncfix.program.tree import Program
+
+MOST_PENDING = 64
+"""Parts that may be put together before one of them ends where it may."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Text that can be worked on: a program that ends where it may, its motions, and whether it is the last.
+
+    passage  what stands before it has been passed over, see there
+    """
+
+    program: Program
+    moves: Moves
+    last: bool
+    passage: Passage | None = None
+
+
+@dataclass(slots=True)
+class Parts:
+    """Reads and follows a program. `parts` is gone through once.
+
+    read    gives the next so many bytes of the text; none at its end
+    size    bytes of a part
+    sided   the errors of the machine depend on the way in which its axes move
+    rest    what of the text comes after the end of the program
+    blocks  lines so far
+    led     the tip is under control (TCP), or may be
+    share   which parts this process works on
+    found   parts that have been read so far, also those behind which something is lacking
+    told    the last one that others have been told of
+    """
+
+    options: FixOptions
+    reader: PartReader
+    follower: Follower
+    read: Read
+    size: int
+    sided: bool = False
+    rest: bytes = b""
+    blocks: int = 0
+    led: bool = True
+    share: Share = field(default_factory=Share)
+    found: int = 0
+    told: int = -1
+
+    def parts(self) -> Iterator[Part]:
+        """The text in parts that end where they may."""
+        pending: list[tuple[Program, Moves]] = []
+        for program, last, passage in self._texts():
+            refuse_stamped(program, self.options)
+            self.reader.first_line += program.lines_ended
+            self.blocks += len(program)
+            self.follower.watched = self.share.shares(self.found)
+            pending.append((program, self.follower.follow(program, last)))
+            self.led = bool(pending[-1][1].tcp.any()) if passage is None else passage.led
+            last |= self.follower.ended
+            if passage is not None:
+                self.found += 1
+                yield Part(*pending.pop(), last, passage)
+                continue
+            if not last and not _ends_clean(*pending[-1]):
+                self._tell(None)
+                if len(pending) > MOST_PENDING:
+                    raise NotInPartsError("there is no place at which the program could be parted")
+                continue
+            programs = [each for each, _ in pending]
+            moves = joined_moves([each for _, each in pending], [len(each) for each in programs])
+            self._tell(None if last or len(pending) > 1 else self._passage(*pending[0]))
+            if last:
+                self._check_rest()
+            self.found += 1
+            yield Part(joined(programs), moves, last)
+            pending = []
+            if last:
+                return
+
+    def _tell(self, passage: Passage | None) -> None:
+        """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""
+        if self.share.shares(self.found) and self.told < self.found:
+            self.told = self.found
+            self.share.announce(self.found, passage)
+
+    def _passage(self, program: Program, moves: Moves) -> Passage | None:
+        """What others have to know of a part; None if they have to follow it."""
+        remains = None if self.sided else self.follower.remains(moves)
+        if remains is None:
+            return None
+        begin = int(program.blocks[-1, 0])
+        lines = program.lines_ended_before(begin)
+        return Passage(len(program.source), begin, lines, len(program) - 1, self.led, remains)
+
+    def _passed(self, passage: Passage, text: bytes) -> Program:
+        """Pass over a part, which this text begins with, but for its last block."""
+        self.rest = text[passage.size :]
+        self.reader.first_line += passage.lines
+        self.blocks += passage.blocks
+        self.follower.resume(passage.remains)
+        return self.reader.read(text[passage.begin : passage.size])
+
+    def _check_rest(self) -> None:
+        """Raise `NotInPartsError` if text comes after the end of the program that might belong to it."""
+        while self.follower.to_the_last and not self.rest.strip() and (more := self.read(self.size)):
+            self.rest += more
+        if self.follower.to_the_last and self.rest.strip():
+            raise NotInPartsError("text that may belong to the program comes after its end")
+
+    @property
+    def _wanted(self) -> int:
+        """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
+        return self.size // 4 if self.led else self.size
+
+    def _texts(self) -> Iterator[tuple[Program, bool, Passage | None]]:
+        """The text in parts that end between two blocks of plain words; True with the last one.
+
+        All processes read the same, so that their parts are the same.
+        """
+        wanted = self._wanted
+        while True:
+            new = self.read(max(wanted - len(self.rest), self.size // 4))
+            text = self.rest + new
+            if not new:
+                self.rest = b""
+                if text:
+                    yield self.reader.read(text), True, None
+                return
+            if text.isspace():
+                self.rest = text
+                continue
+            passage = self.share.passage(self.found)
+            if passage is not None and passage.size <= len(text):
+                wanted = self._wanted
+                yield self._passed(passage, text), False, passage
+                continue
+            begun = text[: text.rfind(b"\n", 0, max(text.rfind(b"\n"), 0)) + 1]
+            program = None if not begun or begun.isspace() else self.reader.read(begun)
+            cut = self.reader.last_cut(program) if program is not None else 0
+            if program is None or not cut:
+                self._tell(None)
+                self.rest, wanted = text, 2 * max(wanted, len(text))
+                continue
+            wanted = self._wanted
+            self.rest = text[int(program.blocks[cut, 0]) :]
+            yield stretch(program, 0, cut), False, None
+
+
+def _ends_clean(program: Program, moves: Moves) -> bool:
+    """Whether another part may follow: the last block is a straight motion that may be corrected, and nothing else."""
+    if len(moves) < 2 or moves.block[-1] != len(program) - 1 or moves.block[-2] == moves.block[-1]:
+        return False
+    straight = moves.kind[-1] in (Kind.RAPID, Kind.FEED) and moves.modal[-1] in (0, 10)
+    known = np.isfinite(moves.start[-1]).all() and np.isfinite(moves.end[-1]).all()
+    return bool(straight and known and moves.rule[-1] == Rule.CORRECT)
