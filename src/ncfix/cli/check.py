@@ -12,6 +12,7 @@ from ncfix.cli import console
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, optional_machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
+from ncfix.cli.surveying import looked_at
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import ExitCode, Message, NcfixError
 
@@ -49,17 +50,17 @@ def _outcome(following: Following, path: str) -> Outcome:
     entry: dict[str, Any] = {"path": shown(path)}
     try:
         with console.busy(f"checking {shown(path)}"):
-            program = following.read(path)
-            checked = following.checked(program, path)
+            looked = looked_at(following, path)
     except NcfixError as error:
         console.tell(*error.messages)
         return Outcome(error.exit_code, {**entry, "errors": _as_dicts(error.messages)})
+    checked, dialect = looked.checked, looked.dialect
     console.tell_some(checked.findings)
     count = len(checked.findings)
     said = console.counted(count, "finding") if count else "nothing found"
-    size = f"{console.counted(len(program), 'block')}, {console.counted(checked.moves, 'motion')}"
-    console.say(f"{shown(path)}: {size}, {program.dialect.name}: {said}")
-    entry |= {"dialect": program.dialect.name, "blocks": len(program), "moves": checked.moves}
+    size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
+    console.say(f"{shown(path)}: {size}, {dialect}: {said}")
+    entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
     return Outcome(ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)})
 
 

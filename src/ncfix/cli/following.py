@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves, Trace
     from ncfix.program.setup import Setup
-    from ncfix.program.tree import Program
+    from ncfix.program.tree import Program, Template
 
 LINEAR = ("X", "Y", "Z")
 ROTARY = ("A", "B", "C")
@@ -37,9 +38,9 @@ class Following:
         exacting = machine is not None and not machine.is_perfect
         return cls(machine, setup if exacting else replace(setup, assume_zero=True), dialect)
 
-    def read(self, path: str) -> Program:
-        """Read a program."""
-        return read_program(path, self.dialect, self.machine)
+    def read(self, path: str, text: bytes | None = None) -> Program:
+        """Read a program; `text`: what is in the file."""
+        return read_program(path, self.dialect, self.machine, text)
 
     def trace(self, program: Program, path: str) -> Trace:
         """The motions of a program."""
@@ -63,7 +64,7 @@ class Following:
         from ncfix.compensate.following import rotary_names
 
         if self.machine is None:
-            return named_axes(program), frozenset(ROTARY)
+            return axes_of(program.templates), frozenset(ROTARY)
         return self.machine.axis_names, rotary_names(self.machine)
 
     def simulated(self, path: str) -> tuple[Program, Moves, TipError]:
@@ -83,9 +84,9 @@ class Following:
         return found.machine, found.trace.moves
 
 
-def named_axes(program: Program) -> tuple[str, ...]:
-    """X Y Z, and what other axes the program has words for."""
-    words = {word.address for template in program.templates for word in template.words}
+def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:
+    """X Y Z, and what other axes a program with blocks of these shapes has words for."""
+    words = {word.address for template in templates for word in template.words}
     return LINEAR + tuple(letter for letter in ROTARY + PARALLEL if letter in words)
 
 

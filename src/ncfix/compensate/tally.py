@@ -9,28 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
-from ncfix.compensate.findings import MOST, Finding, Mask
+from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import largest_correction, refusals
 from ncfix.compensate.left import Left, joined, left_where_they_stand
+from ncfix.compensate.notes import Notes
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.settle import Settled
 from ncfix.compensate.verify import Figures, PathError
 from ncfix.diagnostics import Message
 from ncfix.program.moves import Moves
 from ncfix.program.tree import Program
-
-ORDER = ("NCF408", "NCF414", "NCF402", "NCF403", "NCF415", "NCF413", "NCF409", "NCF410")
-"""Findings of a plan in the order in which it reports them."""
-ONCE = frozenset({"NCF409"})
-"""Findings that hold for the whole program, and are told of its first motion only."""
-
-
-@dataclass(slots=True)
-class Found:
-    """Messages of one kind, the first few, and how many there are."""
-
-    shown: list[Message] = field(default_factory=list)
-    count: int = 0
 
 
 @dataclass(slots=True)
@@ -75,7 +63,7 @@ class Tally:
     after: Side = field(default_factory=Side)
     refused: list[Refusal] = field(default_factory=list)
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
-    found: dict[tuple[str, str, str], Found] = field(default_factory=dict)
+    found: Notes = field(default_factory=Notes)
     left: dict[str, Left] = field(default_factory=dict)
 
     def add(self, program: Program, settled: Settled, own: Mask, steps: NDArray[np.float64]) -> None:
@@ -97,7 +85,7 @@ class Tally:
         refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
         self.refused += refusals(program, Account(account.compensated, account.passed, refused))
         for finding in settled.plan.findings:
-            self._note(finding, program, moves, own)
+            self.found.add(finding, program, moves, own)
 
     def add_plain(self, program: Program, settled: Settled, largest: float) -> None:
         """Take in a part of dwells and motions that were corrected, each in a block of its own.
@@ -110,7 +98,7 @@ class Tally:
         self.largest = max(self.largest, largest)
         self.changed |= len(settled.emission.splices) > 0
         for finding in settled.plan.findings:
-            self._note(finding, program, settled.moves, np.ones(len(settled.moves), dtype=bool))
+            self.found.add(finding, program, settled.moves)
 
     def take(self, other: Tally) -> None:
         """Take in what has been done to the part that comes next."""
@@ -127,8 +115,7 @@ class Tally:
         self.refused += other.refused
         self.notes = other.notes | self.notes
         self.left = joined(self.left, other.left)
-        for key, found in other.found.items():
-            self._take_found(key, found)
+        self.found.take(other.found)
 
     def figures(self, errors: PathError, program: Program, moves: Moves) -> None:
         """Take in the tip errors of a part."""
@@ -137,33 +124,8 @@ class Tally:
             line = program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
             side.add(figures, errors.way, line)
 
-    def _note(self, finding: Finding, program: Program, moves: Moves, own: Mask) -> None:
-        shown = []
-        for k in np.flatnonzero(own[finding.moves])[:MOST].tolist():
-            place = program.place(int(moves.block[finding.moves[k]]))
-            shown.append(Message(finding.code, finding.sentence(k), place, finding.hint))
-        self._take_found((finding.code, finding.text, finding.hint), Found(shown, int(own[finding.moves].sum())))
-
-    def _take_found(self, key: tuple[str, str, str], found: Found) -> None:
-        if key[0] in ONCE and key in self.found:
-            return
-        note = self.found.setdefault(key, Found())
-        note.shown += found.shown[: max(MOST - note.count, 0)]
-        note.count += found.count
-
     def _left(self, path: str) -> list[Message]:
         return [left.message(path) for left in self.left.values()]
-
-    def warnings(self) -> list[Message]:
-        """What the plans found, in the order of one plan."""
-        messages = []
-        for code, note in sorted(
-            ((key[0], note) for key, note in self.found.items()), key=lambda each: ORDER.index(each[0])
-        ):
-            messages += note.shown
-            if note.count > MOST:
-                messages.append(Message(code, f"and {note.count - MOST} more motions like these"))
-        return messages
 
     def report(self, path: str, messages: tuple[Message, ...], leaves: str, options: FixOptions) -> FixReport:
         """The report; `messages` are those of following the program."""
@@ -181,7 +143,7 @@ class Tally:
             error_before_um=self.before.as_dict(self.way) if figures else {},
             error_after_um=after if figures else {},
             refused=tuple(self.refused),
-            warnings=(*messages, *self.notes.values(), *self._left(path), *self.warnings()),
+            warnings=(*messages, *self.notes.values(), *self._left(path), *self.found.messages()),
             strategy=options.strategy,
             leaves=leaves,
             left=tuple(self.left.values()),

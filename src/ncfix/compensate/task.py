@@ -39,13 +39,9 @@ class Task:
 
     def follower(self) -> Follower:
         """What follows the program; raises `NotInPartsError` if its language is followed as a whole."""
-        make = language_of(self.dialect).follower
-        if make is None:
-            raise NotInPartsError(f"{self.dialect.title} is followed as a whole")
         axes, rotary = self.machine.axis_names, rotary_names(self.machine)
         kinematics = kinematics_of(self.machine)
-        found: Follower = make(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
-        return found
+        return follower_of(self.dialect, Run(self.setup, axes, rotary, self.resolve, kinematics=kinematics))
 
     def check(self) -> None:
         """Raise `NotInPartsError` for what has to be looked at as a whole."""
@@ -54,3 +50,12 @@ class Task:
             raise NotInPartsError(f"the strategy {strategy.name} looks at the whole path at once")
         if self.options.block_numbers == "renumber" and language_of(self.dialect).renumber is not None:
             raise NotInPartsError("all blocks get new numbers")
+
+
+def follower_of(dialect: Dialect, run: Run) -> Follower:
+    """What follows a program part by part; raises `NotInPartsError` if its language is followed as a whole."""
+    make = language_of(dialect).follower
+    if make is None:
+        raise NotInPartsError(f"{dialect.title} is followed as a whole")
+    found: Follower = make(dialect, run)
+    return found

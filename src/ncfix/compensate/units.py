@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -53,6 +53,7 @@ class Units(Parts):
     notes    what there is to say about them
     lacking  what of them is not known
     units    of length, so far
+    look     is shown each part
     """
 
     machine: Machine
@@ -63,6 +64,7 @@ class Units(Parts):
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     lacking: dict[str, Message] = field(default_factory=dict)
     units: set[float] = field(default_factory=set)
+    look: Callable[[Part], object] | None = None
 
     @classmethod
     def of(cls, task: Task, read: Read) -> Units:
@@ -91,6 +93,8 @@ class Units(Parts):
             part = replace(found, moves=self._known(found))
             if self.follower.lacking or self.lacking:
                 continue
+            if self.look is not None:
+                self.look(part)
             unit = Unit(part, head, direction)
             self._check_units(part.moves, head is None)
             if not part.last:
