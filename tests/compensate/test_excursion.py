@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.excursion import skew, surely_within
+from ncfix.compensate.excursion import arcs_within, skew, surely_within
 from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.compensate.segments import Segments
 from ncfix.machine import Machine, load
 
 LENGTH = 120.0
@@ -30,6 +31,37 @@ def test_what_surely_stays_within_does(name: str, turn: float, root: Path) -> No
     assert seen[within].all()
     assert within.mean() < 1
     assert within.any() or turn > 0.1
+
+
+def test_arcs_that_are_said_to_stay_within_the_travels_do(root: Path) -> None:
+    machine, arcs = load(root / "benchmarks/five_axis.toml"), some_arcs(load(root / "benchmarks/five_axis.toml"))
+    looks = [arcs.at(np.arange(len(arcs)), np.full(len(arcs), f)) for f in fractions()]
+    tight = ranged(machine, looks[0], looks[-1])
+    within, (low, high) = arcs_within(tight, arcs), tight.ranges.T
+    seen = np.array([((q >= low - 1e-9) & (q <= high + 1e-9)).all(axis=1) for q in looks]).all(axis=0)
+    assert seen[within].all()
+    assert within.any()
+    assert (seen[: len(arcs) // 2] & ~within[: len(arcs) // 2]).mean() < 0.1  # of small arcs few are looked at in vain
+
+
+def test_an_arc_of_which_a_number_is_not_known_is_looked_at(root: Path) -> None:
+    machine = load(root / "benchmarks/five_axis.toml")
+    for name in ("start", "end", "centre"):
+        arcs = some_arcs(machine)
+        getattr(arcs, name)[:, 0] = np.nan
+        assert not arcs_within(machine, arcs).any(), name
+
+
+def some_arcs(machine: Machine) -> Segments:
+    """Arcs about some directions, the first half of them small, with rotary axes and radii that change on the way."""
+    rng, n = np.random.default_rng(4), 400
+    start, way = some_commands(machine, 0.5)
+    normal = rng.normal(size=(n, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    off = rng.uniform(-1, 1, (n, 3)) * np.repeat((3.0, 60.0), n // 2)[:, None]
+    columns = np.array([machine.axis_names.index(letter) for letter in "XYZ"])
+    centre = start[:, columns] + off
+    return Segments(start, start + way, np.ones(n, bool), centre, normal, rng.uniform(-7, 7, n), columns)
 
 
 def fractions() -> np.ndarray:

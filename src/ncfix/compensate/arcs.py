@@ -55,8 +55,9 @@ def fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, ro
     """
     arcs = standing.rows(rows)
     ends = arcs.start[:, intent.columns], arcs.end[:, intent.columns]
-    wanted, fraction = _corrected_path(intent, standing, rows)
-    centre = _in_plane(arcs.centre, arcs.normal, _mean_centre(intent, arcs, rows, wanted, fraction))
+    programmed, wanted, fraction = _corrected_path(intent, standing, rows)
+    mean = intent.moves.centre[rows] + (wanted - programmed).mean(axis=1)
+    centre = _in_plane(arcs.centre, arcs.normal, mean)
     closed = full_circles(intent, rows) & (np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1) < CLOSED)
     centre = np.where(closed[:, None], centre, _onto_bisector(*ends, arcs.normal, centre))
     best = _best_on_bisector(arcs, ends, centre, wanted, fraction)
@@ -75,26 +76,23 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
     return result
 
 
-def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
-    """X Y Z that the corrected path wants at `LOOKS` fractions of each arc, (k, LOOKS, 3), and the fractions.
+def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array, Array]:
+    """X Y Z of the program at `LOOKS` fractions of each arc, what the corrected path wants, and the fractions.
+
+    The first two are (k, LOOKS, 3).
 
     Of axes that get no word it wants what they can do: their way as programmed, from where they stand.
     """
     fraction = np.arange(1, LOOKS + 1) / (LOOKS + 1)
     each, at = np.repeat(rows, LOOKS), np.tile(fraction, len(rows))
-    wanted = intent.guessed(real, each, at)[:, intent.columns]
+    commands = intent.segments.at(each, at)
+    wanted = intent.guessed(real, each, at, commands)[:, intent.columns]
+    programmed = commands[:, intent.columns]
     if intent.mute is not None:
         off = (real.start - intent.moves.start)[each[:, None], intent.columns]
-        programmed = intent.segments.at(each, at)[:, intent.columns]
         wanted = np.where(intent.mute[each], programmed + off, wanted)
-    return wanted.reshape(len(rows), LOOKS, 3), fraction
-
-
-def _mean_centre(intent: Intent, arcs: Segments, rows: Index, wanted: Array, fraction: Array) -> Array:
-    each, at = np.repeat(np.arange(len(rows)), LOOKS), np.tile(fraction, len(rows))
-    intended = intent.segments.at(rows[each], at)[:, intent.columns].reshape(wanted.shape)
-    mean: Array = intent.moves.centre[rows] + (wanted - intended).mean(axis=1)
-    return mean
+    shape = len(rows), LOOKS, 3
+    return programmed.reshape(shape), wanted.reshape(shape), fraction
 
 
 def across(vectors: Array, normal: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.kinematics import linear_columns
 from ncfix.compensate.rows import every, lengths
+from ncfix.compensate.segments import Segments, height
 from ncfix.machine import Machine
 
 
@@ -35,6 +36,21 @@ def stays_within(machine: Machine, begin: Array, end: Array, acceleration: Array
     low, high = machine.ranges.T
     room = np.minimum(np.minimum(begin, end) - low, high - np.maximum(begin, end))
     return every((room >= 0) & ((room > stray[:, None]) | turning))
+
+
+def arcs_within(machine: Machine, arcs: Segments) -> Mask:
+    """(k,) arcs of commands that are axis positions which cannot leave the range of an axis.
+
+    What is between both ends in height is no farther from the arc's axis than the farther end; other axes go straight.
+    """
+    begin, end, reach = arcs.start.copy(), arcs.end.copy(), np.zeros(arcs.end.shape)
+    for ends in (begin, end):
+        points = ends[:, arcs.columns]
+        feet = arcs.centre + height(points - arcs.centre, arcs.normal) * arcs.normal
+        reach[:, arcs.columns] = np.maximum(reach[:, arcs.columns], lengths(points - feet)[:, None])
+        ends[:, arcs.columns] = feet
+    low, high = machine.ranges.T
+    return every(np.minimum(np.minimum(begin, end) - low, high - np.maximum(begin, end)) >= reach)
 
 
 def accelerations(

@@ -206,14 +206,17 @@ class Intent:
         q, arrived = steer(self.machine, begin, target, self.states(rows, fraction))
         return commands_from_joints(self.machine, q, moves.tcp[rows], moves.tool_length[rows]), arrived
 
-    def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
+    def guessed(self, real: Segments, rows: Index, fraction: Array, programmed: Array | None = None) -> Array:
         """Nearly the corrected commands at fractions of motions, (k, n_axes).
 
         X Y Z by one Newton step from those of the program, with the rotary axes where `real` has them: good to the
         errors times their gradient, some tens of nanometres.
+
+        programmed  (k, n_axes) the commands of the program there, if known
         """
-        commands = real.at(rows, fraction)
-        commands[:, self.columns] = self.segments.at(rows, fraction)[:, self.columns]
-        gap = self.gap(rows, fraction, commands)
+        programmed = self.segments.at(rows, fraction) if programmed is None else programmed
+        commands = real.linearly(rows, fraction)
+        commands[:, self.columns] = programmed[:, self.columns]
+        gap = self.gaps(rows, programmed, [self.joints(rows, commands)], self.states(rows, fraction))[0]
         commands[:, self.columns] -= solve(self.follows(rows, commands), gap)
         return commands

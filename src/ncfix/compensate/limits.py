@@ -6,14 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ncfix.compensate.excursion import surely_within
+from ncfix.compensate.excursion import arcs_within, surely_within
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import distinct
 from ncfix.compensate.rows import finite, greatest, lengths, some
+from ncfix.compensate.segments import Segments
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves
+from ncfix.program.moves import Moves
 from ncfix.program.pieces import Pieces
 
 FUZZ = 1e-9
@@ -105,11 +106,12 @@ def _corrected_excess(written: Written) -> Array:
     """As `excess`, of the corrected program, (n, n_axes)."""
     pieces = written.pieces
     each = np.arange(len(pieces))
-    curved = written.intent.moves.tcp[pieces.move]
-    if curved.any():
+    tcp = written.intent.moves.tcp[pieces.move]
+    curved = tcp.copy()
+    if tcp.any():
         curved[curved] = _may_leave(written.intent, written.joints, each[curved], written.done[curved])
     if pieces.arc.any():
-        curved |= written.segments.arc
+        curved |= _arcs_may_leave(written.intent.machine, written.segments, tcp)
     found = excess(written.intent.machine, written.joints, each, curved, written.done)
     beyond = np.full((len(written.intent.moves), len(written.intent.moves.axes)), -np.inf)
     if (found > FUZZ).any():
@@ -206,7 +208,11 @@ def programmed_excess(written: Written) -> Array:
     intent = written.intent
     each = np.arange(len(intent.moves))
     ends = written.programmed if len(each) == len(written.pieces) else None
-    curved, led = intent.curved.copy(), np.flatnonzero(intent.moves.tcp & (intent.moves.kind != Kind.ARC))
+    tcp = intent.moves.tcp
+    curved, led = (
+        tcp | _arcs_may_leave(intent.machine, intent.segments, tcp),
+        np.flatnonzero(tcp & ~intent.segments.arc),
+    )
     if led.size:
         curved[led] = _may_leave(intent, intent.joints_at, led, None if ends is None else ends[led])
     return excess(intent.machine, intent.joints_at, each, curved, ends)
@@ -218,6 +224,17 @@ def _may_leave(intent: Intent, joints: Joints, each: Index, ends: Array | None) 
     end = joints(each, np.ones(len(each))) if ends is None else ends
     longest = float(np.nanmax(intent.moves.tool_length, initial=0.0))
     return ~surely_within(intent.machine, begin, end, longest)
+
+
+def _arcs_may_leave(machine: Machine, segments: Segments, tcp: Mask) -> Mask:
+    """(n,) which motions are arcs that may leave a range on their way; see `excess`.
+
+    tcp  (n,) under tool-centre-point control: these may
+    """
+    may_leave = segments.arc.copy()
+    rows = np.flatnonzero(may_leave & ~tcp)
+    may_leave[rows] = ~arcs_within(machine, segments.rows(rows))
+    return may_leave
 
 
 def _of_axes(written: Written, code: str, text: str, beyond: Array) -> Finding:

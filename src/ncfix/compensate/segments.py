@@ -52,18 +52,22 @@ class Segments:
 
         The end of a motion is known even if its start is not.
         """
+        command = self.linearly(rows, fraction)
+        if self.arc.any():
+            on_arc = np.flatnonzero(self.arc[rows] & (fraction != 1))
+            if on_arc.size:
+                command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
+        return command
+
+    def linearly(self, rows: Index, fraction: Array) -> Array:
+        """As `at`, with X Y Z of arcs on their chords."""
         inside = np.flatnonzero(fraction != 1)
         if not inside.size:
             return picked(self.end, rows)
         if inside.size == len(rows):
-            command = self._on_line(rows, fraction)
-        else:
-            command = picked(self.end, rows)
-            command[inside] = self._on_line(rows[inside], fraction[inside])
-        if self.arc.any():
-            on_arc = inside[self.arc[rows[inside]]]
-            if on_arc.size:
-                command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
+            return self._on_line(rows, fraction)
+        command = picked(self.end, rows)
+        command[inside] = self._on_line(rows[inside], fraction[inside])
         return command
 
     def _on_line(self, rows: Index, fraction: Array) -> Array:
@@ -80,17 +84,18 @@ class Segments:
         centre, normal = picked(self.centre, rows), picked(self.normal, rows)
         sweep, f = self.sweep[rows], fraction[:, None]
         start, end = (picked(points, rows).take(self.columns, axis=1) - centre for points in (self.start, self.end))
-        low, high = _height(start, normal), _height(end, normal)
+        low, high = height(start, normal), height(end, normal)
         from_start = _turned(start - low * normal, normal, fraction * sweep)
         from_end = _turned(end - high * normal, normal, (fraction - 1) * sweep)
-        height = (1 - f) * low + f * high
-        result: Array = centre + height * normal + (1 - f) * from_start + f * from_end
+        between = (1 - f) * low + f * high
+        result: Array = centre + between * normal + (1 - f) * from_start + f * from_end
         return result
 
 
-def _height(points: Array, normal: Array) -> Array:
-    height: Array = np.einsum("ij,ij->i", points, normal)[:, None]
-    return height
+def height(points: Array, normal: Array) -> Array:
+    """How far vectors (k, 3) go along the normals, (k, 1)."""
+    along: Array = np.einsum("ij,ij->i", points, normal)[:, None]
+    return along
 
 
 def _turned(radius: Array, normal: Array, angle: Array) -> Array:
@@ -107,7 +112,7 @@ def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: 
     """
     first, last = start - centre, end - centre
     sine = np.einsum("ij,ij->i", vector_product(first, last), normal)
-    cosine = np.einsum("ij,ij->i", first, last) - _height(first, normal)[:, 0] * _height(last, normal)[:, 0]
+    cosine = np.einsum("ij,ij->i", first, last) - height(first, normal)[:, 0] * height(last, normal)[:, 0]
     change = np.arctan2(sine, cosine) - like
     result: Array = like + change - 2 * np.pi * np.round(change / (2 * np.pi))
     return result
