@@ -12,6 +12,7 @@ from ncfix.compensate.following import kinematics_of
 from ncfix.machine import Machine, load
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import Pointing, within
+from ncfix.program.pointing_angles import led, nearest
 
 MACHINES = ("wCAYFXZSt", "wCBXFZYSt", "dmu50", "angle_head")
 LENGTH = 128.0
@@ -84,3 +85,27 @@ def test_along_the_outer_axis_it_stays_where_it_is(root: Path) -> None:
 def test_only_ways_within_the_travels_are_taken(ways: list, travel: list, near: tuple, found: list) -> None:
     turned = within(np.radians(ways).tolist(), np.radians(travel).tolist(), (math.radians(near[0]), 0.0))
     assert [tuple(np.degrees(way)) for way in turned] == [pytest.approx(way) for way in found]
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_many_directions_are_solved_to_the_bit_as_one_is(root: Path, name: str) -> None:
+    """Among them are both ends of the outer axis's line, where it may stand anywhere."""
+    pointing, _ = pointing_of(load(str(root / f"examples/machines/{name}.toml")))
+    poles = np.array([pointing.lines[0], [-each for each in pointing.lines[0]]])
+    directions = np.vstack([np.random.default_rng(9).normal(size=(200, 3)), poles])
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    x, y, z = directions.T
+    reached, both = pointing.ways_of_many((x, y, z))
+    for direction, is_reached, ways in zip(directions, reached.tolist(), both, strict=True):
+        single = pointing.angles(direction, (0.4, -0.2))
+        many = list(dict.fromkeys(nearest(ways, (0.4, -0.2)))) if is_reached else []
+        assert many == single
+
+
+def test_an_angle_is_led_to_the_nearest_turn() -> None:
+    turn = 2 * math.pi
+    assert led(0.25, 7.0) == 0.25 + turn
+    assert led(0.25, -0.5) == 0.25
+    assert led(math.pi, 0.0) == -math.pi
+    assert led(-math.pi, 0.0) == -math.pi
+    assert led(math.nan, 0.3) == 0.3

@@ -14,9 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from ncfix.program.pointing_angles import POLE, SAME, FloatArray, Triple, cross, nearest, solve, to_each, to_one, turned
 
-Triple = tuple[float, float, float]
+Columns = tuple[FloatArray, FloatArray, FloatArray]
+
+Ways = tuple[tuple[float, float], tuple[float, float]]
+"""Two ways to point the tool, of which `pointing_angles.nearest` takes one: angles of outer and inner axis, rad."""
 
 Directions = Callable[[float, float], FloatArray]
 """Angles of the two rotary axes, rad -> the unit vector (3,) from the tip to the spindle in the workpiece."""
@@ -31,13 +34,9 @@ SQUARE = 2e-4
 """A tool closer to a direction than this, rad, is taken to lie along it: rotary words have three decimals of a degree,
 9e-6 rad each."""
 
-SAME = 1e-9
 TURNS = 2
 AT_END = 1e-6
 """rad; so far past its travel an axis is still at the end of it."""
-
-POLE = 1e-7
-"""rad; nearer to the outer axis than that the tool may turn about it at will."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +66,7 @@ class Pointing:
 
     def at(self, outer: float, inner: float) -> FloatArray:
         """The direction (3,) at these angles, rad."""
-        return np.array(_turned(self.lines[0], outer, _turned(self.lines[1], inner, self.lines[2])))
+        return np.array(turned(self.lines[0], outer, turned(self.lines[1], inner, self.lines[2], to_one), to_one))
 
     def direction(self, position: FloatArray) -> FloatArray:
         """The direction (3,) at a position (n_axes,), rad."""
@@ -78,18 +77,18 @@ class Pointing:
 
         Nearest to `near` first; an axis that may stand anywhere stands there. Empty if the machine cannot point there.
         """
-        outer, inner, tool = self.lines
-        wanted = _triple(direction)
-        share = dot(inner, tool)
-        flat = inner[0] * share, inner[1] * share, inner[2] * share
-        a, b = dot(outer, tool) - dot(outer, flat), dot(outer, cross(inner, tool))
-        c, r = dot(outer, wanted) - dot(outer, flat), math.hypot(a, b)
-        if abs(c) > r * (1 + SAME):
+        beyond, ways = solve(self.lines, _triple(direction), to_one)
+        if beyond > 0:
             return []
-        middle, half = math.atan2(b, a), math.acos(min(max(c / r, -1.0), 1.0))
-        found = {near[1] + wrapped(angle - near[1]) for angle in (middle + half, middle - half)}
-        ways = [(self._outer_angle(angle, wanted, near[0]), angle) for angle in found]
-        return sorted(ways, key=lambda way: abs(way[0] - near[0]) + abs(way[1] - near[1]))
+        first, second = nearest(ways, near)
+        return [first] if first == second else [first, second]
+
+    def ways_of_many(self, directions: Columns) -> tuple[NDArray[np.bool_], list[Ways]]:
+        """Whether the machine can point along unit vectors, three columns (n,), and the two `Ways` to do it."""
+        outer, inner, tool = ((np.array(x), np.array(y), np.array(z)) for x, y, z in self.lines)
+        beyond, ways = solve((outer, inner, tool), directions, to_each)
+        first, second = (zip(one.tolist(), other.tolist(), strict=True) for one, other in ways)
+        return beyond <= 0, list(zip(first, second, strict=True))
 
     def at_pole(self, direction: FloatArray) -> bool:
         """Whether the tool would stand along the line of the outer axis."""
@@ -101,15 +100,6 @@ class Pointing:
         half = self.at(*start) + self.at(*stop)
         size = float(np.linalg.norm(half))
         return math.pi if size < SAME else float(np.linalg.norm(middle - half / size))
-
-    def _outer_angle(self, inner: float, wanted: Triple, near: float) -> float:
-        outer = self.lines[0]
-        start = _across(outer, _turned(self.lines[1], inner, self.lines[2]))
-        stop = _across(outer, wanted)
-        if min(math.hypot(*start), math.hypot(*stop)) < POLE:
-            return near
-        angle = math.atan2(dot(outer, cross(start, stop)), dot(start, stop))
-        return near + wrapped(angle - near)
 
 
 def within(
@@ -131,21 +121,6 @@ def _in_travel(angle: float, low: float, high: float, near: float) -> float | No
     return min(possible, key=lambda each: abs(each - near), default=None)
 
 
-def dot(a: Triple, b: Triple) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Triple, b: Triple) -> Triple:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def wrapped(angle: float) -> float:
-    """An angle between minus and plus half a turn, rad."""
-    return (angle + math.pi) % (2 * math.pi) - math.pi
-
-
 def _swapped(directions: Directions) -> Directions:
     return lambda a, b: directions(b, a)
 
@@ -153,22 +128,6 @@ def _swapped(directions: Directions) -> Directions:
 def _triple(vector: FloatArray) -> Triple:
     x, y, z = vector.tolist()
     return x, y, z
-
-
-def _turned(axis: Triple, angle: float, vector: Triple) -> Triple:
-    along, (u, v, w) = dot(axis, vector), cross(axis, vector)
-    c, s = math.cos(angle), math.sin(angle)
-    rest = 1 - c
-    return (
-        along * axis[0] * rest + c * vector[0] + s * u,
-        along * axis[1] * rest + c * vector[1] + s * v,
-        along * axis[2] * rest + c * vector[2] + s * w,
-    )
-
-
-def _across(axis: Triple, vector: Triple) -> Triple:
-    along = dot(axis, vector)
-    return vector[0] - along * axis[0], vector[1] - along * axis[1], vector[2] - along * axis[2]
 
 
 def _line(directions: Directions, probes: tuple[float, ...] = PROBES) -> FloatArray | None:

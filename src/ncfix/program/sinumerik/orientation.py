@@ -9,6 +9,7 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 
 from ncfix.program.follow.coordinates import DEGREE, LETTERS, product
 from ncfix.program.follow.faults import Fault
-from ncfix.program.pointing import Pointing, Triple, dot
+from ncfix.program.pointing import Pointing
+from ncfix.program.pointing_angles import Triple, dot
 from ncfix.program.sinumerik.affine import turned
 from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.directions import NO_LENGTH
 from ncfix.program.sinumerik.state import Sinumerik
 
 FloatArray = NDArray[np.float64]
@@ -32,8 +35,6 @@ OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA",
 """Other ways to say how the tool stands, which are not followed."""
 
 BAD_VECTOR = "NCF254"
-NO_LENGTH = 1e-9
-"""A shorter vector says nothing."""
 WAY = "NCF253"
 AT_RUNTIME = "the direction of the tool is known only at run time"
 NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
@@ -152,9 +153,9 @@ def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:
     return np.array([dot(row, vector) / size for row in control.rotation])
 
 
-def is_choice(pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]) -> bool:
+def is_choice(pointing: Pointing, here: tuple[float, float], ways: Sequence[tuple[float, float]]) -> bool:
     """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
-    return len(ways) > 1 and pointing.at_pole(pointing.at(*here)) and not pointing.at_pole(pointing.at(*ways[0]))
+    return len({*ways}) > 1 and pointing.at_pole(pointing.at(*here)) and not pointing.at_pole(pointing.at(*ways[0]))
 
 
 def note_choice(

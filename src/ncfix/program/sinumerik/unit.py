@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ncfix.program.follow.ahead import Ahead
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane_tables import LaneTables
+from ncfix.program.sinumerik.directions import Directions
 from ncfix.program.sinumerik.plans import Branching, Plan, plan_of
 from ncfix.program.tree import Constant, Literal, Program, Word, view
 from ncfix.program.tree import Text as Label
@@ -76,6 +77,7 @@ class Unit:
     parameters  of its PROC
     saves       the PROC says SAVE: modal codes and frames of the caller come back
     ahead       what the fast lane has seen of the blocks to come
+    directions  where their vectors point the tool
     """
 
     text: Text
@@ -90,6 +92,7 @@ class Unit:
     parameters: tuple[Parameter, ...] = ()
     saves: bool = False
     ahead: Ahead = field(default_factory=Ahead)
+    directions: Directions = field(default_factory=Directions)
     _lane_stops: NDArray[np.int64] | None = None
     _lanes: LaneTables | None = None
     _vector_stops: NDArray[np.int64] | None = None

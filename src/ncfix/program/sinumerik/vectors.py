@@ -7,16 +7,18 @@ stand. What there is to say of, to refuse, or to keep in one piece ends the stre
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ncfix.program.follow.coordinates import DEGREE
 from ncfix.program.follow.lane import SHORTEST, before_placing, is_open, take
-from ncfix.program.follow.stage import FloatArray, IntArray, Stage, stage_of
+from ncfix.program.follow.stage import IntArray, Stage, stage_of
 from ncfix.program.moves import FeedMode
-from ncfix.program.pointing import Pointing
-from ncfix.program.sinumerik.orientation import BY_AXES, FAR, NO_LENGTH, ON_CURVES, direction_of, is_choice
+from ncfix.program.pointing import Pointing, Ways
+from ncfix.program.pointing_angles import nearest
+from ncfix.program.sinumerik.orientation import BY_AXES, FAR, ON_CURVES, is_choice
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unit import Unit
 
@@ -37,9 +39,12 @@ def run_vectors(control: Sinumerik, unit: Unit, block: int, main: bool) -> int:
     stop = before_placing(control, mask, block)
     if stop - block < SHORTEST:
         return 0
-    stage = stage_of(control, unit, block, stop)
-    stage = replace(stage, mask=mask[: stop - block])
-    count = turn(control, pointing, letters, vectors_of(unit, block, stop), stage)
+    ways = unit.directions.known(pointing, unit, block, stop, SHORTEST)
+    if len(ways) < SHORTEST:
+        return 0
+    stage = stage_of(control, unit, block, block + len(ways))
+    stage = replace(stage, mask=mask[: len(ways)])
+    count = turn(control, pointing, letters, ways, stage)
     if count < SHORTEST:
         return 0
     control.points = True
@@ -56,37 +61,28 @@ def is_ready(control: Sinumerik) -> bool:
     return plain and followed and control.pointing is not None
 
 
-def vectors_of(unit: Unit, start: int, stop: int) -> FloatArray:
-    """(n, 3) the components of the vectors of blocks; zero where one is not written."""
-    program = unit.program
-    slots = unit.vectors[program.template[start:stop]]
-    values = program.numbers[program.first_number[start:stop, None] + np.maximum(slots, 0)]
-    found: FloatArray = np.where(slots >= 0, values, 0.0)
-    return found
-
-
-def turn(control: Sinumerik, pointing: Pointing, letters: list[int], vectors: FloatArray, stage: Stage) -> int:
-    """Put the rotary axes of a stage where vectors (n, 3) lead them; up to which motion that goes without saying."""
+def turn(control: Sinumerik, pointing: Pointing, letters: list[int], ways: Sequence[Ways], stage: Stage) -> int:
+    """Put the rotary axes of a stage where one of two ways leads them; up to which motion that goes without saying."""
     first, second = letters
+    (scale, other_scale), (offset, other_offset) = (
+        [each[i] for i in letters] for each in (control.scale, control.offset)
+    )
     here, path = (control.position[first], control.position[second]), stage.path
     found: list[tuple[float, float]] = []
     even = even_motions(control, stage.motion.astype(np.int64))
-    for vector, is_even in zip(vectors.tolist(), even, strict=True):
-        if math.hypot(*vector) < NO_LENGTH:
+    at_will = True
+    for both, is_even in zip(ways, even, strict=True):
+        led = nearest(both, here)
+        if (at_will and is_choice(pointing, here, led)) or not (is_even or pointing.stray(here, led[0]) <= FAR):
             break
-        ways = pointing.angles(direction_of(control, (vector[0], vector[1], vector[2])), here)
-        if not ways or is_choice(pointing, here, ways):
-            break
-        if not is_even and pointing.stray(here, ways[0]) > FAR:
-            break
-        one, other = (
-            control.scale[index] * ((angle - control.offset[index]) / DEGREE) + control.offset[index]
-            for index, angle in zip(letters, ways[0], strict=True)
+        outer, inner = led[0]
+        here = (
+            scale * ((outer - offset) / DEGREE) + offset,
+            other_scale * ((inner - other_offset) / DEGREE) + other_offset,
         )
-        here = one, other
         found.append(here)
-    path[1 : len(found) + 1, first] = [one for one, _ in found]
-    path[1 : len(found) + 1, second] = [other for _, other in found]
+        at_will = math.isnan(both[0][0])
+    path[1 : len(found) + 1, letters] = found or np.empty((0, 2))
     return len(found)
 
 
