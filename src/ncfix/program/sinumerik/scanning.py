@@ -18,8 +18,9 @@ FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
 
 LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"
-LETTER = table(LETTERS)
+LETTER, ADDRESS = table(LETTERS), table(LETTERS[:-2])
 DIGITS, BLANKS = b"0123456789", b" \t"
+DIGIT = table(DIGITS)
 NAMES = table(LETTERS + DIGITS)
 
 PASSIVE = re.compile(rb'"[^"\r\n]*"|(?P<comment>;[^\r\n]*)')
@@ -59,9 +60,18 @@ def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
     second = text[np.minimum(start + 1, len(text) - 1)]
     named = np.zeros(len(text), dtype=np.bool_)
     fill(named, words[LETTER[text[start]] & LETTER[second]], True)
-    for place in np.flatnonzero(text == ord("=")).tolist():
+    places = np.flatnonzero(text == ord("="))
+    single = extended_by_one(text, places)
+    named[places[single] - 1] = True
+    for place in places[~single].tolist():
         named[slice(*extension(source, place))] = True
     return named
+
+
+def extended_by_one(text: NDArray[np.uint8], places: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) the equals signs right behind an address of one letter and one digit, as in ` A3=`."""
+    digit, letter, before = (text[np.maximum(places - back, 0)] for back in (1, 2, 3))
+    return (places > 2) & DIGIT[digit] & ADDRESS[letter] & ~LETTER[before]
 
 
 def extension(source: bytes, place: int) -> tuple[int, int]:
