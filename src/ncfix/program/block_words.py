@@ -6,6 +6,9 @@ import math
 from functools import lru_cache
 from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS, Layout
 from ncfix.program.number_style import NumberStyle
 from ncfix.program.target import TANGENTIAL, Rendered, Target
@@ -24,6 +27,12 @@ def columns_of(letters: tuple[str, ...]) -> tuple[tuple[int, str], ...]:
     return tuple(sorted(enumerate(letters), key=lambda each: AXIS_LETTERS.index(each[1])))
 
 
+@lru_cache(maxsize=32)
+def half_steps(decimals: tuple[int, ...]) -> NDArray[np.float64]:
+    """(n_axes,) half an output step of axes with so many digits behind the point; not to be written to."""
+    return np.asarray(0.5 * 10.0 ** -np.array(decimals, dtype=float))
+
+
 class BlockWriter(Generic[LayoutT]):
     """One block in any language, and what its motion is to become; what is written is gathered in `out` and `added`.
 
@@ -39,7 +48,7 @@ class BlockWriter(Generic[LayoutT]):
         self.out = Rendered()
         self.added: list[str] = []
         self.columns = columns_of(target.letters)
-        self.half = 0.5 * 10.0 ** -target.decimals.astype(float)
+        self.half = half_steps(tuple(target.decimals.tolist()))
 
 
 class WordWriter(BlockWriter[Layout]):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from ncfix.program.render import STRAIGHT_AND_ARCS
 from ncfix.program.standstill import passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target
 from ncfix.program.tree import Program, view
-from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone
+from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone, turns_alone
 from ncfix.program.writer import Edit, Splices
 
 FloatArray = NDArray[np.float64]
@@ -128,18 +129,16 @@ class _Emitter:
         self.first_piece = self.bulk.first_piece
         self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
         self.wordless, self.increments = moves.wordless, moves.increments
-        self._moved: NDArray[np.bool_] | None = None
         x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
         self.spatial = (x, y, z)
         self.layouts: dict[int, BlockLayout | None] = {}
         self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
         self.replaced: int | None = None
-        self.replaced_by = -1
         self.cycle_end: FloatArray | None = None
         self.levels = LevelBook(moves, pieces)
         self.written: dict[int, Rendered] = {}
         self.latest, self.added = list[int](), 0
-        self.conflicts: dict[int, str] = {}
+        self.conflicts, self.replaced_by = dict[int, str](), -1
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
 
     def run(self, done: FloatArray | None, row: int) -> Emission:
@@ -167,12 +166,15 @@ class _Emitter:
         splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
 
-    @property
+    @cached_property
     def moved(self) -> NDArray[np.bool_]:
         """(n, n_axes) axes that a motion takes to its end; found out when a motion is kept."""
-        if self._moved is None:
-            self._moved = self.moves.moved
-        return self._moved
+        return self.moves.moved
+
+    @cached_property
+    def turns(self) -> NDArray[np.bool_]:
+        """(n,) motions that turn rotary axes alone."""
+        return turns_alone(self.moves)
 
     def _stretch(self, row: int) -> int:
         """Write the stretch of plain motions that begins here all at once; the number of motions written."""
@@ -338,7 +340,7 @@ class _Emitter:
 
     def _turn_minutes(self, row: int) -> float:
         """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
-        if self.program.dialect.feed_of == "all":
+        if self.program.dialect.feed_of == "all" or not self.turns[row]:
             return float("nan")
         own = self.program.templates[int(self.program.template[self.moves.block[row]])].slots
         return minutes(self.moves, row, own_feed="F" in own)

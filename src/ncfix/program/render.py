@@ -104,11 +104,9 @@ class BlockRenderer(TurnWriter):
         target, closed = self.target, np.zeros(len(position), dtype=bool)
         if not target.arc or len(target.ends) > 1:
             return closed
-        plane = [target.spatial[index] for index in target.plane[:2]]
-        if -1 not in plane:
-            chord = (self._xyz(target.nominal) - target.origin)[list(target.plane[:2])]
-            near = np.abs(end - position)[plane] < NEAR * self.half[plane]
-            closed[plane] = bool((np.abs(chord) < CLOSED).all() and near.all())
+        plane, nominal = [target.spatial[index] for index in target.plane[:2]], self._xyz(target.nominal)
+        if -1 not in plane and all(abs(nominal[index] - target.origin[index]) < CLOSED for index in target.plane[:2]):
+            closed[plane] = bool((np.abs(end - position)[plane] < NEAR * self.half[plane]).all())
         return closed
 
     def _stay(self, position: FloatArray, column: int, word: Word | None) -> None:
@@ -207,15 +205,18 @@ class BlockRenderer(TurnWriter):
         """The centre that the radius as written means, if that is within an output step of where it belongs."""
         plane = list(self.target.plane[:2])
         radius = abs(self._value(word, np.nan))
-        begin, finish, wanted = self._xyz(start)[plane], self._xyz(end)[plane], self.target.centre[plane]
-        chord = finish - begin
-        half_chord = float(np.hypot(*chord)) / 2
+        (x, y), (u, v), (a, b) = (
+            point[plane].tolist() for point in (self._xyz(start), self._xyz(end), self.target.centre)
+        )
+        half_chord = float(np.hypot(u - x, v - y)) / 2
         if not radius > half_chord > 0:
             return None
-        rise = np.sqrt(radius**2 - half_chord**2) * np.array([-chord[1], chord[0]]) / (2 * half_chord)
-        sides = [(begin + finish) / 2 + side * rise for side in (1, -1)]
-        nearest = min(sides, key=lambda centre: float(np.hypot(*(centre - wanted))))
-        if float(np.hypot(*(nearest - wanted))) > 2 * self.half[self.target.spatial[plane[0]]]:
+        height = math.sqrt(radius**2 - half_chord**2)
+        rise = height * -(v - y) / (2 * half_chord), height * (u - x) / (2 * half_chord)
+        sides = [((x + u) / 2 + side * rise[0], (y + v) / 2 + side * rise[1]) for side in (1, -1)]
+        off = [float(np.hypot(p - a, q - b)) for p, q in sides]
+        nearest = sides[0] if not off[1] < off[0] else sides[1]
+        if min(off) > 2 * self.half[self.target.spatial[plane[0]]]:
             return None
         centre = self.target.centre.copy()
         centre[plane] = nearest

@@ -31,6 +31,14 @@ DIGITS = 6
 """Significant digits of an F word of ours."""
 
 
+def turns_alone(moves: Moves) -> NDArray[np.bool_]:
+    """(n,) motions at feed in which no linear axis moves: whether `turn_alone` can be other than 0."""
+    alone: NDArray[np.bool_] = moves.kind == Kind.FEED
+    for column in np.flatnonzero(~moves.rotary):
+        alone &= moves.end[:, column] - moves.start[:, column] == 0
+    return alone
+
+
 def turn_alone(moves: Moves, row: int) -> float:
     """The angle of a motion at feed that turns rotary axes alone, in degrees; 0 for others."""
     if moves.kind[row] != Kind.FEED:
