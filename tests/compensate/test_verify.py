@@ -53,6 +53,16 @@ def test_figures_of_a_case_that_can_be_worked_out_by_hand() -> None:
     assert error.before.tilt == 0.0
 
 
+def test_the_start_of_a_cut_behind_a_rapid_is_looked_at() -> None:
+    """An error of `size` u^2 from -250 to 250: the largest is where the rapid ends."""
+    machine, size = bow(), 0.05
+    moves = motions(machine, (0, 0, 0), [(250, 0, 0), (0, 0, 0)], [Kind.RAPID, Kind.FEED])
+    pieces = untouched(moves, np.zeros(2, dtype=bool)).pieces
+    error = path_error(machine, moves, pieces, rows=np.array([False, True]))
+    assert error.before.max == pytest.approx(size, rel=1e-4)
+    assert error.before.move == 1
+
+
 def test_ways_count_by_their_length() -> None:
     """A millimetre with a large error and 99 with none: the square mean is a tenth of the large one."""
     step = Effect("EXX", (0.01,), Polynomial((1,)), 0.0, 1.0)

@@ -50,14 +50,15 @@ NEARLY = 1 - 1e-6
 class Course:
     """The plan of a part of plain motions.
 
-    part      its text and motions
-    plain     (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
-    intent    the motions on the machine
-    real      where they really start and end, before rounding: there the tip is where it should be, to 1 nm
-    pieces    what is to be written
-    first     (n + 1,) the first piece of each motion, and how many there are
-    before    (n,) mm: how far off it is at their ends without a correction
-    findings  what there is to say of motions
+    part          its text and motions
+    plain         (n,) those that are plain: straight, and to be corrected; the few others are arcs and dwells
+    intent        the motions on the machine
+    real          where they really start and end, before rounding: there the tip is where it should be, to 1 nm
+    pieces        what is to be written
+    first         (n + 1,) the first piece of each motion, and how many there are
+    before        (n,) mm: how far off it is at their ends without a correction
+    findings      what there is to say of motions
+    behind_rapid  whether the motion before them is one
     """
 
     part: Part
@@ -68,6 +69,7 @@ class Course:
     first: Index
     before: Array
     findings: tuple[Finding, ...]
+    behind_rapid: bool
 
     @property
     def single(self) -> bool:
@@ -75,9 +77,10 @@ class Course:
         return len(self.pieces) == len(self.first) - 1
 
     @property
-    def behind_dwells(self) -> Mask:
-        """(n,) motions that may not begin quite where they should: as `judge.uneasy_starts`."""
-        return np.append(False, self.part.moves.kind[:-1] == Kind.DWELL)
+    def uneasy(self) -> Mask:
+        """(n,) motions whose starts no figure of the one before shows: as `verify.uneasy`."""
+        kind = self.part.moves.kind[:-1]
+        return np.append(self.behind_rapid, (kind == Kind.DWELL) | (kind == Kind.RAPID))
 
     def settled(self, emission: Emission) -> Settled:
         """The plan and its text as the long way has them."""
@@ -148,7 +151,8 @@ class Planner:
             pieces = on_digits(self.machine, moves, pieces, inner)
             if not self._fine_inside(poses, real, pieces, inner, found.q - poses.meant):
                 return None
-        return Course(part, plain, intent, real, pieces, first, found.before[1:], findings)
+        behind_rapid = bool(unit.head.moves.kind[-1] == Kind.RAPID)
+        return Course(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
 
     def _bounds_of(self, poses: Poses, intent: Intent, real: Segments, done: Array) -> Array | None:
         """What the deviation of the tip does not exceed along motions, (n,) mm; None if one leaves a travel on its way.

@@ -32,7 +32,7 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
     moves, written = course.part.moves, replace(course.real, start=text.start, end=course.last(text.end))
     shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
-    apart = ~course.plain | course.behind_dwells | (np.diff(course.first) > 1)
+    apart = ~course.plain | course.uneasy | (np.diff(course.first) > 1)
     if moves.tcp[0]:
         apart |= bool(course.intent.kinks)
     else:
@@ -130,4 +130,4 @@ def _along(course: Course, text: Emission, rows: Index) -> Iterator[Samples]:
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
     written = Written(course.intent, pieces, text.start)
     known = Known(course.before, course.real.end)
-    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=course.behind_dwells)
+    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=course.uneasy)

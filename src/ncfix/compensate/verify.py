@@ -18,7 +18,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import finite, lengths, picked
+from ncfix.compensate.rows import finite, lengths, picked, some
 from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
@@ -124,11 +124,11 @@ def samples(
 ) -> Iterator[Samples]:
     """Look at pieces `which`, in batches; what is known of their ends need not be looked at.
 
-    uneasy  (n,) motions that may not begin where they should, if that is known
+    uneasy  (n,) motions whose start is looked at, too, if that is known
     """
     counts, along = _counts(written, which, density)
     if uneasy is None:
-        uneasy = uneasy_starts(written.intent, _kept_motions(written))
+        uneasy = _uneasy(written)
     for batch in batches(counts + 1, BATCH):
         piece, fraction = _places(written, which[batch], counts[batch], along[batch], uneasy)
         yield _errors(written, piece, fraction, known, tilts)
@@ -156,6 +156,16 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     if any(len(each) for each, _ in extra):
         many, fraction = merged(len(which), (owners(many), fraction), *extra)
     return which[owners(many)], fraction
+
+
+def _uneasy(written: Written) -> Mask:
+    """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
+
+    Not behind rapids of which an axis is left where it stands: what that leaves is said by itself.
+    """
+    found, moves = uneasy_starts(written.intent, _kept_motions(written)), written.intent.moves
+    found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
+    return found
 
 
 def _begins_uneasily(written: Written, which: Index, uneasy: Mask) -> Mask:
