@@ -109,6 +109,17 @@ def test_what_is_not_for_the_lane_is_left_alone(text: str) -> None:
     assert_same(text)
 
 
+def test_blocks_without_a_time_of_their_own_are_kept_whole_alike() -> None:
+    """SINUMERIK: under G93 a block without F has the F of the one before; its pieces would need others."""
+    body = [f"X{i} C{2 * i}" + " F3" * (i % 9 == 0) + " G0" * (i % 13 == 0) + " G1" * (i % 13 == 1) for i in range(60)]
+    text = "\n".join(["G0 X0 Y0 Z0 B0 C0", "G1 G93 F3 X1", *body, "M30"])
+    one, other = (columns(text, length, "siemens", Setup(assume_zero=True)) for length in (ALWAYS, NEVER))
+    assert not isinstance(one, str)
+    assert not isinstance(other, str)
+    np.testing.assert_array_equal(one["compensated"], other["compensated"])
+    assert np.any(one["compensated"])
+
+
 PLACED = "G90 G1 F100 X0. Y0."
 MANY = [f"X{i}. Y{i}." for i in range(1, 25)]
 """Blocks that bring Z and B to their places go by themselves: behind `MANY` a stretch ends before the first of them."""

@@ -79,9 +79,10 @@ def before_placing(control: Control, mask: IntArray, block: int) -> int:
 
 
 def count_allowed(control: Control, stage: Stage) -> int:
-    """How many blocks run before one that the control would refuse for want of a feed."""
+    """How many blocks run before one that is refused for want of a feed, or that has no time of its own."""
     modal, count = control.modal, len(stage.mask)
-    if not control.needs_feed or (modal.feed_mode == FeedMode.PER_MINUTE and modal.feed_given and stage.feed.all()):
+    exact = control.needs_feed or modal.feed_mode == FeedMode.INVERSE_TIME
+    if not exact or (modal.feed_mode == FeedMode.PER_MINUTE and modal.feed_given and stage.feed.all()):
         return count
     at_feed = (stage.motion == 10) & ((stage.mask != 0) | stage.coded)
     if modal.feed_mode == FeedMode.INVERSE_TIME:

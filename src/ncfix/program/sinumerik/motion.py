@@ -35,7 +35,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if not machine:
         mind_carried(control)
-    timed = control.modal.feed_mode == 93 and "F" not in words.values
+    timed = control.modal.feed_mode == 93 and code != 0 and "F" not in words.values
     words.whole = timed or words.block in control.solitary or control.modes.modal_cycle is not None
     corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
     control.at_corner = not machine and (corner or control.cornered)
