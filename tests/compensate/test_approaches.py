@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.compensate.comparison import compare
+from compensate.side import compared
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
@@ -59,8 +59,8 @@ def test_every_hole_has_its_own_level(machine: Machine, dialect: str, retract: s
     text, before, after = fixed(f"{HEAD}{retract} G81 {HOLES}G0 X0. Y0.\nG1 Z0. F300.\nX90.\nM2\n", machine, dialect)
     assert np.abs(heights_off(before, after, machine)).max() <= HALF
     assert np.ptp([float(value) for value in re.findall(r"R([\d.]+)", text)][:3]) > 0
-    there, back = compare(machine, before, after)
-    assert max(there.size.max(), back.size.max()) <= 0.001
+    _, there, back = compared(machine, before, after)
+    assert max(there.max, back.max) <= 0.001
 
 
 def test_a_level_in_inches_and_in_another_offset(machine: Machine) -> None:

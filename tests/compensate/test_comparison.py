@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from ncfix.compensate.comparison import compare, error_of
+from compensate.side import compared
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
@@ -75,7 +75,7 @@ def farthest(path: np.ndarray, other: np.ndarray) -> float:
 
 
 def truth(machine: Machine, original: Moves, other: Moves) -> tuple[float, float]:
-    """What `compare` has to find: the same by dense points. Both only turn, and cut from their second motion on."""
+    """What `compared` has to find: the same by dense points. Both only turn, and cut from their second motion on."""
     meant = machine.tip(dense(original, list(range(1, len(original)))))
     done = machine.actual_tip(dense(other, list(range(1, len(other)))))
     return farthest(done, meant), farthest(meant, done)
@@ -85,10 +85,10 @@ def test_a_motion_in_which_an_axis_turns_far(machine: Machine) -> None:
     text = unwinding()
     before, after = moves_of(text, machine), moves_of(fixed(text, machine), machine)
     assert len(after) > len(before) + 10
-    there, back = compare(machine, before, after)
-    assert (there.max_mm, back.max_mm) == pytest.approx(truth(machine, before, after), abs=AGREED)
-    assert max(there.max_mm, back.max_mm) < 1e-3
-    assert error_of(machine, before).max_mm == pytest.approx(truth(machine, before, before)[0], abs=AGREED)
+    alone, there, back = compared(machine, before, after)
+    assert (there.max, back.max) == pytest.approx(truth(machine, before, after), abs=AGREED)
+    assert max(there.max, back.max) < 1e-3
+    assert alone.max == pytest.approx(truth(machine, before, before)[0], abs=AGREED)
 
 
 @pytest.mark.parametrize("axis", range(5))
@@ -101,8 +101,8 @@ def test_a_fault_in_any_piece_of_such_a_motion_is_seen(machine: Machine, axis: i
         end[row, axis] += fault
         start[row + 1, axis] += fault
         wrong = replace(after, start=start, end=end)
-        found = compare(machine, before, wrong)
-        assert tuple(each.max_mm for each in found) == pytest.approx(truth(machine, before, wrong), abs=AGREED)
+        _, *found = compared(machine, before, wrong)
+        assert tuple(each.max for each in found) == pytest.approx(truth(machine, before, wrong), abs=AGREED)
 
 
 @pytest.mark.parametrize("near", [1e-5, 1e-3])
@@ -118,9 +118,9 @@ def test_a_fault_of_a_micrometre_is_found_wherever_it_is(machine: Machine, near:
         end, start = meant.end.copy(), meant.start.copy()
         end[row, z] += 1.5e-3
         start[row + 1, z] += 1.5e-3
-        there, _ = compare(perfect, meant, replace(meant, start=start, end=end), near=near)
-        assert there.max_mm == pytest.approx(1.5e-3, rel=1e-4)
-        assert there.worst_row in (row, row + 1)
+        _, there, _ = compared(perfect, meant, replace(meant, start=start, end=end), near)
+        assert there.max == pytest.approx(1.5e-3, rel=1e-4)
+        assert there.where in (row, row + 1)
 
 
 def replace_errors(machine: Machine) -> Machine:
@@ -144,7 +144,7 @@ def test_blocks_that_are_missing_or_too_many(machine: Machine, change: object, l
     head = "G21 G90 G94 G17\nG0 X140 Y100 Z5\n"
     texts = [head + "".join(each) + "M2\n" for each in (lines, change(lines))]  # type: ignore[operator]
     meant, done = (moves_of(text, perfect) for text in texts)
-    found = compare(perfect, meant, done)
+    _, *found = compared(perfect, meant, done)
     # the distance rises by up to 0.006 mm in half a block of 0.67 mm: by so much between two dense points at the peak
-    assert tuple(each.max_mm for each in found) == pytest.approx(truth(perfect, meant, done), abs=3e-4)
-    assert max(each.max_mm for each in found) >= least_mm
+    assert tuple(each.max for each in found) == pytest.approx(truth(perfect, meant, done), abs=3e-4)
+    assert max(each.max for each in found) >= least_mm

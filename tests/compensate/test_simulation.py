@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.compensate.comparison import compare
+from compensate.side import compared
 from ncfix.compensate.following import follow
 from ncfix.compensate.simulation import TipError, tip_error
 from ncfix.diagnostics import DifferenceError
@@ -75,8 +75,8 @@ def test_a_program_that_cuts_nothing_has_no_error() -> None:
 def both(machine: str, original: str, other: str) -> tuple[float, float]:
     """The largest distance along the other program, and along the original, mm."""
     made, meant = followed(machine, original)
-    there, back = compare(made, meant, followed(machine, other)[1])
-    return there.max_mm, back.max_mm
+    _, there, back = compared(made, meant, followed(machine, other)[1])
+    return there.max, back.max
 
 
 WAVE = "G0 X0 Y0 Z0\n" + "".join(f"G1 X{x} Y{20 + 10 * np.sin(x / 20):.3f}\n" for x in range(0, 200, 7))

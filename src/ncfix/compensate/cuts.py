@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.comparison import as_made
 from ncfix.compensate.crew import Read
 from ncfix.compensate.curve import Curve
 from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.simulation import unseen
+from ncfix.compensate.simulation import actual_tip, unseen
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
@@ -71,6 +70,11 @@ class Cut:
         flank = flank and flank.taken(counted(actual))
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
         return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last)
+
+
+def as_made(done: Intent) -> Curve:
+    """The path of motions on the real machine."""
+    return Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:

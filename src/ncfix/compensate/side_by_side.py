@@ -1,4 +1,9 @@
-"""Two programs compared while they are read: what is at hand of their paths goes along with the reading.
+"""Two programs on one machine, compared while they are read: does the second one cut what the first one means?
+
+The paths are compared as curves in the workpiece, so this knows nothing of how the second program was made: from every
+sample of the real path of the second program to the nearest point of the intended path of the first, and back, so that
+nothing may be missing. Nearest is looked for near the same length of path, so that the next pass of a cut, a hair's
+breadth beside it, is not taken for the one that is meant.
 
     original --> what it means ----------------+--> there: from what the other makes to what is meant
              --> what the machine makes of it  |    back:  from what is meant to what the other makes
@@ -15,14 +20,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ncfix.compensate.comparison import check_alike
 from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.holes import over_holes
 from ncfix.compensate.nearest import Search
+from ncfix.diagnostics import DifferenceError
 
+UNLIKE = 0.02
+"""Paths whose lengths differ by more than this share are not the same cut."""
 KEPT = 100.0
 """mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
 
@@ -225,7 +232,13 @@ class SideBySide:
             else:
                 self._take_other(next(other, None))
             self._go_on()
-        check_alike((self.intended.count, self.intended.cut), (self.fixed.count, self.fixed.cut))
+        self._check_alike()
+
+    def _check_alike(self) -> None:
+        meant, made = self.intended.cut, self.fixed.cut
+        if (self.intended.count == 0) != (self.fixed.count == 0) or abs(meant - made) > UNLIKE * max(meant, made):
+            text = f"the two programs do not cut the same: {meant:.3f} mm and {made:.3f} mm of path"
+            raise DifferenceError.of("NCF420", text, hint="give the original program first, then the corrected one")
 
     def _take_original(self, cut: Cut | None) -> None:
         if cut is None:
