@@ -46,7 +46,7 @@ def finished(control: Control, program: Program, moves: Moves) -> Trace:
     marked = stamp.find(program)
     return Trace(
         moves=moves,
-        messages=(*control.knowledge.assumed.values(), *control.messages.values()),
+        messages=rollover.remarks(control),
         assumed=tuple(control.knowledge.assumed),
         stamp="" if marked is None else program.text_of(marked),
     )

@@ -113,7 +113,7 @@ class PartFollower(ABC):
     @property
     def messages(self) -> tuple[Message, ...]:
         """What there is to say so far."""
-        return (*self.control.knowledge.assumed.values(), *self.control.messages.values())
+        return rollover.remarks(self.control)
 
     @property
     def assumed(self) -> tuple[str, ...]:

@@ -113,5 +113,11 @@ def extremes(rolls: Mask, plain: Mask, end: NDArray[np.float64]) -> NDArray[np.f
 def say(control: Control, program: Program) -> None:
     """Say where the first of them is, of each kind."""
     for block, text, hint in ((control.builder.overturned, TEXT, HINT), (control.builder.brought_back, BACK, WORDS)):
-        if block is not None and text not in control.messages:
-            control.messages[text] = Message(ROLLED, text, program.place(block), hint)
+        if block is not None and text not in control.rolled:
+            control.rolled[text] = Message(ROLLED, text, program.place(block), hint)
+
+
+def remarks(control: Control) -> tuple[Message, ...]:
+    """All that there is to say of the program, in the same order whether it was followed in parts or as a whole."""
+    rolled = (control.rolled[text] for text in (TEXT, BACK) if text in control.rolled)
+    return (*control.knowledge.assumed.values(), *control.messages.values(), *rolled)

@@ -48,7 +48,8 @@ class Standing(ABC):
     tcp        X Y Z are those of the tip (tool-centre-point control)
     tilted     a tilted plane is in force, in which they are
     increments what a number without a decimal point counts, linear and rotary words
-    locate     where in the program we are; `messages` are the remarks so far, by their text
+    locate     where in the program we are; `messages` are the remarks so far, by their text, and `rolled` those about
+               axes that may roll over, which come behind them
     """
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
@@ -64,6 +65,7 @@ class Standing(ABC):
         self.tools = Tools()
         self.knowledge = Knowledge(run.setup, self.place)
         self.messages: dict[str, Message] = {}
+        self.rolled: dict[str, Message] = {}
         self.increments = (1.0, 1.0)
         self.tilted = False
         self.tcp = run.setup.tcp
