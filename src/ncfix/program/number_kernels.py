@@ -15,6 +15,12 @@ Bytes = NDArray[np.uint8]
 
 MOST_STEPS = 18
 """Decimals of the finest output step that is written here."""
+EIGHT_DIGITS = np.uint64(10**8)
+"""What numbers of eight digits are less than."""
+ZEROS, TOPS, ABOVE_NINE = (np.uint64(each * 0x0101010101010101) for each in (ZERO, 0x80, 0x76))
+"""Of each of eight bytes: the digit zero, the highest bit, and what takes all above nine, but no digit, to that bit."""
+PLACES = np.uint64(0x0001020304050607)
+"""Times a number of eight bytes, of which one is 1 and the others are 0: its highest byte is the place of that one."""
 ROOM = LONGEST + MOST_STEPS + 4
 """Bytes that a word takes at most: its head, a sign, digits before the point and behind it."""
 
@@ -42,6 +48,29 @@ def copied(out: Bytes, at: int, data: Bytes, start: int, stop: int) -> int:
     return at + stop - start
 
 
+def put_word(out: Bytes, at: np.uint64, word: np.uint64) -> None:
+    """Write eight bytes: the reverse of `word_at`."""
+    for k in range(np.uint64(8)):
+        out[at + k] = np.uint8(word >> (np.uint64(8) * k))
+
+
+def point_in(text: Bytes, first: int, stop: int) -> int:
+    """How many digits stand before the point of up to eight characters, all of them if it has none; -1: another text.
+
+    As bytes of one number: no branch depends on how many digits there are, which no processor foresees.
+    """
+    count = np.uint64(stop - first)
+    if stop < 8 or count - np.uint64(1) >= np.uint64(8):
+        return -1
+    word = (word_at(text, np.uint64(stop - 8)) ^ ZEROS) >> (np.uint64(64) - np.uint64(8) * count)
+    odd = ((word & ~TOPS) + ABOVE_NINE | word) & TOPS
+    if odd == np.uint64(0):
+        return stop - first
+    at = ((odd >> np.uint64(7)) * PLACES) >> np.uint64(56)
+    alone = odd & (odd - np.uint64(1)) == np.uint64(0)
+    return np.int64(at) if alone and (word >> (np.uint64(8) * at)) & np.uint64(255) == np.uint64(POINT ^ ZERO) else -1
+
+
 def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool, bool, int, bool]:
     """Decimals, point, plus, digits before the point of the number at a span, and whether it is nothing but that.
 
@@ -49,6 +78,11 @@ def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool
     """
     head = text[np.uint64(start)]
     first = start + (head in (PLUS, MINUS))
+    plus = bool(head == PLUS) or (signed != 0 and bool(head == MINUS))
+    whole = point_in(text, first, stop)
+    if whole >= 0:
+        pointed = first + whole < stop
+        return stop - first - whole - (1 if pointed else 0), pointed, plus, whole, True
     point = -1
     for place in range(first, stop):
         character = text[np.uint64(place)]
@@ -58,7 +92,6 @@ def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool
             return 0, False, False, 0, False
     decimals = stop - point - 1 if point >= 0 else 0
     clear = stop - first <= LONGEST and decimals <= MOST_DECIMALS
-    plus = bool(head == PLUS) or (signed != 0 and bool(head == MINUS))
     return decimals, point >= 0, plus, stop - first - decimals - (point >= 0), clear
 
 
@@ -70,6 +103,16 @@ def steps_of(value: float, decimals: int) -> int:
     if not (steps < LARGEST and abs(steps - np.floor(steps) - 0.5) > TIE * steps):
         return -1
     return int(np.rint(steps))
+
+
+def eight_digits(number: np.uint64) -> np.uint64:
+    """Eight digits of a number, the first one in the lowest byte: halves, quarters and eighths, all at once."""
+    four = number // np.uint64(10_000)
+    halves = four | (number - np.uint64(10_000) * four) << np.uint64(32)
+    two = (halves * np.uint64(10_486) >> np.uint64(20)) & np.uint64(0x7F0000007F)
+    quarters = two | (halves - np.uint64(100) * two) << np.uint64(16)
+    one = (quarters * np.uint64(103) >> np.uint64(10)) & np.uint64(0x000F000F000F000F)
+    return ZEROS + (one | (quarters - np.uint64(10) * one) << np.uint64(8))
 
 
 def put_digits(data: Bytes, at: int, number: np.uint64, count: int) -> int:
@@ -85,20 +128,45 @@ def put_digits(data: Bytes, at: int, number: np.uint64, count: int) -> int:
 
 
 def put(data: Bytes, at: int, steps: int, decimals: int, sign: int, least: int, point: bool) -> int:
-    """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero."""
-    number, one = np.uint64(steps), np.uint64(TENS[decimals])
+    """Write a number at `at`; where the next byte goes. `least`: digits before the point, -1 for none if it is zero.
+
+    What stands up to ten bytes behind it may change: it is yet to be written.
+    """
+    data[np.uint64(at)] = sign
+    at += 1 if sign else 0
+    number, one, pointed = np.uint64(steps), np.uint64(TENS[decimals]), point or decimals > 0
+    count = max(least, 0 if number < one and least < 0 and decimals > 0 else 1)
+    if number < EIGHT_DIGITS and count + decimals <= 8:
+        count = max(count, digits_in(number) - decimals)
+        return put_short(data, np.uint64(at), number, count, decimals, pointed)
     whole = number // one
-    if sign:
-        data[np.uint64(at)] = sign
-        at += 1
-    count = max(least, 0 if whole == np.uint64(0) and least < 0 and decimals > 0 else 1)
     while count < 18 and whole >= np.uint64(TENS[count]):
         count += 1
     at = put_digits(data, at, whole, count)
-    if point or decimals > 0:
+    if pointed:
         data[np.uint64(at)] = POINT
         at += 1
     return put_digits(data, at, number - whole * one, decimals)
+
+
+def digits_in(number: np.uint64) -> int:
+    """How many digits a number of eight digits at most has; 1 for zero."""
+    digits = 1
+    for power in range(1, 8):
+        digits += 1 if number >= np.uint64(TENS[power]) else 0
+    return digits
+
+
+def put_short(data: Bytes, at: np.uint64, number: np.uint64, whole: int, decimals: int, pointed: bool) -> int:
+    """Write a number with so many digits before and behind the point, eight at most; where the next byte goes."""
+    before, four = np.uint64(whole), np.uint64(4)
+    word = eight_digits(number) >> (np.uint64(64) - np.uint64(8) * (before + np.uint64(decimals)))
+    put_word(data, at, word)
+    at += before
+    if pointed:
+        data[at] = POINT
+        put_word(data, at + np.uint64(1), (word >> four * before) >> four * before)
+    return np.int64(at) + (1 if pointed else 0) + decimals
 
 
 def put_in_style(
@@ -146,5 +214,20 @@ def put_new(data: Bytes, at: int, head: Bytes, value: float, decimals: int, sign
     return put(data, at, steps, decimals, sign, 1, False), np.copysign(steps / POWERS[decimals], value)
 
 
-HELPERS = (word_at, copied, style_of, steps_of, put_digits, put, put_in_style, put_all, put_new)
+HELPERS = (
+    word_at,
+    put_word,
+    copied,
+    point_in,
+    style_of,
+    steps_of,
+    eight_digits,
+    put_digits,
+    digits_in,
+    put_short,
+    put,
+    put_in_style,
+    put_all,
+    put_new,
+)
 """Functions that kernels are made of."""
