@@ -68,7 +68,8 @@ def point_in(text: Bytes, first: int, stop: int) -> int:
         return stop - first
     at = ((odd >> np.uint64(7)) * PLACES) >> np.uint64(56)
     alone = odd & (odd - np.uint64(1)) == np.uint64(0)
-    return np.int64(at) if alone and (word >> (np.uint64(8) * at)) & np.uint64(255) == np.uint64(POINT ^ ZERO) else -1
+    found = alone and (word >> (np.uint64(8) * at)) & np.uint64(255) == np.uint64(POINT ^ ZERO)
+    return int(np.int64(at)) if found else -1
 
 
 def style_of(text: Bytes, start: int, stop: int, signed: int) -> tuple[int, bool, bool, int, bool]:
@@ -166,7 +167,7 @@ def put_short(data: Bytes, at: np.uint64, number: np.uint64, whole: int, decimal
     if pointed:
         data[at] = POINT
         put_word(data, at + np.uint64(1), (word >> four * before) >> four * before)
-    return np.int64(at) + (1 if pointed else 0) + decimals
+    return int(np.int64(at)) + (1 if pointed else 0) + decimals
 
 
 def put_in_style(
