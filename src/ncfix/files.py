@@ -75,6 +75,19 @@ def put_at(handle: int, at: int, data: bytes) -> None:
         at, rest = at + done, rest[done:]
 
 
+@contextmanager
+def said_of(path: str | None) -> Iterator[None]:
+    """What the system says of a file without a name is said of this path; None: of the folder for temporary files."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None:
+            from tempfile import gettempdir
+
+            error.filename = path or gettempdir()
+        raise
+
+
 def unnamed(folder: str | None) -> IO[bytes]:
     """A new file without a name, in a folder if that is there: gone with this process unless it is given one.
 

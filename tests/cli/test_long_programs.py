@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 
 import pytest
@@ -78,6 +80,27 @@ def test_a_file_that_is_changed_meanwhile(
     result = fix(PART, long_program, "-o", tmp_path / "out.ngc")
     assert "NCF002" in result.err
     assert "was changed while it was read" in result.err
+    assert not (tmp_path / "out.ngc").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("{source}", "-o", "{folder}/out.ngc"), ("{source}", "--jobs", "2", "-o", "{folder}/out.ngc"), ("-", "-o", "-")],
+)
+def test_no_room_for_what_is_written(
+    arguments: tuple[str, ...], long_program: Path, root: Path, tmp_path: Path, ncfix_process: Any
+) -> None:
+    """The output is named, or the folder for temporary files where it goes to a pipe."""
+    given = [argument.format(source=long_program, folder=tmp_path) for argument in arguments]
+    result = ncfix_process(
+        *("fix", *given, "-m", root / "benchmarks" / "five_axis.toml", "--assume-zero", "--dialect", "linuxcnc"),
+        stdin=long_program.read_bytes(),
+        env={**os.environ, "NCFIX_PART_BYTES": str(PART), "NCFIX_NO_FAST": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5 * PART, 5 * PART)),
+    )
+    assert result.code == ExitCode.USAGE, result.err
+    where = gettempdir() if given[0] == "-" else tmp_path / "out.ngc"
+    assert f"{where}: NCF007: cannot be written: File too large" in result.err
     assert not (tmp_path / "out.ngc").exists()
 
 

@@ -24,7 +24,7 @@ def owned(error: Exception) -> NcfixError:
     if isinstance(error, NcfixError):
         return error
     if isinstance(error, OSError) and error.errno in FULL:
-        return unwritable(str(error.filename or "<stdout> or a temporary file"), error)
+        return unwritable(str(error.filename or "<stdout>"), error)
     return fault(error)
 
 

@@ -122,7 +122,8 @@ class Source:
         except OSError as error:
             raise files.unreadable(shown(self.path), error) from error
         if self.kept is not None:
-            files.put_at(self.kept.fileno(), self.taken, part)
+            with files.said_of(None):
+                files.put_at(self.kept.fileno(), self.taken, part)
             self.taken += len(part)
         return part
 
@@ -206,5 +207,5 @@ def outlet_for(target: Target, sure: bool, stamped: Callable[[], bool]) -> Itera
     """An outlet; `sure`: everything that the stamp says is known from the beginning."""
     direct = target.path == STREAM
     folder = None if direct else os.path.dirname(target.path) or "."
-    with files.unnamed(folder) as kept:
+    with files.said_of(None if direct else target.path), files.unnamed(folder) as kept:
         yield Outlet(kept, direct and sure, stamped)
