@@ -12,9 +12,11 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
+from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.ends import corrected
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import _look, bounds, uneasy_starts
+from ncfix.compensate.nearest import Search
 from ncfix.compensate.path import plan
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import STRETCH, Grid, fewest
@@ -53,6 +55,36 @@ def test_fewest_pieces(seed: int, most: int) -> None:
     assert fast.engage()
     for found, expected in zip(fewest(nodes, 0.002), plain, strict=True):
         assert np.array_equal(found, expected)
+
+
+def wandering(rng: np.random.Generator, k: int, off: float) -> Curve:
+    """Parabolas of all lengths with holes among them and gaps between them, and up to `off` mm beside where it was."""
+    shift = np.random.default_rng(7)
+    size = shift.choice([0.0, 1e-4, 0.01, 0.3, 5.0], k, p=[0.2, 0.1, 0.2, 0.4, 0.1])
+    way = np.cumsum(size[:, None] * shift.normal(size=(k, 3)), axis=0)
+    end = way + off * rng.normal(size=(k, 3))
+    begin = np.vstack([np.zeros((1, 3)), end[:-1]])
+    opens = shift.random(k) < 0.2
+    begin[opens] += 0.2
+    hole = size == 0
+    begin[hole], opens[hole] = end[hole], True
+    middle = (begin + end) / 2 + 0.05 * size[:, None] * shift.normal(size=(k, 3))
+    return Curve(np.arange(k), np.zeros(k), np.ones(k), begin, middle, end, opens)
+
+
+@pytest.mark.parametrize("near", [1e-5, 0.01, np.inf])
+@pytest.mark.parametrize("seed", range(4))
+def test_nearest_points(seed: int, near: float) -> None:
+    pytest.importorskip("numba", reason="the `fast` extra is not installed")
+    rng = np.random.default_rng(seed)
+    curve, other = wandering(rng, 500, 0.0), wandering(rng, 500, 10.0 ** -rng.integers(1, 6))
+    at = Samples.of(other)
+    expected = other.way(at.piece, at.share)
+    plain = Search(curve, near).around(at.points, expected)
+    assert fast.engage()
+    found = Search(curve, near).around(at.points, expected)
+    for column in ("piece", "share", "gap"):
+        assert np.array_equal(getattr(found, column), getattr(plain, column)), column
 
 
 def winding(machine: Machine, n: int, step: float) -> Intent:

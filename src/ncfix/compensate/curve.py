@@ -118,9 +118,19 @@ class Curve:
         return np.stack([at_begin, at_begin + inside])
 
     @cached_property
+    def parabolas(self) -> Array:
+        """Begin, slope and bend of each, (9, k) mm."""
+        return np.ascontiguousarray(np.hstack([self.begin, self.slope, self.bend]).T)
+
+    @cached_property
     def lying(self) -> Index:
         """Those that have a length, ascending."""
         return np.flatnonzero(self.ways > 0)
+
+    @cached_property
+    def upto(self) -> Index:
+        """How many have a length up to each and with it, (k,)."""
+        return np.cumsum(self.ways > 0)
 
     def place(self, lengths: Array) -> Index:
         """The parabola in which a way along the path (n,) mm ends, (n,)."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ncfix import fast
 from ncfix.compensate.curve import Curve, length
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import batches, owners, places
@@ -105,33 +106,49 @@ class Search:
 
     def around(self, points: Array, expected: Array) -> Nearest:
         """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`."""
-        piece = self.curve.place(expected)
-        size = self.curve.ways[piece]
-        share = np.clip((expected - self.curve.lengths[piece]) / np.where(size > 0, size, 1.0), 0.0, 1.0)
-        found = self._down(points, piece, share)
+        found = (self._down_compiled if fast.engaged() else self._down)(np.ascontiguousarray(points.T), expected)
         far = np.flatnonzero(found.gap > self.near)
         if far.size:
             self._everywhere(points, expected, found, far)
         return found
 
-    def _down(self, points: Array, piece: Index, share: Array) -> Nearest:
-        """The nearest points that are reached without going away from `points`, from shares of parabolas."""
+    def _down(self, points: Array, expected: Array) -> Nearest:
+        """The nearest points that are reached without going away from `points` (3, n)."""
+        piece, lying = self.curve.place(expected), self.curve.lying
+        size = self.curve.ways[piece]
+        share = np.clip((expected - self.curve.lengths[piece]) / np.where(size > 0, size, 1.0), 0.0, 1.0)
         share, gap, push = _newton(self.curve, points, piece, share)
         push += CLOSE * self._at_gap(piece, share) * (gap > self.near)
-        found, lying = Nearest(piece, share, gap), self.curve.lying
-        rows, step_by_step = np.flatnonzero(push), np.zeros(len(points), dtype=bool)
+        found = Nearest(piece, share, gap)
+        rows, step_by_step = np.flatnonzero(push), np.zeros(len(expected), dtype=bool)
         for _ in range(HOPS if lying.size else 0):
             if not rows.size:
                 break
             new = self._hop(found.piece[rows], push[rows], step_by_step[rows])
             entered = np.where(push[rows] > 0, 0.0, 1.0)
-            tried, way, further = _newton(self.curve, points[rows], new, entered)
+            tried, way, further = _newton(self.curve, points.take(rows, axis=1), new, entered)
             better = way < found.gap[rows]
             found.put(rows[better], Nearest(new[better], tried[better], way[better]))
             push[rows[better]] = further[better]
-            again = ~better & ~step_by_step[rows] & (np.abs(push[rows]) > 0)
+            again = ~better & ~step_by_step[rows]
             step_by_step[rows] = ~better
             rows = rows[(better & (further != 0)) | again]
+        return found
+
+    def _down_compiled(self, points: Array, expected: Array) -> Nearest:
+        """As `_down`."""
+        from ncfix.compensate import nearest_kernels
+
+        n, path = len(expected), (getattr(self.curve, name) for name in nearest_kernels.Path._fields)
+        found = Nearest(np.empty(n, dtype=np.intp), np.empty(n), np.empty(n))
+        nearest_kernels.down(
+            points,
+            expected,
+            nearest_kernels.Path(*path),
+            (self.near, CLOSE),
+            (STEPS, HOPS),
+            (found.piece, found.share, found.gap),
+        )
         return found
 
     def _at_gap(self, piece: Index, share: Array) -> Array:
@@ -143,15 +160,13 @@ class Search:
 
     def _hop(self, piece: Index, push: Array, one: Mask) -> Index:
         """Where to look next: as far along as the point lies, or on the very next parabola that has a length."""
-        curve, lying = self.curve, self.curve.lying
-        ahead = push > 0
-        end = curve.lengths[piece] + np.where(ahead, curve.ways[piece], 0.0)
-        far = curve.place(end + np.where(one, 0.0, push))
-        after = np.searchsorted(lying, piece, side="right")
-        before = np.searchsorted(lying, piece, side="left") - 1
-        at = np.searchsorted(lying, far, side="right") - 1
-        at = np.where(ahead, np.where(one, after, np.maximum(at, after)), np.where(one, before, np.minimum(at, before)))
-        return lying[np.clip(at, 0, len(lying) - 1)]
+        curve = self.curve
+        ahead, size = push > 0, curve.ways[piece]
+        end = curve.lengths[piece] + np.where(ahead, size, 0.0)
+        at = curve.upto[curve.place(end + np.where(one, 0.0, push))] - 1
+        after = curve.upto[piece]
+        at = np.where(ahead, np.maximum(at, after), np.minimum(at, after - (size > 0) - 1))
+        return curve.lying[np.clip(at, 0, len(curve.lying) - 1)]
 
     # -- where the path turns -----------------------------------------------------------------------------------------
 
@@ -191,7 +206,8 @@ class Search:
         way = np.clip(expected[rows[owner]], self.curve.lengths[piece], self.curve.way(piece, np.ones(len(piece))))
         hopeful = np.flatnonzero(np.hypot(least, ALONG * (way - expected[rows[owner]])) < cost[owner])
         owner, piece = owner[hopeful], piece[hopeful]
-        share, gap, _ = _newton(self.curve, picked(points, rows[owner]), piece, share[hopeful])
+        here = np.ascontiguousarray(picked(points, rows[owner]).T)
+        share, gap, _ = _newton(self.curve, here, piece, share[hopeful])
         costs = np.hypot(gap, ALONG * (self.curve.way(piece, share) - expected[rows[owner]]))
         order = np.lexsort((costs, owner))
         best = order[np.unique(owner[order], return_index=True)[1]]
@@ -199,31 +215,38 @@ class Search:
         found.put(rows[owner[best]], Nearest(piece[best], share[best], gap[best]))
 
 
-def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Array, Array, Array]:
-    """The nearest points to `points` (n, 3) on parabolas (n,), from shares (n,) of them.
+def _newton(curve: Curve, points: Array, piece: Index, share: Array, steps: int = STEPS) -> tuple[Array, Array, Array]:
+    """The nearest points to `points` (3, n) on parabolas (n,), from shares (n,) of them.
 
     Returns the shares, the distances, and how far beyond their ends the way to the points goes on: mm, negative before
     their begin, 0 if it ends on them.
     """
-    slope, bend = picked(curve.slope, piece), picked(curve.bend, piece)
-    u, left = share, points - picked(curve.begin, piece) - share[:, None] * (slope + share[:, None] * bend)
-    slope = slope + (2 * u)[:, None] * bend
-    for _ in range(STEPS):
-        square = np.einsum("ij,ij->i", slope, slope)
-        bowed = square - 2 * np.einsum("ij,ij->i", left, bend)
-        bowed = np.where(bowed > square / 4, bowed, square)
-        wanted = u + np.einsum("ij,ij->i", left, slope) / np.where(bowed > 0, bowed, 1.0)
-        new = np.clip(wanted, 0.0, 1.0)
-        step = (new - u)[:, None]
-        left = left - step * (slope + step * bend)
-        slope = slope + 2 * step * bend
-        moved, u = np.abs(new - u) * np.sqrt(square), new
-        if moved.max(initial=0.0) < CLOSE:
-            break
-    ahead = np.einsum("ij,ij->i", left, slope)
-    size = length(slope)
-    push = np.where(((u == 1) & (ahead > 0)) | ((u == 0) & (ahead < 0)), ahead / np.where(size > 0, size, 1.0), 0.0)
-    return u, length(left), push
+    begin, slope, bend = curve.parabolas.take(piece, axis=1).reshape(3, 3, -1)
+    left = points - begin - share * (slope + share * bend)
+    slope = slope + 2 * share * bend
+    square = _dot(slope, slope)
+    size = np.sqrt(square)
+    gap, ahead = np.sqrt(_dot(left, left)), _dot(left, slope) / np.where(size > 0, size, 1.0)
+    outside = ((share == 1) & (ahead > 0)) | ((share == 0) & (ahead < 0))
+    push = np.where(outside, ahead, 0.0)
+    rows = np.flatnonzero((np.abs(ahead) > CLOSE) & ~outside)
+    if not rows.size or not steps:
+        return share, gap, push
+    bowed = (square - 2 * _dot(left, bend))[rows]
+    square = square[rows]
+    bowed = np.where(bowed > square / 4, bowed, square)
+    new = np.clip(share[rows] + ahead[rows] * size[rows] / bowed, 0.0, 1.0)
+    share = share.copy()
+    better = _newton(curve, points.take(rows, axis=1), piece[rows], new, steps - 1)
+    for column, part in zip((share, gap, push), better, strict=True):
+        column[rows] = part
+    return share, gap, push
+
+
+def _dot(one: Array, other: Array) -> Array:
+    """The products (n,) of vectors (3, n)."""
+    found: Array = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return found
 
 
 def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]:
