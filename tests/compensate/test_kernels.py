@@ -12,7 +12,7 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
-from ncfix.compensate.curve import Curve, Samples
+from ncfix.compensate.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.ends import corrected
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import _look, bounds, uneasy_starts
@@ -69,7 +69,7 @@ def wandering(rng: np.random.Generator, k: int, off: float) -> Curve:
     hole = size == 0
     begin[hole], opens[hole] = end[hole], True
     middle = (begin + end) / 2 + 0.05 * size[:, None] * shift.normal(size=(k, 3))
-    return Curve(np.arange(k), np.zeros(k), np.ones(k), begin, middle, end, opens)
+    return Curve(np.arange(k), np.zeros(k), np.ones(k), begin, middle, end, opens, arc_lengths(begin, middle, end))
 
 
 @pytest.mark.parametrize("near", [1e-5, 0.01, np.inf])

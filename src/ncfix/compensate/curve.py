@@ -9,25 +9,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners, places
-from ncfix.compensate.rows import every, finite, picked, some
-from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
+from ncfix.compensate.rows import finite, picked
 from ncfix.compensate.simulation import batches
-from ncfix.program.moves import Kind
+from ncfix.compensate.stretches import Stretches
 
 Tip = Callable[[Index, Array], Array]
-
-ROUND, TWISTED = 1e-6, 2e-5
-"""mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""
-QUARTIC, CUBIC = 1 / 512, 3**0.5 / 72
-"""A parabola through begin, middle and end of an arc of angle a and radius r is r a^4 / 512 from it, along it up to
-r a^3 sqrt(3) / 216, which does not matter. A way b besides, by another axis, adds no more than b a^2 sqrt(3) / 72: the
-third derivative of a point that turns and is moved is -a^2 times the first, and at most 3 a^2 b."""
-JUMP = 1e-6
-"""Fraction of a motion on both sides of a kink or jump of the errors where a parabola ends."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +26,7 @@ class Curve:
     start, stop         (k,) the fractions of the motion from which to which it goes
     begin, middle, end  (k, 3) mm: where it begins, half-way, and ends
     opens               (k,) it does not begin where the one before ends
+    ways                (k,) mm, how long it is
     first               mm, the way along the whole path to the first of them
     """
 
@@ -48,14 +37,14 @@ class Curve:
     middle: Array
     end: Array
     opens: Mask
+    ways: Array
     first: float = 0.0
 
     @classmethod
-    def of(cls, intent: Intent, tip: Tip, after: int = 0) -> Curve:
-        """What motions from row `after` on cut, by a function that gives the tip; where it has none is left out."""
-        rows, start, stop = _stretches(intent, after)
-        opens = _opening(intent, rows, start)
-        fresh = np.flatnonzero(opens)
+    def through(cls, stretches: Stretches, tip: Tip) -> Curve:
+        """Along stretches of motions, by a function that gives the tip; where it has none is left out."""
+        rows, start, stop = stretches.rows, stretches.start, stretches.stop
+        fresh = np.flatnonzero(stretches.opens)
         at = np.concatenate([rows, rows, rows[fresh]])
         fraction = np.concatenate([(start + stop) / 2, stop, start[fresh]])
         parts = [tip(at[part], fraction[part]) for part in batches(len(at))]
@@ -64,19 +53,13 @@ class Curve:
         begin = np.empty_like(end)
         begin[1:] = end[:-1]
         begin[fresh] = points[2 * len(rows) :]
-        there = finite(begin) & finite(middle) & finite(end)
+        there, opens = finite(begin) & finite(middle) & finite(end), stretches.opens.copy()
         opens[1:] |= ~there[:-1]
-        curve = cls(rows, start, stop, begin, middle, end, opens)
+        curve = cls(rows, start, stop, begin, middle, end, opens, arc_lengths(begin, middle, end))
         return curve if there.all() else curve.taken(there)
 
     def __len__(self) -> int:
         return len(self.rows)
-
-    @cached_property
-    def ways(self) -> Array:
-        """The length of each, (k,) mm: by Simpson's rule, as it were, from one chord and from two."""
-        halves = distance(self.begin, self.middle) + distance(self.middle, self.end)
-        return (4 * halves - distance(self.begin, self.end)) / 3
 
     @cached_property
     def gaps(self) -> Array:
@@ -203,6 +186,13 @@ class Samples:
         return Samples(*(np.concatenate([getattr(each, name) for each in (self, other)]) for name in names))
 
 
+def arc_lengths(begin: Array, middle: Array, end: Array) -> Array:
+    """Of parabolas through points (k, 3), (k,) mm: by Simpson's rule, as it were, from one chord and from two."""
+    halves = distance(begin, middle) + distance(middle, end)
+    lengths: Array = (4 * halves - distance(begin, end)) / 3
+    return lengths
+
+
 def distance(one: Array, other: Array) -> Array:
     """How far points (n, 3) are from others, (n,)."""
     return length(one - other)
@@ -219,77 +209,3 @@ def _unit(vectors: Array) -> Array:
     size = length(vectors)
     unit: Array = vectors / np.where(size > 0, size, 1.0)[:, None]
     return unit
-
-
-def _stretches(intent: Intent, after: int) -> tuple[Index, Array, Array]:
-    """What is cut, in stretches: motion (k,), and the fractions of it from which to which each goes (k,)."""
-    moves = intent.moves
-    known = finite(moves.end) & moves.cuts
-    known[:after] = False
-    hole = moves.kind == Kind.CYCLE
-    along = np.flatnonzero(known & ~hole & finite(moves.start))
-    counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)
-    turning = reversals(intent, along, counts, between)
-    if turning[0].size:
-        sides = [(turning[0], np.clip(turning[1] + side, 0.0, 1.0)) for side in (-JUMP, JUMP)]
-        counts, between = merged(len(along), (owners(counts), between), *sides)
-    pieces = counts + 1
-    owner, ends = owners(pieces), np.ones(int(pieces.sum()))
-    last = np.cumsum(pieces) - 1
-    ends[np.delete(np.arange(len(ends)), last)] = between
-    starts = np.concatenate([[0.0], ends[:-1]])[: len(ends)]
-    starts[last - pieces + 1] = 0.0
-    at_end = np.flatnonzero(known & hole)
-    rows = np.concatenate([along[owner], at_end])
-    order = np.argsort(rows, kind="stable")
-    ones = np.ones(len(at_end))
-    return rows[order], np.concatenate([starts, ones])[order], np.concatenate([ends, ones])[order]
-
-
-def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:
-    """Fractions between which parabolas are near enough to the path: counts (k,) and flat fractions, ends left out."""
-    often = bends(intent, rows)
-    often[DENSITY * often >= MOST] = 0.0
-    counts = np.maximum(np.ceil(DENSITY / 2 * often), _round_axes(intent, rows))
-    found = np.clip(counts, 1, MOST_SHOWN).astype(np.intp) - 1
-    return found, even(found)
-
-
-def _round_axes(intent: Intent, rows: Index) -> Array:
-    """How many parabolas it takes for motions (k,) that lead the tip round an axis, (k,)."""
-    moves, machine = intent.moves, intent.machine
-    angle, radius, besides = (np.zeros(len(rows)) for _ in range(3))
-    way = picked(moves.end, rows) - picked(moves.start, rows)
-    arcs = np.flatnonzero(intent.segments.arc[rows])
-    if arcs.size:
-        angle[arcs], radius[arcs] = np.abs(moves.sweep[rows[arcs]]), arc_radii(intent, rows[arcs])
-        besides[arcs] = np.abs(np.einsum("ij,ij->i", way[arcs[:, None], intent.columns], moves.normal[rows[arcs]]))
-    turned = np.abs(way[:, machine.rotary])
-    swung = np.flatnonzero(some(turned > 0) & ~moves.tcp[rows])
-    if swung.size:
-        turned = turned[swung]
-        radius[swung] = np.maximum(radius[swung], reach(intent, rows[swung]))
-        besides[swung] += radius[swung] * (angle[swung] + turned.sum(axis=1) - turned.max(axis=1))
-        besides[swung] += np.abs(way[swung][:, ~machine.rotary]).sum(axis=1)
-        angle[swung] += turned.sum(axis=1)
-    squared = angle**2
-    count = np.maximum(
-        np.cbrt(CUBIC * besides * squared / TWISTED), np.sqrt(squared * np.sqrt(QUARTIC * radius / ROUND))
-    )
-    found: Array = np.ceil(count)
-    return found
-
-
-def _opening(intent: Intent, rows: Index, start: Array) -> Mask:
-    """(k,) stretches of motions that may begin elsewhere than the one before ends."""
-    opens: Mask = start == 0
-    opens |= intent.moves.kind[rows] == Kind.CYCLE
-    if not len(rows) or intent.arrival is not None:
-        return opens
-    moves = intent.moves
-    next_one = np.flatnonzero(opens[1:]) + 1
-    row, before = rows[next_one], rows[next_one - 1]
-    same = every(picked(moves.start, row) == picked(moves.end, before)) & (moves.tcp[row] == moves.tcp[before])
-    same &= (moves.tool_length[row] == moves.tool_length[before]) & (moves.kind[row] != Kind.CYCLE)
-    opens[next_one[same]] = False
-    return opens

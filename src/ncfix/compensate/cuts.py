@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import actual_tip, unseen
+from ncfix.compensate.stretches import Stretches
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
@@ -64,17 +66,13 @@ class Cut:
             first, stop, _ = rows.indices(len(intent.moves))
             return lines[found[(found >= first) & (found < stop)]]
 
-        actual = as_made(intent)
-        intended = in_lines(Curve.of(intent, intent.tip)) if meant else None
+        stretches = Stretches.of(intent)
+        actual = Curve.through(stretches, partial(actual_tip, intent))
+        intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
         flank = Flank.of(intent, actual)
         flank = flank and flank.taken(counted(actual))
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
         return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last)
-
-
-def as_made(done: Intent) -> Curve:
-    """The path of motions on the real machine."""
-    return Curve.of(done, lambda rows, fraction: actual_tip(done, rows, fraction))
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.compensate.curve import Curve, Samples
+from ncfix.compensate.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
@@ -96,7 +96,7 @@ def _all_aside(done: Intent, actual: Curve, motions: Mask, motion: Mask) -> Curv
         columns[name] = getattr(actual, name).copy()
         columns[name][which] = other_side(done, rows, fraction[which], motions[rows])
     opens = actual.opens | motion | np.append(False, motion[:-1])
-    return replace(actual, **columns, opens=opens)
+    return replace(actual, **columns, opens=opens, ways=arc_lengths(**columns))
 
 
 def uncertain(intent: Intent, rows: Index, fraction: Array) -> Mask:

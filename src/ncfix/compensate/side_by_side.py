@@ -61,7 +61,7 @@ class Track:
         """Of a path that begins."""
         none = np.zeros(0)
         places = np.zeros((0, 3))
-        return cls(Curve(np.zeros(0, dtype=np.intp), none, none, places, places, places, np.zeros(0, dtype=bool)))
+        return cls(Curve(np.zeros(0, dtype=np.intp), none, none, places, places, places, np.zeros(0, dtype=bool), none))
 
     @property
     def count(self) -> int:
@@ -101,12 +101,12 @@ class Track:
 class Along:
     """How far a path is from another one, added up.
 
-    limit   mm; where it is farther is noted
+    limit   mm; lines in which it is farther are noted
     where   the line of the largest gap
     beyond  lines with gaps beyond the limit, by parts
     """
 
-    limit: float
+    limit: float = np.inf
     max: float = 0.0
     where: int | None = None
     squares: float = 0.0
@@ -147,12 +147,14 @@ class Along:
 class Match:
     """Looks from one path to another for what is nearest, as far as both are at hand.
 
+    near   as `Search` has it
     done   parabolas of the path that have been looked at
     ahead  how much farther one is along the other path at the end of these, mm
     """
 
     path: Track
     other: Track
+    near: float
     along: Along
     done: int = 0
     ahead: float = 0.0
@@ -168,7 +170,7 @@ class Match:
         self.done += stop - start
         part = self.path.part(start, stop)
         samples = Samples.of(part)
-        search = Search(other.curve, self.along.limit, self.ahead, other.dropped == 0, other.complete)
+        search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         first = search.around(part.begin[:1], part.lengths[:1] + self.ahead).piece
         found = search.all(samples.points, part.way(samples.piece, samples.share))
         self.ahead = search.ahead
@@ -206,11 +208,10 @@ class SideBySide:
     matches: tuple[Match, Match, Match] = field(init=False)
 
     def __post_init__(self) -> None:
-        before, there, back = (Along(self.limit) for _ in range(3))
         self.matches = (
-            Match(self.unfixed, self.intended, before),
-            Match(self.fixed, self.intended, there),
-            Match(self.intended, self.fixed, back),
+            Match(self.unfixed, self.intended, self.limit, Along()),
+            Match(self.fixed, self.intended, self.limit, Along(self.limit)),
+            Match(self.intended, self.fixed, self.limit, Along(self.limit)),
         )
 
     @property
