@@ -72,7 +72,8 @@ def test_the_tip_gets_there(root: Path) -> None:
         at[:, linear(machine)] = aim.place
         meant = machine.tip(q, given.tool_length)
         assert np.abs(machine.actual_tip(at, given) - meant).max() < NM
-        np.testing.assert_allclose(aim.gap, machine.actual_tip(q, given) - meant, rtol=0, atol=1e-12)
+        gap = machine.actual_tip(q, given) - meant
+        np.testing.assert_allclose(aim.off, np.linalg.norm(gap, axis=1), rtol=0, atol=1e-12)
         beyond = meant + np.array([0.05, -0.02, 0.01])
         at[:, linear(machine)] = machine.aim(q, linear(machine), given, beyond).place
         assert np.abs(machine.actual_tip(at, given) - beyond).max() < NM
@@ -99,7 +100,7 @@ def test_compiled_and_plain(root: Path) -> None:
         compiled = machine.actual_tip(q, given), machine.aim(q, linear(machine), given)
         fast.disengage()
         assert np.array_equal(plain[0], compiled[0], equal_nan=True)
-        for name in ("place", "arrived", "gap"):
+        for name in ("place", "arrived", "off"):
             assert np.array_equal(getattr(plain[1], name), getattr(compiled[1], name), equal_nan=True), name
         assert not plain[1].arrived[17]
         assert plain[1].arrived.sum() == 999

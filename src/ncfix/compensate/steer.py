@@ -65,5 +65,4 @@ def steered(machine: Machine, q: Array, target: Array | None, state: State) -> C
     aim = machine.aim(q, (x, y, z), state, target)
     result = q.copy()
     result[:, columns] = aim.place
-    before: Array = np.sqrt(np.einsum("ij,ij->i", aim.gap, aim.gap))
-    return Correction(result, aim.arrived, np.zeros(len(q), dtype=bool), before)
+    return Correction(result, aim.arrived, np.zeros(len(q), dtype=bool), aim.off)

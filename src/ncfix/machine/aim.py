@@ -1,12 +1,12 @@
 """Bringing the tool tip of a machine with errors to a point by its linear axes: Newton's method on the exact model.
 
-The derivative is that of the perfect machine: errors change it by parts in ten thousand only, so each pass gains about
-as many digits.
+The derivative is that of the machine without small motions: they change it by parts in ten thousand only, so each pass
+gains about as many digits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,12 +20,14 @@ from ncfix.machine.state import Poses
 from ncfix.machine.steps import SMALL, dot, has_arrived, volume
 
 if TYPE_CHECKING:
-    from ncfix.machine.route import Route
+    from ncfix.machine.route import Approach, Route
 
 Mask = NDArray[np.bool_]
 Turns = tuple[Array, Array]
-Tips = Callable[[Poses, Turns], Array]
-"""Poses with their sines -> the tip (3, n)."""
+Tips = Callable[[Poses, Turns], tuple[Array, Array]]
+"""Poses with their sines -> the tip (3, n), and the largest squared angle of a small motion (n,)."""
+Vector = Sequence[float | Array]
+"""Along x, y, z: columns (n,), or numbers where all poses have the same."""
 
 CLOSE = 1e-6
 """mm; a tip that is expected to be closer to its target than 1 nm has arrived."""
@@ -42,70 +44,104 @@ class Aim:
 
     place    (3, n) of the linear axes, mm; where it began if they cannot bring the tip there
     arrived  (n,) the tip is where it should be, to 1 nm
-    gap      (3, n) actual tip minus target where it began, mm
+    off      (n,) mm: how far off the tip was where it began
     """
 
     place: Array
     arrived: Mask
-    gap: Array
+    off: Array
+
+    @classmethod
+    def of(cls, n: int) -> Aim:
+        """Room for n poses."""
+        return cls(np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty(n))
+
+    def put(self, rows: slice | NDArray[np.intp], other: Aim) -> None:
+        """Put in some poses."""
+        self.place[:, rows], self.arrived[rows], self.off[rows] = other.place, other.arrived, other.off
 
 
 def aimed(
-    poses: Poses, axes: tuple[int, int, int], perfect: Route, turns: Turns, tips: Tips, target: Array | None
-) -> Aim:
-    """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
+    poses: Poses,
+    axes: tuple[int, int, int],
+    turns: Turns,
+    tips: Tips,
+    ways: Sequence[Vector],
+    goal: Array,
+    passes: int = PASSES,
+) -> tuple[Aim, Array]:
+    """Move three linear axes until the tip is at `goal` (3, n).
 
-    axes     the columns of X, Y and Z
-    perfect  the route without errors
-    turns    sines and versines of the rotary axes, which do not change
-    tips     the tip of the machine with errors
+    axes   the columns of X, Y and Z
+    turns  sines and versines of the rotary axes, which do not change
+    tips   the tip of the machine with errors
+    ways   how the tip follows each of the axes without them, mm per mm
+
+    Also the largest squared angle of a small motion that was met with (n,).
     """
-    goal = perfect.tips(poses, turns)[0] if target is None else target
-    ways = perfect.follows(poses, axes, turns)
     with np.errstate(all="ignore"):
-        whole, *normals = volume(*(ways[:, i] for i in range(3)))
-        back = np.array(normals) * (1 / whole)
+        whole, *normals = volume(*([np.atleast_1d(part) for part in way] for way in ways))
+        back = [[part * (1 / whole) for part in normal] for normal in normals]
         usable = ~(np.abs(whole) < FLAT) & np.isfinite(goal.sum(0) + poses.positions.sum(0))
-    q, gap = poses.positions.copy(), np.zeros_like(goal)
-    arrived, before = np.zeros(q.shape[1], dtype=bool), np.zeros(q.shape[1])
+    q, (off, before, largest) = poses.positions.copy(), np.zeros((3, len(usable)))
+    arrived = np.zeros(len(usable), dtype=bool)
     active = np.flatnonzero(usable)
-    for number in range(PASSES):
+    for number in range(passes):
         if not active.size:
             break
-        everyone = active.size == q.shape[1]
+        everyone = active.size == len(usable)
         rows: slice | NDArray[np.intp] = slice(None) if everyone else active
         here = replace(poses, positions=q) if everyone else taken(poses, q, active)
-        off = tips(here, turns if everyone else (turns[0][:, active], turns[1][:, active])) - goal[:, rows]
-        if number == 0:
-            gap[:, rows] = off
+        tip, angle = tips(here, turns if everyone else (turns[0][:, active], turns[1][:, active]))
+        gap = tip - goal[:, rows]
         for i, axis in enumerate(axes):
-            step = dot(back[i][:, rows], off)
+            step = dot([part if everyone else _rows(part, active) for part in back[i]], gap)
             q[axis, rows] -= step if number < WHOLE_STEPS else step / 2
-        size = np.sqrt(dot(off, off))
+        size = np.sqrt(dot(gap, gap))
+        if number == 0:
+            off[rows] = size
+        largest[rows] = np.maximum(largest[rows], angle)
         done = has_arrived(size, before[rows], CLOSE)
         before[rows] = size
         arrived[active[done]] = True
         active = active[~done]
-    return Aim(q[list(axes)], arrived, gap)
+    return Aim(q[list(axes)], arrived, off), largest
 
 
-def aimed_at_once(
-    poses: Poses, axes: tuple[int, int, int], perfect: Route, route: Route, target: Array | None
-) -> tuple[Aim, Mask]:
-    """As `aimed`, compiled, and which poses (n,) it is not for: they need more passes, or small motions are large."""
+def aimed_ahead(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, NDArray[np.intp]]:
+    """Move three linear axes until the tip is at `target` (3, n); None: where a perfect machine has it.
+
+    What they do not change is undone once, ahead of all passes; so only the rest is gone through in each.
+
+    Also the poses that it is not for: they need more passes, or small motions are large.
+    """
+    many = fast.engaged() and poses.positions.shape[1] > 1
+    aim, largest = (_compiled if many else _by_columns)(poses, perfect, approach, target)
+    return aim, np.flatnonzero(~aim.arrived | (largest >= SMALL))
+
+
+def _by_columns(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, Array]:
+    """The same; also the largest squared angle of a small motion (n,)."""
+    within, behind, turns = approach.within, approach.behind, approach.within.turns(poses)
+    goal = perfect.tips(poses, turns)[0] if target is None else target
+    goal, angle = behind.carried(poses, turns, goal)
+    ways = within.ways(approach.axes, turns)
+    aim, largest = aimed(poses, approach.axes, turns, within.tips, ways, goal, WHOLE_STEPS)
+    return aim, np.maximum(largest, angle)
+
+
+def _compiled(poses: Poses, perfect: Route, approach: Approach, target: Array | None) -> tuple[Aim, Array]:
+    """The same, compiled."""
     from ncfix.machine import kernels
 
-    given, out = route.columns(poses, route.turns(poses)), np.empty((8, poses.positions.shape[1]))
+    within, behind, turns = approach.within, approach.behind, approach.within.turns(poses)
+    routes = perfect.compiled, within.compiled, behind.compiled
+    given = within.columns(poses, turns, behind.terms.given(poses) + within.terms.given(poses))
+    out = np.empty((6, poses.positions.shape[1]))
     goal = np.empty((3, 0)) if target is None else np.ascontiguousarray(target)
-    limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(axes, dtype=np.int64)
-    kernels.aim(perfect.compiled, route.compiled, given, columns, goal, limits, room(route.compiled, given), out)
-    arrived = out[7] > 0
-    return Aim(out[:3], arrived, out[3:6]), ~arrived | (out[6] >= SMALL)
-
-
-def at_once(route: Route, poses: Poses, axes: tuple[int, int, int]) -> bool:
-    """Whether compiled kernels are to take it: nothing that comes from elsewhere changes with the linear axes."""
-    return fast.engaged() and poses.positions.shape[1] > 1 and not route.terms.see(axes)
+    limits, columns = np.array([CLOSE, FLAT, WHOLE_STEPS]), np.array(approach.axes, dtype=np.int64)
+    kernels.aim(*routes, given, columns, goal, limits, room(given, *routes), out)
+    return Aim(out[:3], out[5] > 0, out[3]), out[4]
 
 
 def taken(poses: Poses, q: Array, rows: NDArray[np.intp]) -> Poses:

@@ -16,6 +16,7 @@ from ncfix.machine.loops import (
     add_up,
     carry,
     laid_out,
+    set_off,
     take_up,
     unpacked,
     work_out,
@@ -26,7 +27,7 @@ from ncfix.machine.steps import SHIFT, TURN, Steps, dot, has_arrived, turned, tw
 class Goal(NamedTuple):
     """Where a handful of tips shall be.
 
-    point   (4, .) mm
+    point   (4, .) mm, after the steps that change with the linear axes; and the largest squared angle behind them
     back    (9, .) what takes a gap of the tip to positions of the axes, row after row
     before  (.,) the size of the gap before, mm; -1 if the axes cannot bring the tip there
     """
@@ -38,7 +39,8 @@ class Goal(NamedTuple):
 
 def aim(
     perfect: Packed,
-    route: Packed,
+    within: Packed,
+    behind: Packed,
     columns: Columns,
     axes: Ints,
     target: Array,
@@ -48,29 +50,37 @@ def aim(
 ) -> None:
     """Newton's method for all poses: as `aim.aimed`, by whole steps.
 
-    axes    the columns of X, Y and Z
-    target  (3, n) mm; (3, 0): where a perfect machine has the tip
-    limits  when a tip has arrived, mm, which volume of its motions is none, and how many steps there are
-    out     (8, n): positions of the axes, gaps at the beginning, mm, largest squared angles of small motions, and
-            whether the tip has arrived
+    within, behind  the two of `route.Approach`; the other functions in `columns` are of the second, then of the first
+    axes            the columns of X, Y and Z
+    target          (3, n) mm; (3, 0): where a perfect machine has the tip
+    limits          when a tip has arrived, mm, which volume of its motions is none, and how many steps there are
+    out             (6, n): positions of the axes, how far off the tip is at the beginning, mm, largest squared angles
+                    of small motions, and whether the tip has arrived
     """
     nominal, _ = unpacked(perfect[0], perfect[1])
-    steps, functions = unpacked(route[0], route[1])
-    hand, spare = laid_out(work, columns, len(functions.order), len(steps.kind))
+    steps, functions = unpacked(within[0], within[1])
+    undone, more = unpacked(behind[0], behind[1])
+    most = max(len(functions.order), len(more.order)), max(len(steps.kind), len(undone.kind), len(nominal.kind))
+    hand, spare = laid_out(work, columns, most[0], most[1])
     goal = Goal(spare[:4], spare[4:13], spare[13])
     close, flat, passes = limits[0], limits[1], limits[2]
     n = columns.q.shape[1]
     for begin in range(0, n, HANDFUL):
         count = min(HANDFUL, n - begin)
         take_up(columns, begin, count, hand)
-        left = set_out(nominal, axes, hand, count, target, begin, flat, goal)
-        for i in range(3, 8):
-            for k in range(count):
-                out[i, np.uint64(begin + k)] = 0.0
+        set_goal(nominal, hand, count, target, begin, goal.point)
+        used = work_out(more, hand, count, 0)
+        add_up(more, hand, count)
+        carry(undone, hand, count, goal.point)
+        left = set_out(steps, axes, hand, count, flat, goal)
+        for k in range(count):
+            at = np.uint64(begin + k)
+            out[3, at], out[4, at], out[5, at] = 0.0, goal.point[3, k], 0.0
         number = 0
         while left and number < passes:
-            work_out(functions, hand, count)
+            work_out(functions, hand, count, used)
             add_up(functions, hand, count)
+            set_off(steps, hand, count, hand.tip)
             carry(steps, hand, count, hand.tip)
             left -= step_closer(axes, close, number == 0, hand, count, goal, begin, out)
             number += 1
@@ -79,18 +89,21 @@ def aim(
                 out[i, np.uint64(begin + k)] = hand.q[axes[i], k]
 
 
-def set_out(
-    perfect: Steps, axes: Ints, hand: Hand, count: int, target: Array, begin: int, flat: float, goal: Goal
-) -> int:
-    """Put down where the tips shall be and how they follow the axes; how many can be brought there at all."""
+def set_goal(perfect: Steps, hand: Hand, count: int, target: Array, begin: int, point: Array) -> None:
+    """Put down where the tips shall be, (4, .)."""
     if target.shape[1]:
-        for i in range(3):
-            for k in range(count):
-                goal.point[i, k] = target[i, np.uint64(begin + k)]
+        for k in range(count):
+            at = np.uint64(begin + k)
+            point[0, k], point[1, k], point[2, k], point[3, k] = target[0, at], target[1, at], target[2, at], 0.0
     else:
-        carry(perfect, hand, count, goal.point)
+        set_off(perfect, hand, count, point)
+        carry(perfect, hand, count, point)
+
+
+def set_out(steps: Steps, axes: Ints, hand: Hand, count: int, flat: float, goal: Goal) -> int:
+    """Put down how the tips follow the axes; how many can be brought to their goals at all."""
     for i in range(3):
-        follow(perfect, axes[i], hand, count, goal.back[3 * i : 3 * i + 3])
+        follow(steps, axes[i], hand, count, goal.back[3 * i : 3 * i + 3])
     whole, total, left = hand.tip[0], hand.tip[1], 0
     for k in range(count):
         a = goal.back[0, k], goal.back[1, k], goal.back[2, k]
@@ -120,21 +133,19 @@ def step_closer(
     for i in range(3):
         for k in range(count):
             gap[i, k] = gap[i, k] - goal.point[i, k]
-        if begins:
-            for k in range(count):
-                out[3 + i, np.uint64(begin + k)] = gap[i, k] if goal.before[k] >= 0 else 0.0
     for i in range(3):
         q, row = hand.q[axes[i]], goal.back[3 * i : 3 * i + 3]
         for k in range(count):
             step = dot((row[0, k], row[1, k], row[2, k]), (gap[0, k], gap[1, k], gap[2, k]))
-            q[k] = q[k] - step if goal.before[k] >= 0 and out[7, np.uint64(begin + k)] == 0 else q[k]
+            q[k] = q[k] - step if goal.before[k] >= 0 and out[5, np.uint64(begin + k)] == 0 else q[k]
     for k in range(count):
         at, before = np.uint64(begin + k), goal.before[k]
         size = np.sqrt(dot((gap[0, k], gap[1, k], gap[2, k]), (gap[0, k], gap[1, k], gap[2, k])))
-        active = before >= 0 and out[7, at] == 0
-        out[6, at] = max(out[6, at], gap[3, k]) if active else out[6, at]
+        active = before >= 0 and out[5, at] == 0
+        out[3, at] = size if begins and active else out[3, at]
+        out[4, at] = max(out[4, at], gap[3, k]) if active else out[4, at]
         there = active and has_arrived(size, before, close)
-        out[7, at] = 1.0 if there else out[7, at]
+        out[5, at] = 1.0 if there else out[5, at]
         goal.before[k] = size if active else before
         arrived += there
     return arrived
@@ -182,6 +193,7 @@ def placed(
     for begin in range(0, n, HANDFUL):
         count = min(HANDFUL, n - begin)
         take_up(columns, begin, count, hand)
+        set_off(before, hand, count, hand.tip)
         carry(before, hand, count, hand.tip)
         for i in range(3):
             for k in range(count):
@@ -226,5 +238,5 @@ def bring_back(steps: Steps, first: int, axes: Ints, hand: Hand, count: int, poi
                 point[2, k] = point[2, k] - dz * way
 
 
-HELPERS = (set_out, step_closer, follow, first_of, is_one_of, bring_back)
+HELPERS = (set_goal, set_out, step_closer, follow, first_of, is_one_of, bring_back)
 """Loops that others are made of."""

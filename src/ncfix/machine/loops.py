@@ -112,9 +112,9 @@ def unpacked(ints: Ints, reals: Array) -> tuple[Steps, Functions]:
     return steps, functions
 
 
-def room(route: Packed, columns: Columns) -> Array:
-    """Room for a handful of poses, and `SPARE` rows more, as `laid_out` divides it."""
-    m, f = int(route[0][0]), int(route[0][2])
+def room(columns: Columns, *routes: Packed) -> Array:
+    """Room for a handful of poses on any of some routes, and `SPARE` rows more, as `laid_out` divides it."""
+    m, f = (max(int(route[0][at]) for route in routes) for at in (0, 2))
     rows = len(columns.q) + 2 * len(columns.sine) + len(columns.others) + f + PARTS * m
     count = (rows + 5 + SPARE) * HANDFUL
     memory = np.zeros(count + LINE)
@@ -123,7 +123,7 @@ def room(route: Packed, columns: Columns) -> Array:
 
 
 def laid_out(work: Array, columns: Columns, f: int, m: int) -> tuple[Hand, Array]:
-    """The parts of the room, and the rows to spare."""
+    """The parts of the room for f functions and m small motions, and the rows to spare."""
     axes, sines, others = len(columns.q), len(columns.sine), len(columns.others)
     a = axes + 2 * sines
     b = a + others + f
@@ -142,21 +142,27 @@ def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) ->
     for begin in range(0, n, HANDFUL):
         count = min(HANDFUL, n - begin)
         take_up(columns, begin, count, hand)
-        work_out(functions, hand, count)
+        work_out(functions, hand, count, 0)
         add_up(functions, hand, count)
+        set_off(steps, hand, count, hand.tip)
         carry(steps, hand, count, hand.tip)
         for i in range(4):
             for k in range(count):
                 out[i, np.uint64(begin + k)] = hand.tip[i, k]
 
 
-def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
-    """Where the tips of a handful of poses go, (4, .): as `steps.carried`."""
-    start, d, p, center = steps.start, steps.direction, steps.point, steps.center
+def set_off(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
+    """Where the tips of a handful of poses are before all steps, (4, .): as `steps.at_tip`."""
+    start = steps.start
     for k in range(count):
         length = hand.length[k]
         tip[0, k], tip[1, k] = start[0] + start[3] * length, start[1] + start[4] * length
         tip[2, k], tip[3, k] = start[2] + start[5] * length, 0.0
+
+
+def carry(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
+    """Where points of a handful of poses go, (4, .): as `steps.carried`."""
+    d, p, center = steps.direction, steps.point, steps.center
     for i in range(len(steps.kind)):
         kind, axis, j = steps.kind[i], steps.axis[i], 3 * i
         dx, dy, dz, px, py, pz = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
@@ -234,9 +240,11 @@ def copy(rows: Array, begin: int, count: int, into: Array) -> None:
             into[i, k] = rows[i, np.uint64(begin + k)]
 
 
-def work_out(functions: Functions, hand: Hand, count: int) -> None:
-    """The functions at a handful of poses: as `steps.work_out_functions`; the tips lend their room to it."""
-    used = 0
+def work_out(functions: Functions, hand: Hand, count: int, used: int) -> int:
+    """The functions at a handful of poses: as `steps.work_out_functions`; the tips lend their room to it.
+
+    used  how many of those that come from elsewhere are for other functions; those after them are added to it
+    """
     for g in range(len(functions.family)):
         if functions.family[g] == GIVEN:
             for f in range(functions.first[g], functions.first[g + 1]):
@@ -247,6 +255,7 @@ def work_out(functions: Functions, hand: Hand, count: int) -> None:
             powers(functions, g, hand, count)
         else:
             waves(functions, g, hand, count)
+    return used
 
 
 def powers(functions: Functions, g: int, hand: Hand, count: int) -> None:
@@ -299,6 +308,7 @@ def add_up(functions: Functions, hand: Hand, count: int) -> None:
 HELPERS = (
     unpacked,
     laid_out,
+    set_off,
     carry,
     nudge,
     take_up,

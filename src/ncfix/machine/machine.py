@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ncfix.machine import bending, fingerprint, jacobian, linear, se3
-from ncfix.machine.aim import Aim, aimed, aimed_at_once, at_once, taken
+from ncfix.machine.aim import Aim, aimed, aimed_ahead, taken
 from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
 from ncfix.machine.bow import Bow, bow_of
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects
 from ncfix.machine.forward import Chain, build_chain, carry
 from ncfix.machine.jacobian import Jacobians
-from ncfix.machine.route import Route, Turns, route_of
+from ncfix.machine.route import Approach, Route, Turns, approach_of, route_of
 from ncfix.machine.se3 import Array
 from ncfix.machine.signals import Signal, inputs_of, with_lags
 from ncfix.machine.state import Poses, State, flatten, poses_first
@@ -111,6 +111,10 @@ class Machine:
     @cached_property
     def _perfect_route(self) -> Route | None:
         return route_of(self.axes, self.tool, self._chain.joints, None, self.workpiece_offset)
+
+    @cached_property
+    def _approach(self) -> Approach | None:
+        return approach_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
 
     @cached_property
     def hash(self) -> str:
@@ -224,34 +228,31 @@ class Machine:
         """
         _, poses = self._poses(q, state, self._model)
         goal = None if target is None else np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
-        n = poses.positions.shape[1]
-        place, arrived, gap = np.empty((3, n)), np.empty(n, dtype=np.bool_), np.empty((3, n))
+        found = Aim.of(poses.positions.shape[1])
         for part, chunk in poses.chunks():
-            found = self._aim(chunk, axes, None if goal is None else goal[:, part])
-            place[:, part], arrived[part], gap[:, part] = found.place, found.arrived, found.gap
-        return Aim(place.T, arrived, gap.T)
+            found.put(part, self._aim(chunk, axes, None if goal is None else goal[:, part]))
+        return Aim(found.place.T, found.arrived, found.off)
 
     def _aim(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
-        route = self._route
-        if route is None or not at_once(route, poses, axes):
-            return self._aim_plainly(poses, axes, target)
-        assert self._perfect_route is not None
-        found, rest = aimed_at_once(poses, axes, self._perfect_route, route, target)
-        rows = np.flatnonzero(rest)
+        approach, perfect = self._approach, self._perfect_route
+        if approach is None or perfect is None or approach.axes != axes:
+            return self._aim_at_length(poses, axes, target)
+        found, rows = aimed_ahead(poses, perfect, approach, target)
         if rows.size:
             goal = None if target is None else target[:, rows]
-            again = self._aim_plainly(taken(poses, poses.positions, rows), axes, goal)
-            found.place[:, rows], found.arrived[rows], found.gap[:, rows] = again.place, again.arrived, again.gap
+            found.put(rows, self._aim_at_length(taken(poses, poses.positions, rows), axes, goal))
         return found
 
-    def _aim_plainly(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
+    def _aim_at_length(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
         perfect, route = self._perfect_route, self._route
         assert perfect is not None
 
-        def tips(here: Poses, turns: Turns) -> Array:
-            return self._tips_along(route, here, self._model, turns)
+        def tips(here: Poses, turns: Turns) -> tuple[Array, Array]:
+            return self._tips_along(route, here, self._model, turns), np.zeros(1)
 
-        return aimed(poses, axes, perfect, (route or perfect).turns(poses), tips, target)
+        turns = (route or perfect).turns(poses)
+        goal = perfect.tips(poses, turns)[0] if target is None else target
+        return aimed(poses, axes, turns, tips, perfect.ways(axes, turns), goal)[0]
 
     def nominal(self, q: ArrayLike, tool_length: ArrayLike = 0.0) -> Array:
         """`workpiece_from_tool` of a perfect machine, shape (..., 4, 4)."""

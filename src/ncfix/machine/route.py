@@ -20,8 +20,8 @@ from ncfix.machine.forward import Joint, lies_on_axis
 from ncfix.machine.loops import Columns, Packed, packed, room
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
-from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Steps
-from ncfix.machine.terms import Place, Terms, terms_of
+from ncfix.machine.steps import BACK, FORTH, PARTS, SHIFT, TURN, Functions, Number, Steps
+from ncfix.machine.terms import Held, Place, Terms, changes_with, terms_of
 from ncfix.machine.transport import SmallMotion, columns, turn
 
 Turns = tuple[Array, Array]
@@ -48,25 +48,32 @@ class Route:
         if _are_many(n):
             from ncfix.machine import kernels
 
-            given, out = self.columns(poses, turns), np.empty((4, n))
-            kernels.tips(*self.compiled, given, room(self.compiled, given), out)
+            given, out = self.columns(poses, turns, self.terms.given(poses)), np.empty((4, n))
+            kernels.tips(*self.compiled, given, room(given, self.compiled), out)
             return out[:3], out[3]
+        return self.carried(poses, turns, steps.at_tip(self.plain[0], poses.tool_length))
+
+    def carried(self, poses: Poses, turns: Turns, point: Sequence[Array] | Array) -> tuple[Array, Array]:
+        """The same of any point (3, n), not compiled."""
         legs, functions = self.plain
         results, values = [0.0] * len(functions.order), [0.0] * (PARTS * (1 + max(legs.small, default=-1)))
         steps.work_out_functions(functions, poses.positions, *turns, self.terms.given(poses), results)
         steps.add_up(functions, results, values)
-        tip, largest = np.empty((3, n)), np.zeros(n)
-        *point, largest = steps.carried(legs, values, poses.tool_length, poses.positions, *turns, largest)
-        tip[0], tip[1], tip[2] = point
-        return tip, largest
+        n = poses.positions.shape[1]
+        found, largest = np.empty((3, n)), np.zeros(n)
+        found[0], found[1], found[2], largest = steps.carried(legs, values, point, poses.positions, *turns, largest)
+        return found, largest
 
-    def follows(self, poses: Poses, axes: Sequence[int], turns: Turns | None = None) -> Array:
-        """How the tip follows linear axes, (3, axes, n) mm per mm; of a route without errors."""
-        turns = turns or self.turns(poses)
+    def follows(self, poses: Poses, axes: Sequence[int]) -> Array:
+        """How the tip follows linear axes, (3, axes, n) mm per mm; small motions are left out."""
         out = np.empty((3, len(axes), poses.positions.shape[1]))
-        for place, axis in enumerate(axes):
-            out[0, place], out[1, place], out[2, place] = steps.follows(self.plain[0], axis, *turns)
+        for place, way in enumerate(self.ways(axes, self.turns(poses))):
+            out[0, place], out[1, place], out[2, place] = way
         return out
+
+    def ways(self, axes: Sequence[int], turns: Turns) -> list[tuple[Number, Number, Number]]:
+        """The same, a column for each axis and direction; one number where it is alike at all poses."""
+        return [steps.follows(self.plain[0], axis, *turns) for axis in axes]
 
     def placed(self, poses: Poses, axes: Sequence[int], back: Array, target: Array) -> Array:
         """Where linear axes have to be for the tip to be at `target` (3, n) mm, (3, n); of a route without errors.
@@ -76,9 +83,9 @@ class Route:
         if _are_many(target.shape[1]):
             from ncfix.machine import kernels
 
-            given, out = self.columns(poses, self.turns(poses)), np.empty(target.shape)
+            given, out = self.columns(poses, self.turns(poses), []), np.empty(target.shape)
             goal, columns = np.ascontiguousarray(target), np.array(axes, dtype=np.int64)
-            kernels.placed(self.compiled, given, columns, back, goal, room(self.compiled, given), out)
+            kernels.placed(self.compiled, given, columns, back, goal, room(given, self.compiled), out)
             return out
         x, y, z = target
         way = steps.brought_back(self.plain[0], axes, x, y, z, poses.tool_length, poses.positions, self.turns(poses))
@@ -97,10 +104,9 @@ class Route:
                 return None
         return np.array([direction for _, direction in sorted(found)]).T if len(found) == len(axes) else None
 
-    def columns(self, poses: Poses, turns: Turns) -> Columns:
-        """What compiled kernels are given."""
+    def columns(self, poses: Poses, turns: Turns, given: Sequence[Array]) -> Columns:
+        """What compiled kernels are given; `given` are the functions that come from elsewhere."""
         n = poses.positions.shape[1]
-        given = self.terms.given(poses)
         others = np.array([np.broadcast_to(row, n) for row in given]).reshape(len(given), n)
         rows = (np.ascontiguousarray(each) for each in (poses.positions, *turns, others, poses.tool_length))
         return Columns(*rows)
@@ -124,6 +130,20 @@ def _are_many(n: int) -> bool:
     return fast.engaged() and n > 1
 
 
+@dataclass(frozen=True)
+class Approach:
+    """A route in two, for those who bring the tip to a point by linear axes.
+
+    axes    their columns, X Y Z
+    within  the steps from the tip up to the last one that changes with these axes
+    behind  those behind it, undone: they take the point to where the tip has to be after the first ones
+    """
+
+    axes: tuple[int, int, int]
+    within: Route
+    behind: Route
+
+
 def route_of(
     axes: tuple[Axis, ...], tool: Tool, joints: tuple[Joint, ...], model: ErrorModel | None, offset: Vector
 ) -> Route | None:
@@ -133,19 +153,52 @@ def route_of(
     points of which one does not lie on it.
     """
     groups = () if model is None else model.groups
+    path = _path(tool, joints, groups, offset, real=model is not None)
+    return None if path is None else _written_out(axes, groups, *path, [])
+
+
+def approach_of(
+    axes: tuple[Axis, ...], tool: Tool, joints: tuple[Joint, ...], model: ErrorModel, offset: Vector
+) -> Approach | None:
+    """The route with errors in two, for those who move X, Y and Z.
+
+    None without a route or these axes, and where functions that bases work out change with them.
+    """
+    path, names = _path(tool, joints, model.groups, offset, real=True), [axis.name for axis in axes]
+    if path is None or not set(names).issuperset("XYZ"):
+        return None
+    moved, (start, links), held = (names.index("X"), names.index("Y"), names.index("Z")), path, list[Held]()
+    if _written_out(axes, model.groups, start, links, held).terms.see(moved):
+        return None
+    cut = 1 + max((i for i, link in enumerate(links) if link.changes_with(moved, model.groups)), default=-1)
+    parts = links[:cut], [link.undone() for link in reversed(links[cut:])]
+    within, behind = (_written_out(axes, model.groups, start, part, held) for part in parts)
+    return Approach(moved, within, behind)
+
+
+def _path(
+    tool: Tool, joints: tuple[Joint, ...], groups: tuple[Group, ...], offset: Vector, *, real: bool
+) -> tuple[Array, list[Link]] | None:
+    """The start of a route, as in `Steps`, and its steps, with errors if it is the `real` one; None without one."""
     links: list[Link] = []
     for index in reversed(range(len(joints))):
-        own = _forth(index, joints[index], groups) if model is not None else _nominal(index, joints[index])
+        own = _forth(index, joints[index], groups) if real else _nominal(index, joints[index])
         if own is None:
             return None
         axis = joints[index].axis
         links += [link.undone() for link in reversed(own)] if axis is not None and axis.workpiece_side else own
     links.append(Link(rigid=se3.shift(-np.asarray(offset))))
     found, ahead = _constants_ahead(links)
-    places = [Place(link.slots, link.seen_from[:3, :3]) for link in found if link.slots]
-    functions, terms = terms_of(axes, groups, places)
-    start = np.array([ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)])
-    legs = _numbers(start, found)
+    return np.array([ahead[:3, :3] @ tool.point + ahead[:3, 3], ahead[:3, :3] @ np.negative(tool.direction)]), found
+
+
+def _written_out(
+    axes: tuple[Axis, ...], groups: tuple[Group, ...], start: Array, links: list[Link], held: list[Held]
+) -> Route:
+    """Steps as numbers; the ranges at whose ends harmonics are held are added to `held`."""
+    places = [Place(link.slots, link.seen_from[:3, :3]) for link in links if link.slots]
+    functions, terms = terms_of(axes, groups, places, held)
+    legs = _numbers(start, links)
     listed = Steps(*(part.tolist() for part in legs)), Functions(*(part.tolist() for part in functions))
     return Route(listed, packed(legs, functions), terms, tuple(i for i, axis in enumerate(axes) if axis.rotary))
 
@@ -173,7 +226,15 @@ class Link:
         """The step that undoes it."""
         if self.rigid is not None:
             return replace(self, rigid=se3.inverse(self.rigid))
-        return replace(self, kind=BACK) if self.slots else replace(self, direction=-self.direction)
+        other = BACK if self.kind == FORTH else FORTH
+        return replace(self, kind=other) if self.slots else replace(self, direction=-self.direction)
+
+    def changes_with(self, axes: Sequence[int], groups: tuple[Group, ...]) -> bool:
+        """Whether it is one along these axes, or a small motion that changes with one of them."""
+        if not self.slots:
+            return self.axis in axes
+        own = [group for group in groups if any(slot in group.slots for slot in self.slots)]
+        return self.axis in axes or any(changes_with(group, axes) for group in own)
 
     def behind(self, motion: Array) -> Link:
         """The step as it is done when `motion` has been done before it, and no longer after it."""

@@ -203,18 +203,23 @@ def add_up(functions: Functions, found: Numbers, values: Numbers) -> None:
         last = part
 
 
+def at_tip(steps: Steps, length: Number) -> Any:
+    """Where the tip of a tool of this length is before all steps: x, y, z."""
+    start = steps.start
+    return start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
+
+
 def carried(
-    steps: Steps, values: Numbers, length: Number, q: Numbers, sine: Numbers, versine: Numbers, largest: Number
+    steps: Steps, values: Numbers, point: Any, q: Numbers, sine: Numbers, versine: Numbers, largest: Number
 ) -> Any:
-    """Where the tip of a tool of this length goes: x, y, z, and the largest squared angle of a small motion.
+    """Where a point x y z goes: x, y, z, and the largest squared angle of a small motion.
 
     values         the numbers of the small motions
     q              axis positions, mm and rad
     sine, versine  of the rotary ones
     largest        zero
     """
-    start, d, p, center = steps.start, steps.direction, steps.point, steps.center
-    x, y, z = start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
+    d, p, center, (x, y, z) = steps.direction, steps.point, steps.center, point
     for i in range(len(steps.kind)):
         kind, axis, j = steps.kind[i], steps.axis[i], 3 * i
         line = d[j], d[j + 1], d[j + 2], p[j], p[j + 1], p[j + 2]
@@ -244,7 +249,7 @@ def carried(
 
 
 def follows(steps: Steps, column: int, sine: Numbers, versine: Numbers) -> Any:
-    """How the tip follows the linear axis with this column, along x, y, z; by the steps without errors."""
+    """How the tip follows the linear axis with this column, along x, y, z; small motions are left out."""
     x, y, z, found, d = 0.0, 0.0, 0.0, False, steps.direction
     for i in range(len(steps.kind)):
         axis, j = steps.axis[i], 3 * i

@@ -24,6 +24,8 @@ SUMS = (Table, Spline, Step)
 """Bases that add up their functions themselves, each sum on its own."""
 ANY = (1.0, -np.inf, np.inf, 0.0, 1.0)
 """A signal that is the position as it is."""
+Held = tuple[int, float, float]
+"""An axis whose harmonics are held at the ends of a range, and these, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +45,11 @@ class Terms:
     """
 
     groups: tuple[tuple[Group, Array | None], ...]
-    held: tuple[tuple[int, float, float], ...]
+    held: tuple[Held, ...]
 
     def see(self, axes: Sequence[int]) -> bool:
         """Whether any of these functions changes with one of the axes."""
-        signals = [signal for group, _ in self.groups for signal in (group.signal, group.factor)]
-        return any(signal is not None and signal.axis in axes for signal in signals)
+        return any(changes_with(group, axes) for group, _ in self.groups)
 
     def given(self, poses: Poses) -> list[Array]:
         """The functions that bases work out, (n,) or (1,) each, in order."""
@@ -62,6 +63,11 @@ class Terms:
         return found
 
 
+def changes_with(group: Group, axes: Sequence[int]) -> bool:
+    """Whether the functions of a group change with one of the axes."""
+    return any(signal is not None and signal.axis in axes for signal in (group.signal, group.factor))
+
+
 @dataclass(frozen=True, slots=True)
 class _Part:
     """A group as numbers: its functions, and the gains (parts, functions) by which they add to the small motions."""
@@ -73,11 +79,12 @@ class _Part:
     gains: Array
 
 
-def terms_of(axes: tuple[Axis, ...], groups: Sequence[Group], places: Sequence[Place]) -> tuple[Functions, Terms]:
-    """The functions of the small motions at `places`, and what has to be given for them."""
+def terms_of(
+    axes: tuple[Axis, ...], groups: Sequence[Group], places: Sequence[Place], held: list[Held]
+) -> tuple[Functions, Terms]:
+    """The functions of the small motions at `places`, and what has to be given for them; `held` is added to."""
     parts: list[_Part] = []
     given: list[tuple[Group, Array | None]] = []
-    held: list[tuple[int, float, float]] = []
     for group in groups:
         gains = _gains(group, places)
         if not gains.any():
@@ -107,7 +114,7 @@ def _is_wave(axes: tuple[Axis, ...], group: Group, signal: Signal) -> bool:
     return type(group.basis) is Fourier and plain and signal.axis is not None and axes[signal.axis].rotary
 
 
-def _row(axes: tuple[Axis, ...], signal: Signal, held: list[tuple[int, float, float]]) -> int:
+def _row(axes: tuple[Axis, ...], signal: Signal, held: list[Held]) -> int:
     """The row of the sine that a wave is made of: its axis's, or one held at the ends of a range."""
     assert signal.axis is not None
     if not np.isfinite([signal.low, signal.high]).any():
