@@ -11,8 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
+from ncfix.diagnostics import SourceError
 from ncfix.program import bulk, number_text
 from ncfix.program.bulk import Stretch
+from ncfix.program.bulk_arcs import CentreWords
 from ncfix.program.emit import Emission, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
@@ -23,6 +25,7 @@ from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
 from ncfix.program.writer import Edit, Splices, apply, spliced
+from program.arcs import full_of_arcs
 
 AXES, ROTARY = ("X", "Y", "Z", "B", "C"), frozenset("BC")
 STEPS = np.array([1e-3, 1e-3, 1e-3, np.radians(1e-3), np.radians(1e-3)])
@@ -65,14 +68,15 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
 
 
 def assert_same(program: Program, moves: Moves, pieces: Pieces) -> None:
+    """The same text and conflicts, and numbers but for noise, which an R near half the chord makes a thousandfold."""
     *many, slow = in_all_ways(program, moves, pieces)
     text = apply(program.source, slow.edits)
     for each in many:
         assert spliced(program.source, each.splices).decode("latin-1") == text.decode("latin-1")
         assert each.conflicts == slow.conflicts
         assert each.added_blocks == slow.added_blocks
-        for name in ("start", "end", "centre"):
-            assert np.allclose(getattr(each, name), getattr(slow, name), rtol=0, atol=1e-12, equal_nan=True), name
+        for name, noise in (("start", 1e-12), ("end", 1e-12), ("centre", 1e-9)):
+            assert np.allclose(getattr(each, name), getattr(slow, name), rtol=0, atol=noise, equal_nan=True), name
 
 
 NUMBERS = st.one_of(
@@ -142,6 +146,34 @@ def test_long_stretches(modal: bool) -> None:
     with mock.patch.object(Stretch, "splices", autospec=True, side_effect=Stretch.splices) as written:
         emit(program, moves, pieces, STEPS)
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 1500
+    assert_same(program, moves, pieces)
+
+
+@EXAMPLES
+@given(
+    seed=st.integers(0, 10_000),
+    size=st.sampled_from([0.0, 0.0003, 0.01, 0.7]),
+    frame=st.sampled_from(["", "G92 X1. Y-2.5", "G20", "G20 G92 X1. Z3."]),
+)
+def test_arcs_many_at_a_time_as_one_by_one(seed: int, size: float, frame: str) -> None:
+    head = ["G0 G90 G21 G94 X0 Y0 Z0 B0 C0 F1000", frame, "X0 Y0 Z0"]
+    try:
+        program, moves = followed("\n".join([*head, *full_of_arcs(seed, 50), "M2\n"]).encode())
+    except SourceError:  # half a turn by R that does not reach its end: digits say less in inch
+        return
+    pieces = moved(moves, seed, size)
+    shift = (pieces.end - moves.end[pieces.move])[:, :3] * np.random.default_rng(seed).choice([0.0, 0.9, 1.0])
+    assert_same(program, moves, replace(pieces, centre=pieces.centre + shift))
+
+
+def test_long_stretches_of_arcs() -> None:
+    program, moves = followed("\n".join(["G90 G21 G94 F1000", *full_of_arcs(4, 2000), "M2\n"]).encode())
+    pieces = moved(moves, 3, 0.01)
+    with mock.patch.object(CentreWords, "splices", autospec=True, side_effect=CentreWords.splices) as written:
+        emit(program, moves, pieces, STEPS)
+    arcs = np.count_nonzero(pieces.arc & ~pieces.kept)
+    assert arcs > 1000
+    assert sum(len(call.args[0].block) for call in written.call_args_list) > 0.4 * arcs
     assert_same(program, moves, pieces)
 
 

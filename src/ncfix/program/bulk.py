@@ -1,4 +1,4 @@
-"""Stretches of corrected straight motions written all at once.
+"""Stretches of corrected motions, straight ones and arcs, written all at once.
 
 What the emitter and the renderer do motion by motion, done as columns, byte for byte; a test holds the two together.
 A motion qualifies if its block is words with plain numbers, is executed once, and becomes one block with the same
@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
+from ncfix.program.bulk_arcs import CentreWords, Manner, whole_arcs
+from ncfix.program.bulk_fit import qualified, sound
 from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
 from ncfix.program.bulk_missing import last_told, missing, with_those_before
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
-from ncfix.program.moves import FeedMode, Frame, Kind, Moves, Rule
+from ncfix.program.moves import Frame, Moves
 from ncfix.program.number_text import Spelling, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
@@ -36,12 +38,27 @@ LONGEST = 1 << 12
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """Motions that have been written.
+
+    ends    (k, n_axes) the commands at the ends of their pieces
+    arcs    (a,) which of these are arcs
+    centre  (a, 3) their centres, command coordinates, mm
+    """
+
+    ends: FloatArray
+    arcs: IntArray
+    centre: FloatArray
+
+
 @dataclass(slots=True)
 class Bulk:
     """The stretches of one emission.
 
     stop     (n + 1,) for each motion, the first one from there on that does not qualify
     layouts  the layout of each shape that qualifies
+    turning  there are arcs
     added    lines that were put in
     """
 
@@ -51,6 +68,7 @@ class Bulk:
     first_piece: IntArray
     layouts: Layouts
     stop: IntArray
+    turning: bool
     parts: list[Splices] = field(default_factory=list)
     added: int = 0
 
@@ -68,7 +86,7 @@ class Bulk:
         """Find the stretches. `frame`, `frames` are those in which the control reads the motions."""
         first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         layouts = Layouts.of(language, program, moves)
-        fit = _qualified(program, moves, pieces, first_piece, layouts)
+        fit = qualified(program, moves, pieces, first_piece, layouts)
         if jumps.any():
             fit &= ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
@@ -77,7 +95,7 @@ class Bulk:
         stop = _stops(fit)
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
-        return cls(program, moves, pieces, first_piece, layouts, stop)
+        return cls(program, moves, pieces, first_piece, layouts, stop, bool(pieces.arc.any()))
 
     @property
     def text(self) -> NDArray[np.uint8]:
@@ -111,47 +129,79 @@ class Bulk:
         fit = plain & layouts.known[shapes]
         several = np.flatnonzero(np.diff(first_piece) > 1)
         fit[several] &= layouts.further[shapes[several]]
+        turning = bool(pieces.arc.any())
+        if turning:
+            fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
+        return cls(program, moves, pieces, first_piece, layouts, _stops(fit), turning)
 
-    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Taken | None:
         """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
 
         position  (n_axes,) the command at which the control stands
         decimals  (n_axes,) digits that the least increment needs
-
-        Returns the commands (k, n_axes) at the ends of the pieces written, which are those of whole motions.
         """
-        if fast.engaged():
-            return self._compiled(row, position, frame, decimals)
+        if self.stop[row] == row:
+            return None
+        manner = Manner(self.text, decimals, _halves(decimals), self.layouts.manner.signed)
+        found = (self._compiled if fast.engaged() else self._in_columns)(row, position, frame, manner)
+        if found is None:
+            return None
+        taken, splices = self._with_centres(row, position, frame, manner, *found)
+        if not len(taken.ends):
+            return None
+        self.put(splices)
+        pieces = len(taken.ends)
+        self.added += pieces - int(np.searchsorted(self.first_piece, self.first_piece[row] + pieces)) + row
+        return taken
+
+    def _in_columns(
+        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
+    ) -> tuple[FloatArray, Splices] | None:
+        """The commands at the ends of the pieces of a stretch, (k, n_axes), and what changes in the words of axes."""
         stop = min(int(self.stop[row]), row + LONGEST)
         if stop - row < SHORTEST:
             return None
-        stretch = Stretch.of(self, row, stop, position, frame, decimals).clear_head()
-        if not len(stretch.block):
-            return None
-        self.put(stretch.splices())
-        self.added += int(np.count_nonzero(stretch.further))
-        return stretch.commands()
+        stretch = Stretch.of(self, row, stop, position, frame, manner).clear_head()
+        return (stretch.commands(), stretch.splices()) if len(stretch.block) else None
 
-    def _compiled(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
-        """The same, compiled."""
+    def _with_centres(
+        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner, ends: FloatArray, splices: Splices
+    ) -> tuple[Taken, Splices]:
+        """A stretch with the centres of its arcs, up to the first one that is not clear."""
+        first = self.first_piece[row]
+        arcs = np.flatnonzero(self.pieces.arc[first : first + len(ends)])
+        if not arcs.size:
+            return Taken(ends, arcs, self.pieces.centre[:0]), splices
+        starts = np.concatenate((position[None], ends)).take(arcs, axis=0)
+        rows, centre = self.pieces.move[first + arcs], self.pieces.centre[first + arcs]
+        about = self.program, self.layouts, self.moves
+        words = CentreWords.of(*about, rows, (starts, ends.take(arcs, axis=0)), centre, frame, manner)
+        if not words.clear.all():
+            count = int(np.argmin(words.clear))
+            ends, splices = ends[: arcs[count]], splices.before(int(self.program.blocks[words.block[count], 0]))
+            arcs, words = arcs[:count], words.head(count)
+        both = Splices.joined([splices, words.splices(self.program, self.layouts, manner)])
+        return Taken(ends, arcs, words.centre), both
+
+    def _compiled(
+        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
+    ) -> tuple[FloatArray, Splices] | None:
+        """As `_in_columns`, compiled."""
         from ncfix.program import writing_kernels
         from ncfix.program.number_kernels import ROOM
 
-        stop = int(self.stop[row])
-        if stop == row:
-            return None
+        stop = min(int(self.stop[row]), row + LONGEST) if self.turning else int(self.stop[row])
         program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
         ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), program.line_end
         axes, edits = len(here), (stop - row) * (len(here) + 1)
         blocks = self.moves.block[row:stop]
         commands, data = np.empty_like(ends), np.empty(self._room(pieces, blocks, axes * ROOM), dtype=np.uint8)
         start, end, length = (np.empty(edits, dtype=np.int64) for _ in range(3))
-        counts = np.zeros(3, dtype=np.int64)
+        counts = np.zeros(2, dtype=np.int64)
         done = writing_kernels.write(
-            self.text,
+            manner.text,
             (program.blocks, blocks, program.first_number, program.template),
             (program.numbers, program.number_spans),
             (layouts.slots, layouts.by_place, layouts.by_letter, layouts.anchors, layouts.heads),
@@ -159,17 +209,15 @@ class Bulk:
             pieces - pieces[0],
             here,
             (frame.frame.offset, frame.scale),
-            (decimals, _halves(decimals), int(layouts.manner.signed)),
+            (manner.decimals, manner.half, int(manner.signed)),
             (np.frombuffer(end_of_line, dtype=np.uint8), layouts.leads, layouts.openings, layouts.closings),
             (commands, start, end, length, data),
             (np.empty(axes), np.empty(axes), np.empty(axes, dtype=np.bool_), counts),
         )
         if not done:
             return None
-        edits, size, lines = counts.tolist()
-        self.put(Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes()))
-        self.added += lines
-        return commands[:done]
+        edits, size = counts.tolist()
+        return commands[:done], Splices(start[:edits], end[:edits], length[:edits], data[:size].tobytes())
 
     def _room(self, pieces: IntArray, blocks: NDArray[np.int32], words: int) -> int:
         """Bytes that the words and lines of some motions take at most; `words`: those of a piece."""
@@ -198,46 +246,6 @@ def _is_plain(frame: Frame) -> bool:
     """Whether each number in a frame stands for one axis, with a point or without."""
     turned = bool((frame.rotation != np.eye(3)).any())
     return not (turned or frame.diameter) and frame.increments == (1.0, 1.0)
-
-
-def _qualified(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
-    """(n,) motions that may be written in bulk, as far as their own data say."""
-    first = first_piece[:-1]
-    turns = moves.kind == Kind.FEED
-    for column in np.flatnonzero(~moves.rotary):
-        turns &= moves.end[:, column] == moves.start[:, column]
-    fit: Mask = (moves.rule == Rule.CORRECT) & ~moves.incremental & ~turns
-    fit &= ((moves.kind == Kind.RAPID) & (moves.modal == 0)) | ((moves.kind == Kind.FEED) & (moves.modal == 10))
-    fit &= ~pieces.kept[first] & _writable_pieces(program, moves, pieces, first_piece, layouts)
-    fit &= pieces.known[first] & _undisplaced(moves, pieces, first_piece)
-    fit &= layouts.known[program.template[moves.block]]
-    rising = moves.block[1:] > moves.block[:-1]
-    if not rising.all():
-        fit &= np.bincount(moves.block, minlength=len(program))[moves.block] == 1
-        fit[1:] &= rising
-    return fit
-
-
-def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
-    """(n,) motions in which axes that must get no word stand where the program believes them to be."""
-    wordless = moves.wordless
-    if not wordless.any():
-        return np.ones(len(moves), dtype=np.bool_)
-    last = first_piece[1:] - 1
-    fine: Mask = ~(wordless & (pieces.end.take(last, axis=0) != moves.end)).any(axis=1)
-    return fine
-
-
-def _writable_pieces(program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts) -> Mask:
-    """(n,) motions in one straight piece; in several, if nothing but words goes with them."""
-    single: Mask = (np.diff(first_piece) == 1) & ~pieces.arc[first_piece[:-1]]
-    several = np.flatnonzero(~single)
-    if len(several):
-        straight = np.add.reduceat(pieces.arc, first_piece[:-1], dtype=np.int64)[several] == 0
-        timed = (moves.feed_mode[several] == FeedMode.INVERSE_TIME) & (moves.modal[several] != 0)
-        finite = np.logical_and.reduceat(pieces.known, first_piece[:-1])[several]
-        single[several] = straight & ~timed & finite & layouts.further[program.template[moves.block[several]]]
-    return single
 
 
 @dataclass(slots=True)
@@ -269,9 +277,9 @@ class Stretch:
     clear: Mask
 
     @classmethod
-    def of(cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Stretch:
+    def of(cls, bulk: Bulk, row: int, stop: int, position: FloatArray, frame: FrameMap, manner: Manner) -> Stretch:
         """Work out which words change."""
-        program = bulk.program
+        program, decimals = bulk.program, manner.decimals
         rows = slice(bulk.first_piece[row], bulk.first_piece[stop])
         move = bulk.pieces.move[rows]
         block = bulk.moves.block.take(move).astype(np.int64)
@@ -279,14 +287,14 @@ class Stretch:
         words = _words(bulk, block, further)
         worded, present = words >= 0, words != NONE
         wanted = frame.program(bulk.pieces.end[rows])
-        half, digits = np.tile(_halves(decimals), (len(block), 1)), np.tile(decimals, (len(block), 1))
+        half, digits = np.tile(manner.half, (len(block), 1)), np.tile(decimals, (len(block), 1))
         original = np.where(worded, program.numbers.take(words, mode="clip"), wanted)
         rewrite = np.abs(wanted - original) >= half
         rewrite[np.flatnonzero(further[1:])] = True
         rewrite &= present
         anew = np.flatnonzero(worded & rewrite)
         spans = program.number_spans.take(words.ravel().take(anew), axis=0)
-        styles = styles_of(bulk.text, spans, signed=bulk.layouts.manner.signed)
+        styles = styles_of(manner.text, spans, signed=manner.signed)
         digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
         kept = present & ~rewrite
         clear = is_plain(wanted, digits) | kept

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.language import BulkLayout, Language
-from ncfix.program.layout import AXIS_LETTERS
+from ncfix.program.language import ArcLayout, BulkLayout, Language
+from ncfix.program.layout import AXIS_LETTERS, CENTRE_LETTERS
 from ncfix.program.moves import Moves
 from ncfix.program.tree import START, Program
 
@@ -59,6 +59,11 @@ class Layouts:
     leads      (s, 2) slot and offset of the place up to which lines of further pieces repeat the beginning of the block
     openings   (s, k) what stands on them before their words, 0 for nothing
     closings   (s, k) what stands on them behind these
+    round      (s,) arcs of the shape may be written in bulk, too, as long as they stay one arc
+    centre     (s, 3) which of the block's numbers is I, J and K, or `NONE`
+    centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
+    radius     (s,) which of them is R, or `NONE`
+    taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
     manner     how numbers and lines are written
     """
 
@@ -72,6 +77,11 @@ class Layouts:
     leads: IntArray
     openings: NDArray[np.uint8]
     closings: NDArray[np.uint8]
+    round: NDArray[np.bool_]
+    centre: IntArray
+    centre_heads: NDArray[np.uint8]
+    radius: IntArray
+    taken: IntArray
     manner: Manner = NOTHING_SPECIAL
 
     @classmethod
@@ -90,6 +100,11 @@ class Layouts:
             np.full((n, 2), (START, 0)),
             np.zeros((n, OPENING), np.uint8),
             np.zeros((n, CLOSING), np.uint8),
+            np.zeros(n, np.bool_),
+            np.full((n, 3), NONE),
+            np.zeros((n, 3, 2), np.uint8),
+            np.full(n, NONE),
+            np.zeros((n, 2, 2), np.int64),
         )
         if language.bulk is not None and len(moves):
             shapes, at = np.unique(program.template[moves.block], return_index=True)
@@ -118,6 +133,17 @@ class Layouts:
             self.leads[shape] = layout.lead
         for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):
             table[shape, : len(text)] = list(text.encode("latin-1"))
+        if layout.arc is not None:
+            self._enter_arc(shape, layout, layout.arc)
+
+    def _enter_arc(self, shape: int, layout: BulkLayout, arc: ArcLayout) -> None:
+        """Fill in what the row of a shape says about arcs."""
+        self.round[shape] = True
+        self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
+        letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]
+        self.centre_heads[shape] = [(ord(layout.blank or "\0"), ord(letter)) for letter in letters]
+        if arc.radius is not None:
+            self.radius[shape], self.taken[shape] = arc.radius
 
     def nameless(self, program: Program, blocks: IntArray) -> NDArray[np.bool_]:
         """(k, n_axes) axes that get no word where `blocks` have none."""
@@ -126,16 +152,18 @@ class Layouts:
 
     def places(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes of `blocks` (k,) at which missing words go."""
-        return self._places(program, blocks, self.anchors)
+        return places_of(program, blocks, self.anchors)
 
     def lead_ends(self, program: Program, blocks: IntArray) -> IntArray:
         """The bytes up to which lines of further pieces repeat `blocks` (k,)."""
-        return self._places(program, blocks, self.leads)
+        return places_of(program, blocks, self.leads)
 
-    def _places(self, program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:
-        slot, offset = anchors[program.template[blocks]].T
-        edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
-        behind = slot >= 0
-        edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
-        places: IntArray = edges + offset
-        return places
+
+def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:
+    """The bytes of `blocks` (k,) that anchors (s, 2), those of each shape, stand for."""
+    slot, offset = anchors[program.template[blocks]].T
+    edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
+    behind = slot >= 0
+    edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
+    places: IntArray = edges + offset
+    return places

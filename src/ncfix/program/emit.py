@@ -143,8 +143,7 @@ class _Emitter:
 
     def run(self, done: FloatArray | None, row: int) -> Emission:
         """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
-        if done is not None:
-            self.position = done.copy()
+        self.position = self.position if done is None else done.copy()
         while row < len(self.moves):
             count = self._stretch(row)
             if count:
@@ -177,20 +176,21 @@ class _Emitter:
         return turns_alone(self.moves)
 
     def _stretch(self, row: int) -> int:
-        """Write the stretch of plain motions that begins here all at once; the number of motions written."""
+        """Write the stretch of motions that begins here all at once; the number of motions written."""
         if self.replaced is not None:
             return 0
         frame, before = self.reading.frame[row], len(self.bulk.parts)
-        ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
-        if ends is None:
+        taken = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
+        if taken is None:
             return 0
         if self.latest:
             self.bulk.parts.insert(before, Splices.of(self._edits()))
-        first = self.first_piece[row]
+        first, ends = self.first_piece[row], taken.ends
         stop = int(np.searchsorted(self.first_piece, first + len(ends)))
         self.end[first : first + len(ends)] = ends
         self.start[row] = self.position
         self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
+        self.centre[first + taken.arcs] = taken.centre
         self.position = ends[-1].copy()
         self.cycle_end = None
         return stop - row

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ncfix.program.setup import Setup
     from ncfix.program.shapes import Scan
     from ncfix.program.target import Rendered, Target
-    from ncfix.program.tree import Anchor, Program, Template, Word
+    from ncfix.program.tree import Anchor, Program, Span, Template, Word
 
 Resolve = Callable[[str], bytes | None]
 """Gives the text of a subprogram file by its name; None if there is none."""
@@ -39,6 +39,18 @@ class BlockLayout(Protocol):
     @property
     def motion(self) -> Word | None:
         """The word that says which kind of motion it is, if the block has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArcLayout:
+    """Where the words that say where the centre of an arc is stand in the blocks of one shape.
+
+    centre  I J K -> which of the block's numbers each has
+    radius  which of them R has, and where that word stands, with the blank before it; None without
+    """
+
+    centre: Mapping[str, int]
+    radius: tuple[int, Span] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +69,7 @@ class BulkLayout:
     comma     numbers are written with a decimal comma
     turns_named  a rotary axis that has no word gets none
     led       rotary axes go where other words of the block lead them, exactly; they have none of their own
+    arc       what there is of arcs; None where these are written one by one
     """
 
     slots: Mapping[str, int]
@@ -71,6 +84,7 @@ class BulkLayout:
     comma: bool = False
     turns_named: bool = False
     led: bool = False
+    arc: ArcLayout | None = None
 
 
 @dataclass(frozen=True, slots=True)

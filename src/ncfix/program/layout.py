@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ncfix.program.language import BulkLayout
+from ncfix.program.language import ArcLayout, BulkLayout
 from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
 
 #: In the order in which programs write them.
@@ -130,3 +130,16 @@ def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | No
         return None
     at = program.position(block, layout.code_at)
     return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())
+
+
+def arc_layout(program: Program, block: int, layout: Layout) -> ArcLayout | None:
+    """The same of the words of an arc; None if one of them is no plain number."""
+    slots = {letter: word.value.slot for letter, word in layout.centre.items() if isinstance(word.value, Literal)}
+    word = layout.radius
+    if len(slots) < len(layout.centre) or not (word is None or isinstance(word.value, Literal)):
+        return None
+    if word is None or not isinstance(word.value, Literal):
+        return ArcLayout(slots)
+    at, (slot, offset) = program.position(block, word.span.start), word.span.start
+    blank = at > program.blocks[block, 0] and program.source[at - 1 : at] in (b" ", b"\t")
+    return ArcLayout(slots, (word.value.slot, Span(Anchor(slot, offset - blank), word.span.stop)))

@@ -91,6 +91,12 @@ class Splices:
         """The same so many bytes further on."""
         return replace(self, start=self.start + way, stop=self.stop + way)
 
+    def before(self, place: int) -> Splices:
+        """Those before a byte of the source, where they are in order."""
+        count = int(np.searchsorted(self.start, place))
+        length = self.length[:count]
+        return Splices(self.start[:count], self.stop[:count], length, self.data[: int(length.sum())])
+
     def edits(self) -> Iterator[Edit]:
         """One by one."""
         at = 0

@@ -247,13 +247,13 @@ def write(
     digits    decimals that the least increment needs, half output steps (axes,), and whether numbers carry signs
     lines     the end of a line, and leads, openings, closings of `Layouts`
     found     room for the commands at the ends of the pieces written, and what changes in the source, as in `Splices`
-    room      for three rows (axes,), and for counts: edits, bytes, and lines that were added
+    room      for three rows (axes,), and for counts: edits and bytes
     """
     (edges, rows, first, shapes), (_, spans) = blocks, numbers
     slots, by_place, by_letter, anchors, heads = layouts
     (commands, start, stop, length, data), (now, wanted, told, counts) = found, room
     pen, by_axis, leads = (data, (start, stop, length)), (wanted, now, told), lines[1]
-    edits, size, done, added = 0, 0, 0, 0
+    edits, size, done = 0, 0, 0
     for row in range(len(rows)):
         block, before, was, first_piece, last_piece = rows[row], edits, size, pieces[row], pieces[row + 1] - 1
         shape, number, several = shapes[block], first[block], first_piece < last_piece
@@ -275,11 +275,10 @@ def write(
             break
         if several:
             edits = note(pen[1], edits, edges[block, 1], edges[block, 1], size - lines_from)
-            added += last_piece - first_piece
         done = last_piece + 1
         for axis in range(len(here)):
             here[axis] = commands[last_piece, axis]
-    counts[0], counts[1], counts[2] = edits, size, added
+    counts[0], counts[1] = edits, size
     return done
 
 

@@ -94,9 +94,9 @@ def test_many_at_a_time_as_one_by_one(comma: bool, odd: float) -> None:
 def test_most_are_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     taken, take = [], bulk.Bulk.take
 
-    def noting(self: bulk.Bulk, *given: object) -> object:
+    def noting(self: bulk.Bulk, *given: object) -> bulk.Taken | None:
         found = take(self, *given)  # type: ignore[arg-type]
-        taken.append(0 if found is None else len(found))
+        taken.append(0 if found is None else len(found.ends))
         return found
 
     monkeypatch.setattr(bulk.Bulk, "take", noting)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Language, Run
-from ncfix.program.layout import AXIS_LETTERS, Layout, bulk_layout, has_free_text, layout_of
+from ncfix.program.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
 from ncfix.program.moves import Trace
 from ncfix.program.reach import tape_end
 from ncfix.program.render import BlockRenderer
@@ -56,7 +56,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     found = None if layout is None else bulk_layout(program, block, layout)
     if layout is None or found is None:
         return None
-    return replace(found, further=not (layout.after or layout.prefix))
+    return replace(found, further=not (layout.after or layout.prefix), arc=arc_layout(program, block, layout))
 
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
