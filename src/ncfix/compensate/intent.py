@@ -29,7 +29,7 @@ from ncfix.compensate.kinematics import (
     solve,
     tip_maps,
 )
-from ncfix.compensate.rows import some
+from ncfix.compensate.rows import picked, some
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.steer import rows_of, steer
 from ncfix.machine import Machine, State
@@ -74,11 +74,10 @@ class Intent:
         """Motions whose axes do not move linearly with the fraction, (n,)."""
         return np.asarray((self.moves.kind == Kind.ARC) | self.moves.tcp, dtype=bool)
 
-    @cached_property
-    def moving(self) -> Mask:
-        """Motions that are to move anything, (n,); others only take up what the machine is off where they begin."""
-        way = np.abs(self.moves.end - self.moves.start)
-        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind == Kind.ARC)
+    def moving(self, rows: Index) -> Mask:
+        """Which of motions `rows` (k,) are to move anything; others only take up what is off where they begin."""
+        way = np.abs(picked(self.moves.end, rows) - picked(self.moves.start, rows))
+        moving: Mask = some((way >= REST) & (way < np.inf)) | (self.moves.kind[rows] == Kind.ARC)
         return moving
 
     @cached_property

@@ -142,7 +142,7 @@ def _followed(intent: Intent, real: Segments, kept: Mask, strategy: Strategy, de
         return np.zeros(len(kept), dtype=bool)
     kind = intent.moves.kind
     followed = (kind == Kind.FEED) | (kind == Kind.ARC) | ((kind == Kind.RAPID) & demands.split_rapids)
-    result: Mask = followed & ~kept & intent.moving & finite(real.start)
+    result: Mask = followed & ~kept & intent.moving(np.arange(len(kept))) & finite(real.start)
     return result
 
 

@@ -32,7 +32,8 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
     """Tip errors over the motions that cut, and over rapids if the tolerance holds along them."""
     moves, written = course.part.moves, replace(course.real, start=text.start, end=course.last(text.end))
     shown = (moves.kind != Kind.DWELL) & (rapids | (moves.kind != Kind.RAPID))
-    apart = ~course.plain | course.uneasy | (np.diff(course.first) > 1)
+    uneasy = course.uneasy
+    apart = ~course.plain | uneasy | (np.diff(course.first) > 1)
     if moves.tcp[0]:
         apart |= bool(course.intent.kinks)
     else:
@@ -44,7 +45,7 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
         tally.add(_inside(course, written, inside[part], counts[inside[part]]))
     rows = np.flatnonzero(apart & shown)
     if rows.size:
-        for found in _along(course, text, rows):
+        for found in _along(course, text, rows, uneasy):
             tally.add(found)
     return tally.result()
 
@@ -122,12 +123,12 @@ def _inside(course: Course, written: Segments, rows: Index, counts: Index) -> Sa
     return Samples(move, fraction, *errors_at(intent, move, fraction, written.at(move, fraction)), weight, 0.0, 0.0)
 
 
-def _along(course: Course, text: Emission, rows: Index) -> Iterator[Samples]:
-    """The errors along motions `rows` (k,)."""
+def _along(course: Course, text: Emission, rows: Index, uneasy: Mask) -> Iterator[Samples]:
+    """The errors along motions `rows` (k,); `uneasy` (n,) as in `Course`."""
     counts = np.diff(course.first)[rows]
     own = np.repeat(course.first[:-1][rows], counts) + places(counts)
     whole, no = course.pieces, np.broadcast_to(False, len(own))
     pieces = Pieces(rows[owners(counts)], whole.fraction[own], text.end[own], whole.arc[own], text.centre[own], no)
     written = Written(course.intent, pieces, text.start)
     known = Known(course.before, course.real.end)
-    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=course.uneasy)
+    return samples(written, np.arange(len(own)), tilts=False, known=known, uneasy=uneasy)

@@ -138,7 +138,7 @@ def _counts(written: Written, which: Index, density: float) -> tuple[Index, Mask
     """Samples inside each piece, ends left out, and which pieces are looked at along the way, not at the end only."""
     intent, move, span = written.intent, written.pieces.move[which], written.span[which]
     wished, kind = bends_closely(intent, move) * span, intent.moves.kind[move]
-    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (span > 2 * INSTANT) & intent.moving[move]
+    along = ((kind == Kind.FEED) | (kind == Kind.ARC)) & (span > 2 * INSTANT) & intent.moving(move)
     begun = picked(written.segments.start, which) + picked(written.start, move) + picked(intent.moves.start, move)
     along &= finite(begun)
     counts = np.minimum(np.nan_to_num(np.ceil(density * wished)), MOST_SHOWN)

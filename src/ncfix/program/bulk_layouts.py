@@ -107,9 +107,9 @@ class Layouts:
             np.zeros((n, 2, 2), np.int64),
         )
         if language.bulk is not None and len(moves):
-            shapes, at = np.unique(program.template[moves.block], return_index=True)
-            for shape, row in zip(shapes.tolist(), at.tolist(), strict=True):
-                layout = language.bulk(program, int(moves.block[row]))
+            shapes = program.template.take(moves.block)
+            for shape in np.flatnonzero(np.bincount(shapes)).tolist():
+                layout = language.bulk(program, int(moves.block[np.argmax(shapes == shape)]))
                 if layout is not None:
                     table.enter(shape, layout, moves)
                     table = replace(table, manner=Manner.of(layout))

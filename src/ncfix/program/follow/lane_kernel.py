@@ -1,4 +1,4 @@
-"""The words of a stretch of plain motions taken block by block, compiled: as `lane.words_of` and `lane.commands`."""
+"""What a stretch of plain motions says, taken block by block, compiled: as `stage.followed`."""
 
 from __future__ import annotations
 
@@ -10,43 +10,52 @@ from ncfix.kernel import Library
 Ints = NDArray[np.int64]
 Rows = NDArray[np.int32]
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 LIBRARY = Library(__file__)
 
 
-@LIBRARY.kernel("f8[:]", "i8[:]", "i4[:]", "i8[:,:]", "i8[:]", "f8[:]", ("f8[:]", "f8[:]"), "i8", ("f8[:,:]", "f8[:]"))
+@LIBRARY.kernel(
+    ("f8[:]", "i8[:]", "i4[:]"),
+    ("i8[:,:]", "i8[:]", "i8[:]", "i8[:]"),
+    ("f8[:]", "f8", "f8", "f8"),
+    ("f8[:]", "f8[:]", "i8"),
+    ("f8[:,:]", "f8[:]", "b1[:]", "f8[:]", "b1[:]", "i8[:]"),
+)
 def followed(
-    numbers: Floats,
-    first: Ints,
-    shapes: Rows,
-    slots: Ints,
-    feeds: Ints,
-    position: Floats,
-    frame: tuple[Floats, Floats],
-    incremental: bool,
-    found: tuple[Floats, Floats],
+    blocks: tuple[Floats, Ints, Rows],
+    tables: tuple[Ints, Ints, Ints, Ints],
+    before: tuple[Floats, float, float, float],
+    frame: tuple[Floats, Floats, int],
+    stage: tuple[Floats, Floats, Mask, Floats, Mask, Ints],
 ) -> None:
-    """Where the k blocks of a stretch lead, and their F words.
+    """What the k blocks of a stretch say, and where they lead.
 
-    numbers, first, shapes  of the program; first and shapes (k,) of these blocks
-    slots, feeds            (s, letters), (s,) which number of a block of each shape is an axis word, or F; -1 for none
-    position                (letters,) the command before the first block
-    frame                   offset and scale (letters,)
-    found                   room for commands (k + 1, letters), the first of them `position`, and for F words (k,), NaN
-                            where there is none
+    blocks  numbers of the program; the first number and the shape of each block (k,)
+    tables  axes, feed, motion, mask of `LaneTables`
+    before  the command before the first block (letters,), what the number of F counts, feed and motion code in force
+    frame   offset and scale (letters,), and whether words are increments
+    stage   room for path, feed, fed, motion, coded, mask of `Stage`
     """
-    (offset, scale), (path, feed) = frame, found
+    (numbers, first, shapes), (slots, feeds, motions, masks) = blocks, tables
+    (position, unit, feed, motion), (offset, scale, incremental) = before, frame
+    path, feed_of, fed, motion_of, coded, mask = stage
     letters = len(position)
     for letter in range(letters):
         path[0, letter] = position[letter]
     for row in range(len(first)):
-        shape = shapes[row]
+        shape, number = shapes[row], first[row]
         for letter in range(letters):
             slot = slots[shape, letter]
             if slot < 0:
                 path[row + 1, letter] = path[row, letter]
             else:
-                step = scale[letter] * numbers[first[row] + slot]
+                step = scale[letter] * numbers[number + slot]
                 path[row + 1, letter] = (path[row, letter] if incremental else offset[letter]) + step
-        feed[row] = numbers[first[row] + feeds[shape]] if feeds[shape] >= 0 else np.nan
+        fed[row], coded[row], mask[row] = feeds[shape] >= 0, motions[shape] >= 0, masks[shape]
+        if fed[row]:
+            feed = unit * numbers[number + feeds[shape]]
+        if coded[row]:
+            motion = float(motions[shape])
+        feed_of[row], motion_of[row] = feed, motion

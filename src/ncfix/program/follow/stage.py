@@ -18,6 +18,9 @@ from ncfix.program.tree import Program
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Shapes = NDArray[np.int32]
+Before = tuple[float, float, float]
+"""What the number of an F word counts; feed and motion code in force before."""
 
 LONGEST = 1 << 16
 """Blocks that are taken at once."""
@@ -61,15 +64,11 @@ class Stage:
 
 def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
     """What blocks say, and where they lead."""
-    program, tables = unit.program, unit.lanes
+    program = unit.program
     shapes, first = program.template[start:stop], program.first_number[start:stop]
-    motion = tables.motion[shapes]
     follow = followed_compiled if fast.engaged() else followed
-    path, words = follow(control, program.numbers, first, shapes, tables)
-    fed, coded = ~np.isnan(words), motion >= 0
-    feed = filled(feed_unit(control) * words, fed, control.modal.feed)
-    codes = filled(motion.astype(np.float64), coded, float(control.modal.motion))
-    return Stage(path, feed, fed, codes, coded, tables.mask[shapes])
+    before = feed_unit(control), control.modal.feed, float(control.modal.motion)
+    return follow(control, program.numbers, first, shapes, unit.lanes, before)
 
 
 def feed_unit(control: Control) -> float:
@@ -78,14 +77,19 @@ def feed_unit(control: Control) -> float:
 
 
 def followed(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
-) -> tuple[FloatArray, FloatArray]:
-    """The path (n + 1, 9) and the F words (n,) of blocks of some shapes with numbers from `first` on."""
+    control: Control, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
+) -> Stage:
+    """What blocks of some shapes with numbers from `first` on say, and where they lead."""
+    unit, feed_before, motion_before = before
     path = np.empty((len(first) + 1, N_LETTERS))
     path[:] = control.position
     for letter in np.flatnonzero((tables.axes >= 0).any(axis=0)).tolist():
         path[1:, letter] = column(control, letter, words(numbers, first, tables.axes[:, letter].take(shapes)))
-    return path, words(numbers, first, tables.feed.take(shapes))
+    feeds, motion = words(numbers, first, tables.feed.take(shapes)), tables.motion.take(shapes)
+    fed, coded = ~np.isnan(feeds), motion >= 0
+    feed = filled(unit * feeds, fed, feed_before)
+    codes = filled(motion.astype(np.float64), coded, motion_before)
+    return Stage(path, feed, fed, codes, coded, tables.mask.take(shapes))
 
 
 def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
@@ -110,17 +114,29 @@ def column(control: Control, letter: int, words: FloatArray) -> FloatArray:
 
 
 def followed_compiled(
-    control: Control, numbers: FloatArray, first: IntArray, shapes: NDArray[np.int32], tables: LaneTables
-) -> tuple[FloatArray, FloatArray]:
+    control: Control, numbers: FloatArray, first: IntArray, shapes: Shapes, tables: LaneTables, before: Before
+) -> Stage:
     """As `followed`."""
     from ncfix.program.follow import lane_kernel
 
     position, offset, scale = (np.array(each) for each in (control.position, control.offset, control.scale))
-    incremental = control.modal.incremental
-    found = np.empty((len(first) + 1, N_LETTERS)), np.empty(len(first))
-    frame = offset, scale
-    lane_kernel.followed(numbers, first, shapes, tables.axes, tables.feed, position, frame, incremental, found)
-    return found
+    n = len(first)
+    stage = Stage(
+        np.empty((n + 1, N_LETTERS)),
+        np.empty(n),
+        np.empty(n, dtype=np.bool_),
+        np.empty(n),
+        np.empty(n, dtype=np.bool_),
+        np.empty(n, dtype=np.int64),
+    )
+    lane_kernel.followed(
+        (numbers, first, shapes),
+        (tables.axes, tables.feed, tables.motion, tables.mask),
+        (position, *before),
+        (offset, scale, int(control.modal.incremental)),
+        (stage.path, stage.feed, stage.fed, stage.motion, stage.coded, stage.mask),
+    )
+    return stage
 
 
 def filled(values: FloatArray, valid: NDArray[np.bool_], before: float) -> FloatArray:

@@ -98,11 +98,10 @@ def stage_of(control: Control, unit: Unit, start: int, stop: int) -> Stage:
     program, tables = unit.program, unit.lanes
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     follow = followed_compiled if fast.engaged() else followed
-    path, words = follow(control, program.numbers, first, shapes, tables.words)
-    feed = filled(control.unit * words, ~np.isnan(words), control.modal.feed)
+    found = follow(control, program.numbers, first, shapes, tables.words, (control.unit, control.modal.feed, RAPID))
     own = tables.side[shapes]
     side = filled(own.astype(np.float64), own >= 0, control.modal.compensated).astype(np.int64)
-    return Stage(path, feed, tables.words.motion[shapes], side, tables.words.mask[shapes])
+    return Stage(found.path, found.feed, tables.words.motion[shapes], side, found.mask)
 
 
 def count_on_one_turn(control: Control, stage: Stage) -> int:
