@@ -210,7 +210,7 @@ class Search:
         share, gap, _ = _newton(self.curve, here, piece, share[hopeful])
         costs = np.hypot(gap, ALONG * (self.curve.way(piece, share) - expected[rows[owner]]))
         order = np.lexsort((costs, owner))
-        best = order[np.unique(owner[order], return_index=True)[1]]
+        best = order[np.diff(owner[order], prepend=-1) != 0]
         best = best[costs[best] < cost[owner[best]]]
         found.put(rows[owner[best]], Nearest(piece[best], share[best], gap[best]))
 

@@ -26,6 +26,7 @@ from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.holes import over_holes
 from ncfix.compensate.nearest import Search
+from ncfix.compensate.ragged import distinct
 from ncfix.diagnostics import DifferenceError
 
 UNLIKE = 0.02
@@ -36,7 +37,7 @@ KEPT = 100.0
 
 def lines_of(parts: list[Index]) -> list[int]:
     """The lines that occur in parts, each once, in order."""
-    lines: list[int] = np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
+    lines: list[int] = distinct(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
     return lines
 
 
@@ -103,7 +104,7 @@ class Along:
 
     limit   mm; lines in which it is farther are noted
     where   the line of the largest gap
-    beyond  lines with gaps beyond the limit, by parts
+    beyond  lines with gaps beyond the limit, by parts; some twice
     """
 
     limit: float = np.inf
@@ -128,7 +129,8 @@ class Along:
         self.plain_squares += float(squares.sum())
         self.count += len(gap)
         if self.max > self.limit:
-            self.beyond.append(np.unique(lines[gap > self.limit]))
+            beyond = lines[gap > self.limit]
+            self.beyond.append(beyond[np.diff(beyond, prepend=-1) != 0])
 
     @property
     def rms(self) -> float:
