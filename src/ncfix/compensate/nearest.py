@@ -215,32 +215,27 @@ class Search:
         found.put(rows[owner[best]], Nearest(piece[best], share[best], gap[best]))
 
 
-def _newton(curve: Curve, points: Array, piece: Index, share: Array, steps: int = STEPS) -> tuple[Array, Array, Array]:
+def _newton(curve: Curve, points: Array, piece: Index, share: Array) -> tuple[Array, Array, Array]:
     """The nearest points to `points` (3, n) on parabolas (n,), from shares (n,) of them.
 
     Returns the shares, the distances, and how far beyond their ends the way to the points goes on: mm, negative before
     their begin, 0 if it ends on them.
     """
     begin, slope, bend = curve.parabolas.take(piece, axis=1).reshape(3, 3, -1)
-    left = points - begin - share * (slope + share * bend)
-    slope = slope + 2 * share * bend
-    square = _dot(slope, slope)
-    size = np.sqrt(square)
-    gap, ahead = np.sqrt(_dot(left, left)), _dot(left, slope) / np.where(size > 0, size, 1.0)
-    outside = ((share == 1) & (ahead > 0)) | ((share == 0) & (ahead < 0))
-    push = np.where(outside, ahead, 0.0)
-    rows = np.flatnonzero((np.abs(ahead) > CLOSE) & ~outside)
-    if not rows.size or not steps:
-        return share, gap, push
-    bowed = (square - 2 * _dot(left, bend))[rows]
-    square = square[rows]
-    bowed = np.where(bowed > square / 4, bowed, square)
-    new = np.clip(share[rows] + ahead[rows] * size[rows] / bowed, 0.0, 1.0)
-    share = share.copy()
-    better = _newton(curve, points.take(rows, axis=1), piece[rows], new, steps - 1)
-    for column, part in zip((share, gap, push), better, strict=True):
-        column[rows] = part
-    return share, gap, push
+    points = points - begin
+    for step in range(STEPS + 1):
+        left, along = points - share * (slope + share * bend), slope + 2 * share * bend
+        square = _dot(along, along)
+        size = np.sqrt(square)
+        ahead = _dot(left, along) / np.where(size > 0, size, 1.0)
+        outside = ((share == 1) & (ahead > 0)) | ((share == 0) & (ahead < 0))
+        moving = (np.abs(ahead) > CLOSE) & ~outside
+        if step == STEPS or not moving.any():
+            break
+        bowed = square - 2 * _dot(left, bend)
+        bowed = np.where(bowed > square / 4, bowed, np.where(moving, square, 1.0))
+        share = np.where(moving, np.clip(share + ahead * size / bowed, 0.0, 1.0), share)
+    return share, np.sqrt(_dot(left, left)), np.where(outside, ahead, 0.0)
 
 
 def _dot(one: Array, other: Array) -> Array:
