@@ -172,16 +172,20 @@ class Search:
 
     def _everywhere(self, points: Array, expected: Array, found: Nearest, far: Index) -> None:
         """Look at all that could be nearer to points `far` (k,) than what was found, where the path turns near by."""
-        curve, cost = self.curve, self._cost(expected, found, far)
-        low, high = expected[far] - cost / ALONG, expected[far] + cost / ALONG
+        curve, (low, high) = self.curve, self._range(expected, found, far)
         first, last = curve.place(low), curve.place(high)
         first, last = np.minimum(first, found.piece[far]), np.maximum(last, found.piece[far])
-        turning = curve.turns[1][last] - curve.turns[0][first] > STRAIGHT
-        counts = np.where(turning, last - first + 1, 0)
+        turning = np.flatnonzero(curve.turns[1][last] - curve.turns[0][first] > STRAIGHT)
+        rows, first, counts = far[turning], first[turning], (last - first + 1)[turning]
         for some in batches(counts, PAIRS):
-            self._among(points, expected, found, far[some], (first[some], counts[some], cost[some]))
+            self._among(points, expected, found, rows[some], (first[some], counts[some]))
+        if self._lacks(low, high) and self._lacks(*self._range(expected, found, far)):
+            raise LostError
 
-        self._check(expected[far], self._cost(expected, found, far))
+    def _range(self, expected: Array, found: Nearest, which: Index) -> tuple[Array, Array]:
+        """The ways along the curve between which there may be a nearer point, (k,) mm."""
+        way = self._cost(expected, found, which) / ALONG
+        return expected[which] - way, expected[which] + way
 
     def _cost(self, expected: Array, found: Nearest, which: Index) -> Array:
         """The measure in which a point is nearest, mm: its distance, and how far it is from where it was expected."""
@@ -189,18 +193,15 @@ class Search:
         cost: Array = np.hypot(found.gap[which], ALONG * off)
         return cost
 
-    def _check(self, expected: Array, cost: Array) -> None:
-        """Raise `LostError` if the path is not at hand as far as there might be a nearer point."""
-        low, high = (expected - cost / ALONG).min(), (expected + cost / ALONG).max()
-        end = self.curve.lengths[-1] + self.curve.ways[-1]
-        if (not self.begins and low < self.curve.lengths[0]) or (not self.ends and high > end):
-            raise LostError
+    def _lacks(self, low: Array, high: Array) -> bool:
+        """Whether some of these ways along the curve are not at hand."""
+        curve = self.curve
+        before = not self.begins and low.min() < curve.lengths[0]
+        return bool(before or (not self.ends and high.max() > curve.lengths[-1] + curve.ways[-1]))
 
-    def _among(
-        self, points: Array, expected: Array, found: Nearest, rows: Index, where: tuple[Index, Index, Array]
-    ) -> None:
-        """Look at runs of parabolas for points `rows` (k,): the first, how many, and what was found in what measure."""
-        first, counts, cost = where
+    def _among(self, points: Array, expected: Array, found: Nearest, rows: Index, where: tuple[Index, Index]) -> None:
+        """Look at runs of parabolas for points `rows` (k,): the first of each, and how many."""
+        (first, counts), cost = where, self._cost(expected, found, rows)
         owner, piece = owners(counts), np.repeat(first, counts) + places(counts)
         share, least = _on_chords(self.curve, picked(points, rows[owner]), piece)
         way = np.clip(expected[rows[owner]], self.curve.lengths[piece], self.curve.way(piece, np.ones(len(piece))))
