@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.assembly import untouched
+from ncfix.compensate.fix import fix_program
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import path_error
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Polynomial
 from ncfix.program.moves import Kind, Rule
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
 
 TOLERANCE = 1e-3
 
@@ -135,3 +140,23 @@ def test_an_empty_selection_has_no_error() -> None:
     moves = motions(machine, (0, 0, 0), [(1, 0, 0)])
     error = path_error(machine, moves, untouched(moves, np.ones(1, dtype=bool)).pieces)
     assert (error.before.max, error.before.move, error.samples) == (0.0, -1, 0)
+
+
+def test_a_cut_that_begins_where_a_passed_rapid_ends(root: Path) -> None:
+    """Before the first cut nobody knows where A and C stand: X and Y are brought to their places when it has begun."""
+    lines = (
+        "BEGIN PGM A MM",
+        "TOOL CALL 6 Z",
+        "L X+38 Y-17 FMAX",
+        "L Z+5 FMAX",
+        "L Z+3 F200",
+        "L X+19",
+        "END PGM A MM",
+    )
+    program = read("\n".join([*lines, ""]).encode(), "a.h", "heidenhain")
+    machine = load(str(root / "examples/machines/wCAYFXZSt.toml"))
+    report = fix_program(program, machine, Setup(assume_zero=True)).report
+    assert report.passed == 2
+    assert report.error_after_um["max"] == pytest.approx(report.error_before_um["max"], rel=0.02)
+    assert report.error_after_um["where"] == 5
+    assert "NCF416" in [message.code for message in report.warnings]

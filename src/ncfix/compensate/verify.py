@@ -23,7 +23,7 @@ from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves
+from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 
 BATCH = 50_000
@@ -149,7 +149,8 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
-    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy) & along)
+    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy))
+    begun = begun[along[begun] | _leaps(written, which[begun])]
     extra = [(begun, np.full(len(begun), START))]
     if written.intent.kinks:
         extra.append(_passed(written, which, along))
@@ -166,6 +167,14 @@ def _uneasy(written: Written) -> Mask:
     found, moves = uneasy_starts(written.intent, _kept_motions(written)), written.intent.moves
     found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
     return found
+
+
+def _leaps(written: Written, which: Index) -> Mask:
+    """Pieces with which motions begin that lead a cut to where it should begin, from where a motion was passed."""
+    moves, move = written.intent.moves, written.pieces.move[which]
+    behind = (move > 0) & (moves.rule[move - 1] == Rule.PASS)
+    leaps: Mask = behind & (written.span[which] <= 2 * INSTANT) & finite(picked(moves.start, move))
+    return leaps
 
 
 def _begins_uneasily(written: Written, which: Index, uneasy: Mask) -> Mask:
