@@ -35,6 +35,15 @@ class Whole:
 
     handle: IO[bytes]
 
+    @classmethod
+    def of(cls, parts: Iterable[bytes], handle: IO[bytes]) -> Whole:
+        """Parts, put into an empty file as they come."""
+        at = 0
+        for part in parts:
+            put_at(handle.fileno(), at, part)
+            at += len(part)
+        return cls(handle)
+
     def __iter__(self) -> Iterator[bytes]:
         self.handle.seek(0)
         while part := self.handle.read(COPIED):
@@ -89,7 +98,7 @@ def said_of(path: str | None) -> Iterator[None]:
 
 
 def unnamed(folder: str | None) -> IO[bytes]:
-    """A new file without a name, in a folder if that is there: gone with this process unless it is given one.
+    """A new file without a name, in a folder if it can be there: gone with this process unless it is given one.
 
     What is written into it is there at once, for all processes that have it open.
     """
@@ -99,7 +108,9 @@ def unnamed(folder: str | None) -> IO[bytes]:
             return os.fdopen(os.open(folder, os.O_RDWR | os.O_TMPFILE, 0o666), "w+b", buffering=0)
     from tempfile import TemporaryFile
 
-    return TemporaryFile(dir=folder, buffering=0)
+    with suppress(OSError):
+        return TemporaryFile(dir=folder, buffering=0)
+    return TemporaryFile(buffering=0)
 
 
 def holds(path: str, data: bytes | Iterable[bytes]) -> bool:

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ncfix.compensate.along import Along
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.side_by_side import Along, SideBySide
+from ncfix.compensate.side_by_side import SideBySide
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 

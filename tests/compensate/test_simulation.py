@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from compensate.side import compared
+from ncfix.compensate.along import Along
 from ncfix.compensate.following import follow
-from ncfix.compensate.simulation import TipError, tip_error
+from ncfix.compensate.intent import Intent
+from ncfix.compensate.simulation import TipError, tip_errors
 from ncfix.diagnostics import DifferenceError
-from ncfix.machine import Machine, loads
+from ncfix.machine import Machine, State, loads
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup
@@ -33,40 +35,51 @@ def followed(machine: str, text: str) -> tuple[Machine, Moves]:
     return found.machine, found.trace.moves
 
 
+def errors(machine: str, text: str) -> list[TipError]:
+    found, moves = followed(machine, text)
+    return list(tip_errors(Intent(found, moves, State()), moves.block))
+
+
 def error(machine: str, text: str) -> TipError:
-    return tip_error(*followed(machine, text))
+    """At all samples of a short program, of which there are some."""
+    (found,) = errors(machine, text)
+    return found
+
+
+def figures(machine: str, text: str) -> Along:
+    return Along.of(errors(machine, text))
 
 
 def test_the_error_at_every_sample_is_that_of_its_place() -> None:
     found = error(LONG, "G0 X10 Y0 Z0\nG1 X110\nY50\nG3 X110 Y70 J10\n")
     assert np.allclose(found.size, 1e-4 * found.intended[:, 0], atol=1e-12)
     assert np.allclose(found.actual - found.intended, found.size[:, None] * [1, 0, 0], atol=1e-12)
-    assert found.max_mm == pytest.approx(1e-4 * 120.0, rel=1e-3)
+    assert Along.of([found]).max == pytest.approx(1e-4 * 120.0, rel=1e-3)
 
 
 def test_weights_are_the_length_of_the_path() -> None:
     found = error(LONG, "G0 X10 Y0 Z0\nG1 X110\nG0 Z50\nG1 Y50\n")
     assert found.weight.sum() == pytest.approx(150.0)
     # 100 mm with x from 10 to 110, 50 mm at 110; the trapezoidal rule over 5 stretches is within 1 %
-    assert found.rms_mm == pytest.approx(1e-4 * np.sqrt(((110**3 - 10**3) / 3 + 50 * 110**2) / 150), rel=0.01)
+    assert Along.of([found]).rms == pytest.approx(1e-4 * np.sqrt(((110**3 - 10**3) / 3 + 50 * 110**2) / 150), rel=0.01)
 
 
 def test_a_kink_is_not_stepped_over() -> None:
     found = error(STEP, "G0 X0 Y0 Z0\nG1 X50.5\n")
-    assert found.max_mm == pytest.approx(0.01, rel=1e-6)
+    assert Along.of([found]).max == pytest.approx(0.01, rel=1e-6)
     assert np.isclose(found.intended[:, 0], 50.0, atol=1e-6).any()
 
 
 def test_rapids_do_not_count_and_cycles_count_at_their_end() -> None:
     found = error(LONG, "G0 X10 Y0 Z5\nG0 X400\nG98 G81 X100 Y10 Z-5 R2 F100\nG80\n")
     assert found.intended.tolist() == [[100.0, 10.0, -5.0]]
-    assert found.max_mm == pytest.approx(0.01)
+    assert Along.of([found]).max == pytest.approx(0.01)
 
 
 def test_a_program_that_cuts_nothing_has_no_error() -> None:
-    found = error(LONG, "G0 X10 Y0 Z5\n")
-    assert (found.max_mm, found.rms_mm, found.worst_row) == (0.0, 0.0, None)
-    assert error(LONG, "G0 X10 Y0 Z5\nG1 X10\n").rms_mm == pytest.approx(1e-3)
+    found = figures(LONG, "G0 X10 Y0 Z5\n")
+    assert (found.max, found.rms, found.where) == (0.0, 0.0, None)
+    assert figures(LONG, "G0 X10 Y0 Z5\nG1 X10\n").rms == pytest.approx(1e-3)
 
 
 # -- two programs -----------------------------------------------------------------------------------------------------

@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ncfix import fast
-from ncfix.cli.following import Following
-from ncfix.cli.options import dialect_of, read_program, subprograms
-from ncfix.cli.parts import Source, part_bytes, source_of
-from ncfix.cli.targets import STREAM, shown
-from ncfix.diagnostics import DifferenceError, NcfixError, SourceError
+from ncfix.cli.following import Following, figures
+from ncfix.cli.options import read_program
+from ncfix.cli.parts import Source, source_of
+from ncfix.cli.targets import STREAM
+from ncfix.cli.through import dialect_in, task_of, through
+from ncfix.diagnostics import SourceError
 
 if TYPE_CHECKING:
-    from ncfix.compensate.side_by_side import Along, SideBySide
-    from ncfix.program.dialect import Dialect
+    from ncfix.compensate.side_by_side import SideBySide
     from ncfix.program.tree import Program
 
 
@@ -47,9 +46,9 @@ class Compared:
         """What was found along both programs."""
         before, there, back = (match.along for match in found.matches)
         return cls(
-            before=_figures(before),
-            after=_figures(there),
-            left_out=_figures(back),
+            before=figures(before),
+            after=figures(there),
+            left_out=figures(back),
             beyond=there.lines_beyond,
             not_reached=back.lines_beyond,
             unseen=found.lines_unseen,
@@ -68,42 +67,20 @@ class Pair:
 
     def compared(self) -> SideBySide:
         """What this machine does with the two, measured against what the first one means."""
-        from ncfix.compensate.nearest import LostError
-        from ncfix.program.parts import NotInPartsError
-
-        long = [source.looked_into()[1] for source in (self.original, self.fixed)]
-        if any(long):
-            fast.engage()
-            try:
-                return self._in_parts()
-            except DifferenceError:
-                raise
-            except (NcfixError, NotInPartsError, LostError):
-                pass  # as wholes then; what is wrong with one of them is said there
-        return self._as_wholes()
+        return through((self.original, self.fixed), self._in_parts, self._as_wholes)
 
     def _in_parts(self) -> SideBySide:
         """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
         from ncfix.compensate.cuts import Cuts
-        from ncfix.compensate.options import FixOptions
         from ncfix.compensate.side_by_side import SideBySide
-        from ncfix.compensate.task import Task
 
-        found = SideBySide(self.tolerance_um / 1e3)
-        machine, dialect = self.following.machine, self._dialect()
-        assert machine is not None
+        found, dialect = SideBySide(self.tolerance_um / 1e3), dialect_in(self.following, self.original)
         cuts = []
         for source, beside in ((self.original, ()), (self.fixed, (self.original.path,))):
-            find = subprograms(source.path, *beside)
-            name = shown(source.path)
-            task = Task(machine, self.following.setup, FixOptions(force=True), find, name, dialect, part_bytes())
+            task = task_of(self.following, source, dialect, *beside)
             cuts.append(Cuts(task, source.read, meant=source is self.original))
         found.run(*map(iter, cuts))
         return found
-
-    def _dialect(self) -> Dialect:
-        head = self.original.head
-        return dialect_of(head, shown(self.original.path), self.following.dialect, self.following.machine)
 
     def _as_wholes(self) -> SideBySide:
         from ncfix.compensate.cuts import whole
@@ -135,8 +112,3 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
     """What this machine does with two programs, measured against what the first one means."""
     with source_of(original) as first, source_of(fixed) as second:
         return Compared.of(Pair(following, first, second, tolerance_um).compared())
-
-
-def _figures(along: Along) -> dict[str, Any]:
-    """How far a path is from another one in two figures, um, and the line of the worst."""
-    return {"max": 1e3 * along.max, "rms": 1e3 * along.rms, "where": along.where}

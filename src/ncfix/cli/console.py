@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import replace
@@ -92,9 +92,20 @@ def put(data: str | bytes) -> None:
         raise unwritable("<stdout>", error) from error
 
 
+def put_all(parts: Iterable[bytes]) -> None:
+    """Data on standard output, part after part."""
+    for part in parts:
+        put(part)
+
+
 def put_json(**content: object) -> None:
-    """One JSON object with its schema version, on standard output; numbers that are not finite become null."""
-    put(json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1) + "\n")
+    """One JSON object, see `json_text`, on standard output."""
+    put(json_text(**content))
+
+
+def json_text(**content: object) -> str:
+    """One JSON object with its schema version; numbers that are not finite become null."""
+    return json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1) + "\n"
 
 
 def _plain(value: Any) -> Any:

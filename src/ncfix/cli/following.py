@@ -10,8 +10,8 @@ from ncfix.cli.options import load_machine, read_program, subprograms
 from ncfix.cli.setup_options import SetupOptions
 
 if TYPE_CHECKING:
+    from ncfix.compensate.along import Along
     from ncfix.compensate.checking import Checked
-    from ncfix.compensate.simulation import TipError
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves, Trace
     from ncfix.program.setup import Setup
@@ -67,14 +67,6 @@ class Following:
             return axes_of(program.templates), frozenset(ROTARY)
         return self.machine.axis_names, rotary_names(self.machine)
 
-    def simulated(self, path: str) -> tuple[Program, Moves, TipError]:
-        """A program, its motions, and the error of the tool tip along them."""
-        from ncfix.compensate.simulation import tip_error
-
-        program = self.read(path)
-        machine, moves = self.on_machine(program, path)
-        return program, moves, tip_error(machine, moves)
-
     def on_machine(self, program: Program, *paths: str) -> tuple[Machine, Moves]:
         """A program as this machine follows it; `paths`: files beside which its subprograms may be."""
         from ncfix.compensate.following import follow
@@ -90,17 +82,6 @@ def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:
     return LINEAR + tuple(letter for letter in ROTARY + PARALLEL if letter in words)
 
 
-def lines_of(program: Program, blocks: Any) -> list[int]:
-    """The line numbers of blocks (n,), all at once."""
-    import numpy as np
-
-    text = np.frombuffer(program.source, dtype=np.uint8)
-    ends = np.flatnonzero(text == ord("\n" if b"\n" in program.source else "\r"))
-    lines: list[int] = (np.searchsorted(ends, program.blocks[blocks, 0]) + 1).tolist()
-    return lines
-
-
-def figures(error: TipError, lines: list[int]) -> dict[str, Any]:
+def figures(along: Along) -> dict[str, Any]:
     """The error along a path in two figures, um, and the line of the worst."""
-    row = error.worst_row
-    return {"max": 1e3 * error.max_mm, "rms": 1e3 * error.rms_mm, "where": None if row is None else lines[row]}
+    return {"max": 1e3 * along.max, "rms": 1e3 * along.rms, "where": along.where}

@@ -80,11 +80,11 @@ class Job:
     def fixed(self, target: Target, find: Find, jobs: int) -> Iterator[Fixed]:
         """The corrected program; a long one is corrected while it is read, if it can be."""
         with source_of(target.source) as source:
-            head, long = source.looked_into()
+            long = source.looked_into()
             if not long or self.options.flatten:
-                yield self._whole(source, source.everything() if long else head, find)
+                yield self._whole(source, source.everything(), find)
                 return
-            dialect = dialect_of(head, shown(target.source), self.dialect, self.machine)
+            dialect = dialect_of(source.head, shown(target.source), self.dialect, self.machine)
             with self._outlet(source, target, dialect, find, jobs) as (stream, outlet):
                 yield self._in_parts(source, stream, outlet, find)
 

@@ -6,7 +6,7 @@ import hashlib
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
 
@@ -66,13 +66,18 @@ def source_of(path: str) -> Iterator[Source]:
         handle = open(path, "rb")  # noqa: SIM115
     except OSError as error:
         raise files.unreadable(shown(path), error) from error
+    began = os.fstat(handle.fileno())
     with handle:
-        yield Source(path, handle, None, os.fstat(handle.fileno()))
+        if stat.S_ISREG(began.st_mode):
+            yield Source(path, handle, None, began)
+            return
+        with files.unnamed(None) as kept:
+            yield Source(path, handle, kept)
 
 
 @dataclass(slots=True)
 class Source:
-    """A text that can be read part by part, and again as a whole: what is read of standard input is kept in a file.
+    """A text that can be read part by part, and again as a whole: what is read of a pipe is kept in a file.
 
     began  what the system said of a file at first
     """
@@ -84,14 +89,12 @@ class Source:
     head: bytes = b""
     taken: int = 0
 
-    def ground(self, out: int) -> Ground | None:
-        """What other processes need to read the text, too, and to write into the file `out`; None for a named pipe."""
+    def ground(self, out: int) -> Ground:
+        """What other processes need to read the text, too, and to write into the file `out`."""
         from ncfix.compensate.crew import Ground
 
-        if self.kept is not None:
-            return Ground(self.kept.fileno(), False, out)
-        regular = self.began is not None and stat.S_ISREG(self.began.st_mode)
-        return Ground(self.handle.fileno(), True, out) if regular else None
+        kept = self.kept is not None
+        return Ground((self.kept or self.handle).fileno(), not kept, out)
 
     def check_unchanged(self) -> None:
         """Raise SourceError NCF002 if the file is not what it was at first: parts of it may not fit together."""
@@ -100,11 +103,16 @@ class Source:
             text = "was changed while it was read"
             raise SourceError.of("NCF002", text, Place(shown(self.path)), "fix it again when it is whole")
 
-    def looked_into(self) -> tuple[bytes, bool]:
-        """The first bytes, which `read` gives once more, and whether there are so many that the program is long."""
+    def looked_into(self) -> bool:
+        """Read the first bytes, which `read` gives once more; whether there are so many that the program is long."""
         many = long_from()
         self.head = self._read(many)
-        return self.head, len(self.head) == many
+        return len(self.head) == many
+
+    @property
+    def first_lines(self) -> bytes:
+        """The lines that the first bytes have, as long as these have not been read."""
+        return self.head[: self.head.rfind(b"\n") + 1]
 
     @property
     def size(self) -> int | None:
@@ -205,7 +213,25 @@ def _stamped(kept: Iterable[bytes], stamp: Stamp) -> Iterator[bytes]:
 @contextmanager
 def outlet_for(target: Target, sure: bool, stamped: Callable[[], bool]) -> Iterator[Outlet]:
     """An outlet; `sure`: everything that the stamp says is known from the beginning."""
-    direct = target.path == STREAM
-    folder = None if direct else os.path.dirname(target.path) or "."
-    with files.said_of(None if direct else target.path), files.unnamed(folder) as kept:
-        yield Outlet(kept, direct and sure, stamped)
+    with room_for(target.file) as kept:
+        yield Outlet(kept, target.path == STREAM and sure, stamped)
+
+
+@contextmanager
+def room_for(output: str | None) -> Iterator[IO[bytes]]:
+    """A file without a name for what is to be an output, in its folder; None: in that for temporary files."""
+    folder = None if output is None else os.path.dirname(output) or "."
+    with files.said_of(output), files.unnamed(folder) as kept:
+        yield kept
+
+
+@dataclass(frozen=True, slots=True)
+class Keep:
+    """Keeps the parts of a long output until they are all there; `opened`: what is to be closed then."""
+
+    output: str | None
+    opened: ExitStack
+
+    def __call__(self, parts: Iterable[bytes]) -> Iterable[bytes]:
+        """Take the parts as they come; what has been kept."""
+        return files.Whole.of(parts, self.opened.enter_context(room_for(self.output)))

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections import deque
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import chain
+from typing import TYPE_CHECKING
 
 import click
 
 from ncfix.cli import console
-from ncfix.cli.following import Following, figures, lines_of
+from ncfix.cli.following import Following, figures
 from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
+from ncfix.cli.parts import Keep, Source, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.table import as_csv, known
 from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.cli.through import dialect_in, task_of, through
 
 if TYPE_CHECKING:
+    from ncfix.cli.table import Columns
+    from ncfix.compensate.along import Along
     from ncfix.compensate.simulation import TipError
     from ncfix.measure.synthetic import Faults
 
@@ -65,15 +73,59 @@ def simulate(
     inputs = (machine_path, *given.files)
     target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
     following = Following.of(machine_path, dialect, given)
-    with console.busy(f"simulating {shown(program)}"):
-        source, moves, error = following.simulated(program)
-    if target:
-        target.write(as_csv(_columns(error, lines_of(source, moves.block))))
-    found = figures(error, lines_of(source, moves.block))
+    with source_of(program) as source, ExitStack() as opened:
+        errors = Errors(following, source, Keep(target.file, opened) if target else None)
+        with console.busy(f"simulating {shown(program)}"):
+            table, along = through([source], errors.in_parts, errors.whole)
+        if target:
+            target.write(table)
+    found = figures(along)
     if as_json:
         console.put_json(path=shown(program), error_um=found, output=target.path if target else None)
     elif not target or target.path != "-":
         console.put(f"tip error: {console.error_figures(found)}\n")
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """The errors along the path of a program; `keep`: with a table of them."""
+
+    following: Following
+    source: Source
+    keep: Keep | None
+
+    def in_parts(self) -> tuple[Iterable[bytes], Along]:
+        """The table and the figures, of a program that is read; raises what that does, and `NotInPartsError`."""
+        from ncfix.compensate.simulation import tip_errors_on
+
+        task = task_of(self.following, self.source, dialect_in(self.following, self.source))
+        return self._gone_along(tip_errors_on(task, self.source.read), self.keep)
+
+    def whole(self) -> tuple[Iterable[bytes], Along]:
+        """The same of a program as a whole."""
+        from ncfix.compensate.intent import Intent
+        from ncfix.compensate.simulation import tip_errors
+        from ncfix.machine import State
+
+        path = self.source.path
+        program = self.following.read(path, self.source.everything())
+        machine, moves = self.following.on_machine(program, path)
+        errors = tip_errors(Intent(machine, moves, State()), program.lines(moves.block))
+        return self._gone_along(errors, self.keep and list)
+
+    def _gone_along(
+        self, errors: Iterable[TipError], keep: Callable[[Iterable[bytes]], Iterable[bytes]] | None
+    ) -> tuple[Iterable[bytes], Along]:
+        from ncfix.cli.table import as_csv
+        from ncfix.compensate.along import Along
+        from ncfix.compensate.simulation import TipError
+
+        along = Along()
+        tables = map(_columns, chain([TipError.none()], along.adding(errors)))
+        if keep:
+            return keep(as_csv(tables)), along
+        deque(tables, maxlen=0)
+        return (), along
 
 
 def _simulate_plan(
@@ -97,10 +149,10 @@ def _simulate_plan(
     target.write(dumps(found).encode())
 
 
-def _columns(error: TipError, lines: list[int]) -> dict[str, list[Any]]:
+def _columns(error: TipError) -> Columns:
     """The samples by columns: intended tip in mm, error in um."""
     gap_um = 1e3 * (error.actual - error.intended)
-    columns: dict[str, list[Any]] = {"line": [lines[row] for row in error.rows], "fraction": known(error.fraction)}
-    columns |= {f"tip_{name}": known(values) for name, values in zip("xyz", error.intended.T, strict=True)}
-    columns |= {f"d{name}_um": known(values) for name, values in zip("xyz", gap_um.T, strict=True)}
-    return {**columns, "error_um": known(1e3 * error.size)}
+    columns: Columns = {"line": error.lines, "fraction": error.fraction}
+    columns |= {f"tip_{name}": values for name, values in zip("xyz", error.intended.T, strict=True)}
+    columns |= {f"d{name}_um": values for name, values in zip("xyz", gap_um.T, strict=True)}
+    return {**columns, "error_um": 1e3 * error.size}

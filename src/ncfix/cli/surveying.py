@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ncfix import fast
-from ncfix.cli.following import ROTARY, Following, axes_of
-from ncfix.cli.options import dialect_of, subprograms
-from ncfix.cli.parts import Source, part_bytes, source_of
-from ncfix.cli.targets import shown
-from ncfix.diagnostics import NcfixError
+from ncfix.cli.following import Following
+from ncfix.cli.parts import Source, source_of
+from ncfix.cli.through import dialect_in, parts_of, task_of, through
 
 if TYPE_CHECKING:
     from ncfix.compensate.checking import Checked
-    from ncfix.program.dialect import Dialect
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,45 +23,20 @@ class Looked:
 
 def looked_at(following: Following, path: str) -> Looked:
     """Look at a program."""
-    from ncfix.program.parts import NotInPartsError
-
     with source_of(path) as source:
-        head, long = source.looked_into()
-        if long:
-            fast.engage()
-            try:
-                return _in_parts(following, source)
-            except (NcfixError, NotInPartsError):
-                pass  # as a whole then; what is wrong with it is said there
-        program = following.read(path, source.everything() if long else head)
-    return Looked(program.dialect.name, following.checked(program, path))
+        return through([source], lambda: _in_parts(following, source), lambda: _whole(following, source))
 
 
 def _in_parts(following: Following, source: Source) -> Looked:
     """While it is read; raises what that does, and `NotInPartsError`."""
-    from ncfix.compensate.checking import OPTIONS
-    from ncfix.compensate.survey import survey_on
-    from ncfix.compensate.task import Task
+    from ncfix.compensate.survey import survey_alone, survey_on
 
-    name = shown(source.path)
-    dialect = dialect_of(source.head, name, following.dialect, following.machine)
+    dialect = dialect_in(following, source)
     if following.machine is None:
-        found = _alone(following, source, dialect)
-    else:
-        find = subprograms(source.path)
-        task = Task(following.machine, following.setup, OPTIONS, find, name, dialect, part_bytes())
-        found = survey_on(task, source.read)
-    source.check_unchanged()
-    return Looked(dialect.name, found)
+        return Looked(dialect.name, survey_alone(*parts_of(following, source, dialect)))
+    return Looked(dialect.name, survey_on(task_of(following, source, dialect), source.read))
 
 
-def _alone(following: Following, source: Source, dialect: Dialect) -> Checked:
-    """Without a machine: with the axes that the beginning of the text names."""
-    from ncfix.compensate.survey import survey_alone
-    from ncfix.program.language import Run
-    from ncfix.program.parts import PartReader
-
-    name, begun = shown(source.path), source.head[: source.head.rfind(b"\n") + 1]
-    axes = axes_of(PartReader(name, dialect).read(begun).templates)
-    run = Run(following.setup, axes, frozenset(ROTARY), subprograms(source.path))
-    return survey_alone(name, dialect, run, axes_of, source.read, part_bytes())
+def _whole(following: Following, source: Source) -> Looked:
+    program = following.read(source.path, source.everything())
+    return Looked(program.dialect.name, following.checked(program, source.path))

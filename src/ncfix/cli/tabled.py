@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from ncfix.cli.following import Following, figures, lines_of
+from ncfix.cli.following import Following, figures
 from ncfix.cli.options import subprograms
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import Message, Place, RefusedError
@@ -46,21 +46,24 @@ def along(
     Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
     its numbers show it.
     """
-    from ncfix.compensate.simulation import tip_error
-    from ncfix.compensate.tabled import seems_corrected, tip_error_with
+    from ncfix.compensate.along import Along
+    from ncfix.compensate.intent import Intent
+    from ncfix.compensate.simulation import tip_errors
+    from ncfix.compensate.tabled import seems_corrected, tip_with
+    from ncfix.machine import State
 
     program, followed = _followed(following, path)
     names, machine, moves = followed.machine.axis_names, followed.machine, followed.trace.moves
-    lines = lines_of(program, moves.block)
-    before = figures(tip_error(machine, moves), lines)
+    intent, lines = Intent(machine, moves, State()), program.lines(moves.block)
+    before = figures(Along.of(tip_errors(intent, lines)))
     if control.rewrites:
         after = rewritten(following, settings, path).report.as_dict()["error_after_um"] or before
     else:
         if seems_corrected(machine, moves):
             text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
             raise RefusedError.of("NCF438", text, Place(shown(path)), INSTEAD)
-        error = tip_error_with(machine, moves, lambda q, way, length: tables.for_tool(length).at(names, q, way))
-        after = figures(error, lines)
+        made = tip_with(lambda q, way, length: tables.for_tool(length).at(names, q, way))
+        after = figures(Along.of(tip_errors(intent, lines, made=made)))
     fixed_length = not (control.any_tool or control.rewrites) and machine.depends_on_tool_length
     remarks = list(_other_tools(moves.tool_length, tool_length)) if fixed_length else []
     return {"path": shown(path), "error_before_um": before, "error_after_um": after, "remarks": remarks}

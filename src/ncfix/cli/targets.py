@@ -73,11 +73,15 @@ class Target:
         """The name under which the input is kept when the output takes its place."""
         return f"{self.path}.orig"
 
+    @property
+    def file(self) -> str | None:
+        """The output's path; None for standard output."""
+        return None if self.path == STREAM else self.path
+
     def write(self, data: bytes | Iterable[bytes]) -> None:
         """Write the output whole or not at all; raises `UsageError` NCF004 ... NCF008."""
         if self.path == STREAM:
-            for part in (data,) if isinstance(data, bytes) else data:
-                console.put(part)
+            console.put_all((data,) if isinstance(data, bytes) else data)
         elif self.in_place:
             files.replace_keeping(self.path, self.backup, data)
         elif self.resume and not self.force and os.path.lexists(self.path):

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix.cli import console
-from ncfix.cli.following import Following, lines_of
+from ncfix.cli.following import Following
 from ncfix.cli.options import (
     dialect_option,
     force_option,
@@ -15,11 +19,14 @@ from ncfix.cli.options import (
     optional_machine_option,
     table_option,
 )
+from ncfix.cli.parts import Keep, Source, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.table import Columns, as_csv, known
 from ncfix.cli.targets import Outputs, shown, targets
+from ncfix.cli.through import dialect_in, parts_of, through
+from ncfix.diagnostics import Message
 
 if TYPE_CHECKING:
+    from ncfix.cli.table import Columns
     from ncfix.machine import Machine
     from ncfix.program.moves import Moves
     from ncfix.program.tree import Program
@@ -45,33 +52,66 @@ def trace(
     """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
     (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
     following = Following.of(machine_path, dialect, given)
-    with console.busy(f"following {shown(program)}"):
-        source = following.read(program)
-        found = following.trace(source, program)
-        columns = table_of(source, found.moves, following.machine)
-    console.tell(*found.messages)
-    if as_json:
-        console.put_json(path=shown(program), columns=list(columns), rows=list(zip(*columns.values(), strict=True)))
-    else:
-        target.write(as_csv(columns))
+    form = partial(_as_json, program) if as_json else _as_csv
+    with source_of(program) as source, ExitStack() as opened:
+        motions = Motions(following, source, form, Keep(None if as_json else target.file, opened))
+        with console.busy(f"following {shown(program)}"):
+            table, messages = through([source], motions.in_parts, motions.whole)
+        console.tell(*messages)
+        if as_json:
+            console.put_all(table)
+        else:
+            target.write(table)
+
+
+def _as_csv(tables: Iterable[Columns]) -> Iterator[bytes]:
+    from ncfix.cli.table import as_csv
+
+    return as_csv(tables)
+
+
+def _as_json(path: str, tables: Iterable[Columns]) -> Iterator[bytes]:
+    from ncfix.cli.table import as_json
+
+    return as_json(tables, path=shown(path))
+
+
+@dataclass(frozen=True, slots=True)
+class Motions:
+    """The motions of a program, to be written as a table: a long one in a file."""
+
+    following: Following
+    source: Source
+    form: Callable[[Iterable[Columns]], Iterator[bytes]]
+    keep: Keep
+
+    def in_parts(self) -> tuple[Iterable[bytes], Sequence[Message]]:
+        """The table and what there is to say, of a program that is read; raises what that does, `NotInPartsError`."""
+        machine = self.following.machine
+        parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
+        table = self.keep(self.form(table_of(part.program, part.moves, machine) for part in found))
+        parts.blocks_behind()
+        return table, parts.follower.messages
+
+    def whole(self) -> tuple[Iterable[bytes], Sequence[Message]]:
+        """The same of a program as a whole."""
+        path = self.source.path
+        program = self.following.read(path, self.source.everything())
+        found = self.following.trace(program, path)
+        return list(self.form([table_of(program, found.moves, self.following.machine)])), found.messages
 
 
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
     """The motions by columns, mm and degrees; the tip only where the machine is known."""
+    from ncfix.cli.table import Words, named
     from ncfix.program.moves import FeedMode, Kind, Rule
 
     positions, tip = _positions(moves, machine)
-    columns: Columns = {
-        "line": lines_of(program, moves.block),
-        "kind": [Kind(kind).name.lower() for kind in moves.kind],
-    }
-    columns |= {name: known(values) for name, values in zip(moves.axes, positions.T, strict=True)}
-    columns |= {f"tip_{name}": known(values) for name, values in zip("xyz", tip.T, strict=False)}
-    columns["feed"] = known(moves.feed)
-    columns["feed_mode"] = [FeedMode(mode).name.lower() for mode in moves.feed_mode]
-    columns["rule"] = [Rule(rule).name.lower() for rule in moves.rule]
-    columns["reason"] = [moves.reasons[reason] for reason in moves.reason]
-    return columns
+    columns: Columns = {"line": program.lines(moves.block), "kind": named(Kind, moves.kind)}
+    columns |= dict(zip(moves.axes, positions.T, strict=True))
+    columns |= {f"tip_{name}": values for name, values in zip("xyz", tip.T, strict=False)}
+    columns |= {"feed": moves.feed, "feed_mode": named(FeedMode, moves.feed_mode)}
+    return columns | {"rule": named(Rule, moves.rule), "reason": Words(moves.reasons, moves.reason)}
 
 
 def _positions(moves: Moves, machine: Machine | None) -> tuple[Any, Any]:

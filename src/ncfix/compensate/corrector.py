@@ -87,8 +87,6 @@ class Corrector:
                 continue
             yield number, self._corrected(unit, number, share, foreign)
             foreign = False
-        if error := self.units.missing():
-            raise error
 
     def _follow_on(self, unit: Unit, foreign: bool) -> None:
         """Take the proof past a part of another process, as programmed; `foreign`: so was the one before."""

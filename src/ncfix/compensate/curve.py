@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.compensate.ragged import owners, places
+from ncfix.compensate.ragged import owners, places, slices
 from ncfix.compensate.rows import finite, picked
-from ncfix.compensate.simulation import batches
+from ncfix.compensate.simulation import BATCH
 from ncfix.compensate.stretches import Stretches
 
 Tip = Callable[[Index, Array], Array]
@@ -47,8 +47,7 @@ class Curve:
         fresh = np.flatnonzero(stretches.opens)
         at = np.concatenate([rows, rows, rows[fresh]])
         fraction = np.concatenate([(start + stop) / 2, stop, start[fresh]])
-        parts = [tip(at[part], fraction[part]) for part in batches(len(at))]
-        points = np.concatenate(parts) if parts else np.empty((0, 3))
+        points = np.concatenate([tip(at[part], fraction[part]) for part in slices(len(at), BATCH)])
         middle, end = points[: len(rows)], points[len(rows) : 2 * len(rows)]
         begin = np.empty_like(end)
         begin[1:] = end[:-1]

@@ -121,15 +121,13 @@ class Cuts:
         machine = units.placed
         around = None
         for unit in units:
-            moves, lines = unit.part.moves, unit.part.program.lines(unit.part.moves.block)
+            moves, lines = unit.part.moves, unit.part.lines
             if not matters(machine):
                 yield Cut.of(Intent(machine, moves, State()), lines, slice(None), unit.part.last, self.meant)
                 continue
             intent, lines, counted = _with(around, machine, moves, lines)
             yield Cut.of(intent, lines, slice(counted, None if unit.part.last else -BESIDE), unit.part.last, self.meant)
             around = Around.behind(intent, lines)
-        if error := units.missing():
-            raise error
 
 
 def _with(around: Around | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate.crew import Read, Share
+from ncfix.compensate.findings import Index
 from ncfix.compensate.fix import refuse_stamped
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.passage import Passage
@@ -30,6 +31,11 @@ class Part:
     moves: Moves
     last: bool
     passage: Passage | None = None
+
+    @property
+    def lines(self) -> Index:
+        """The lines in which the motions are, (n,)."""
+        return self.program.lines(self.moves.block)
 
 
 @dataclass(slots=True)
@@ -90,6 +96,18 @@ class Parts:
             pending = []
             if last:
                 return
+
+    def blocks_behind(self) -> int:
+        """Blocks behind the end of the program; raises `NotInPartsError` if there is more there than the tape mark."""
+        count, text = 0, self.rest
+        while text:
+            if text.strip(b"% \t\r\n"):
+                raise NotInPartsError("text comes after the end of the program")
+            ended = text.endswith(b"\n")
+            count += text.count(b"\n")
+            text = self.read(self.size)
+            count += not text and not ended
+        return count
 
     def _tell(self, passage: Passage | None) -> None:
         """Tell others of an own part, once: before more text is read, which the first process may wait to hand out."""

@@ -115,10 +115,15 @@ def interior(
     `per_bend` samples for each time that the error may bend, from `least` to `most`, and one wherever an axis passes a
     kink or a jump of the error model, done as `real` has the motions. Those that are too long get the least.
     """
+    counts = closely(intent, rows, per_bend, least, most)
+    return with_kinks(intent, real, rows, counts, even(counts))
+
+
+def closely(intent: Intent, rows: Index, per_bend: float, least: int, most: int = MOST) -> Index:
+    """At how many places inside of motions to look, kinks apart, (k,): see `interior`."""
     often = bends(intent, rows)
     often[DENSITY * often >= MOST] = 0.0
-    counts = np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
-    return with_kinks(intent, real, rows, counts, even(counts))
+    return np.clip(np.ceil(per_bend * often), least, most).astype(np.intp)
 
 
 def with_kinks(

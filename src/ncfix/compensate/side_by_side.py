@@ -20,25 +20,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ncfix.compensate.along import Along, lines_of
 from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.cuts import Cut
-from ncfix.compensate.findings import Array, Index
+from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.holes import over_holes
 from ncfix.compensate.nearest import Search
-from ncfix.compensate.ragged import distinct
 from ncfix.diagnostics import DifferenceError
 
 UNLIKE = 0.02
 """Paths whose lengths differ by more than this share are not the same cut."""
 KEPT = 100.0
 """mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
-
-
-def lines_of(parts: list[Index]) -> list[int]:
-    """The lines that occur in parts, each once, in order."""
-    lines: list[int] = distinct(np.concatenate([np.zeros(0, dtype=np.intp), *parts])).tolist()
-    return lines
 
 
 @dataclass(slots=True)
@@ -96,53 +90,6 @@ class Track:
         curve = self.curve
         first = float(curve.lengths[start]) if start < len(curve) else self.reached
         return replace(curve.taken(slice(start, stop)), first=first)
-
-
-@dataclass(slots=True)
-class Along:
-    """How far a path is from another one, added up.
-
-    limit   mm; lines in which it is farther are noted
-    where   the line of the largest gap
-    beyond  lines with gaps beyond the limit, by parts; some twice
-    """
-
-    limit: float = np.inf
-    max: float = 0.0
-    where: int | None = None
-    squares: float = 0.0
-    way: float = 0.0
-    plain_squares: float = 0.0
-    count: int = 0
-    beyond: list[Index] = field(default_factory=list)
-
-    def add(self, lines: Index, gap: Array, weight: Array) -> None:
-        """Add gaps (k,) in lines (k,), with the way (k,) that each stands for."""
-        if not len(gap):
-            return
-        worst = int(np.argmax(gap))
-        if self.where is None or gap[worst] > self.max:
-            self.max, self.where = float(gap[worst]), int(lines[worst])
-        squares = gap**2
-        self.squares += float(squares @ weight)
-        self.way += float(weight.sum())
-        self.plain_squares += float(squares.sum())
-        self.count += len(gap)
-        if self.max > self.limit:
-            beyond = lines[gap > self.limit]
-            self.beyond.append(beyond[np.diff(beyond, prepend=-1) != 0])
-
-    @property
-    def rms(self) -> float:
-        """The root mean square along the path, mm; over the places where the path has no length."""
-        if not self.count:
-            return 0.0
-        return float(np.sqrt(self.squares / self.way if self.way else self.plain_squares / self.count))
-
-    @property
-    def lines_beyond(self) -> list[int]:
-        """The lines with gaps beyond the limit, in order."""
-        return lines_of(self.beyond)
 
 
 @dataclass(slots=True)

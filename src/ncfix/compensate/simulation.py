@@ -6,16 +6,20 @@ out, because how a control moves between their ends is its own affair, and so ar
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.crew import Read
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import owners
-from ncfix.compensate.sampling import MOST_SHOWN, interior, merged
-from ncfix.machine import Machine, State
+from ncfix.compensate.ragged import batches, owners
+from ncfix.compensate.sampling import MOST_SHOWN, closely, even, merged, with_kinks
+from ncfix.compensate.task import Task
+from ncfix.compensate.units import Units
+from ncfix.machine import State
 from ncfix.program.moves import Kind, Moves
 
 LEAST = 4
@@ -23,21 +27,32 @@ LEAST = 4
 BATCH = 200_000
 """Samples worked on at a time."""
 
+Tip = Callable[[Intent, Index, Array], Array]
+"""Motions (k,) and how far they are done (k,) -> where the tip is, (k, 3) mm."""
+
 
 @dataclass(frozen=True, slots=True)
 class TipError:
     """The tool tip along a path, k samples in order.
 
     rows      (k,) the motion that is done there
+    lines     (k,) the line in which it is
     fraction  (k,) how far it is done
     intended  (k, 3) where the tip should be, workpiece frame, mm
     actual    (k, 3) where it is
     """
 
     rows: Index
+    lines: Index
     fraction: Array
     intended: Array
     actual: Array
+
+    @classmethod
+    def none(cls) -> TipError:
+        """Of a path without a sample."""
+        rows, places = np.zeros(0, dtype=np.intp), np.zeros((0, 3))
+        return cls(rows, rows, np.zeros(0), places, places)
 
     @property
     def size(self) -> Array:
@@ -53,55 +68,51 @@ class TipError:
         weight: Array = (np.concatenate([[0.0], step]) + np.concatenate([step, [0.0]])) / 2
         return weight
 
-    @property
-    def max_mm(self) -> float:
-        """The largest error."""
-        return float(self.size.max(initial=0.0))
 
-    @property
-    def rms_mm(self) -> float:
-        """The root mean square along the path; over the samples where the path has no length."""
-        if not len(self.rows):
-            return 0.0
-        weight = self.weight
-        return float(np.sqrt(np.average(self.size**2, weights=weight if weight.sum() > 0 else None)))
-
-    def rows_beyond(self, limit_mm: float) -> Index:
-        """The motions with errors larger than a limit."""
-        found: Index = np.unique(self.rows[self.size > limit_mm])
-        return found
-
-    @property
-    def worst_row(self) -> int | None:
-        """The motion with the largest error; None without any."""
-        return int(self.rows[np.argmax(self.size)]) if len(self.rows) else None
-
-
-def tip_error(machine: Machine, moves: Moves, state: State = State()) -> TipError:  # noqa: B008
+def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = None) -> Iterator[TipError]:
     """The error of a program as this machine runs it: against what a perfect one would do at the same instant.
 
-    state  what else the errors depend on: `inputs`; tool lengths (which must be known) and directions are the motions'
+    Of motions from row `first` on, in lines (n,), some at a time; tool lengths must be known. `made` gives the actual
+    tip, if it is not that of the machine alone.
     """
-    intent = Intent(machine, moves, state)
-    rows, fraction = samples(intent)
-    tips = [_tips(intent, rows[part], fraction[part]) for part in batches(len(rows))]
-    intended, actual = (np.concatenate([each[k] for each in tips]) if tips else np.empty((0, 3)) for k in (0, 1))
-    return TipError(rows, fraction, intended, actual)
+    made = made or actual_tip
+    for rows, fraction in samples(intent, first):
+        yield TipError(rows, lines[rows], fraction, intent.tip(rows, fraction), made(intent, rows, fraction))
 
 
-def samples(intent: Intent) -> tuple[Index, Array]:
-    """Where to look: motions and fractions, ends included, as densely as the error model may bend."""
+def tip_errors_on(task: Task, read: Read) -> Iterator[TipError]:
+    """As `tip_errors`, of the text that is read; raises what following does, and `NotInPartsError`."""
+    units = Units.of(task, read)
+    for unit in units:
+        if units.sided:
+            intent, lines = unit.intent, unit.together.lines
+            yield from tip_errors(intent, lines, int(unit.head is not None))
+        else:
+            yield from tip_errors(Intent(units.placed, unit.part.moves, State()), unit.part.lines)
+    units.blocks_behind()
+
+
+def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:
+    """Where to look: motions and fractions, ends included, as densely as the error model may bend; some at a time."""
     moves = intent.moves
     known = np.isfinite(moves.end).all(axis=1) & moves.cuts
+    known[:first] = False
     hole = moves.kind == Kind.CYCLE
-    along = np.flatnonzero(known & ~hole & np.isfinite(moves.start).all(axis=1))
-    at_end = np.flatnonzero(known & hole)
-    counts, between = interior(intent, intent.segments, along, DENSITY, LEAST, MOST_SHOWN)
-    each, ends = np.arange(len(along)), np.ones(len(along))
-    counts, fraction = merged(len(along), (owners(counts), between), (each, 0 * ends), (each, ends))
-    rows = np.concatenate([along[owners(counts)], at_end])
-    order = np.argsort(rows, kind="stable")
-    return rows[order], np.concatenate([fraction, np.ones(len(at_end))])[order]
+    rows = np.flatnonzero(known & (hole | np.isfinite(moves.start).all(axis=1)))
+    counts, along = np.zeros(len(rows), dtype=np.intp), np.flatnonzero(~hole[rows])
+    counts[along] = closely(intent, rows[along], DENSITY, LEAST, MOST_SHOWN)
+    for some in batches(counts + 2, BATCH):
+        yield _samples(intent, rows[some], counts[some])
+
+
+def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
+    """Motions and fractions: of motions `rows` (k,) both ends, `counts` (k,) places between them, and kinks."""
+    along = np.flatnonzero(intent.moves.kind[rows] != Kind.CYCLE)
+    on, inside = rows[along], counts[along]
+    inside, between = with_kinks(intent, intent.segments, on, inside, even(inside))
+    begins, ends = (along, np.zeros(len(along))), (np.arange(len(rows)), np.ones(len(rows)))
+    counts, fraction = merged(len(rows), (along[owners(inside)], between), begins, ends)
+    return rows[owners(counts)], fraction
 
 
 def unseen(moves: Moves) -> Index:
@@ -111,16 +122,7 @@ def unseen(moves: Moves) -> Index:
     return np.flatnonzero(moves.cuts & lost)
 
 
-def batches(n: int) -> list[slice]:
-    """Samples 0 to n in runs of at most `BATCH`."""
-    return [slice(start, start + BATCH) for start in range(0, n, BATCH)]
-
-
 def actual_tip(intent: Intent, rows: Index, fraction: Array) -> Array:
     """Where the tip of the real machine is at fractions of motions done as programmed, (k, 3) mm."""
     tip: Array = intent.machine.actual_tip(intent.joints_at(rows, fraction), intent.states(rows, fraction))
     return tip
-
-
-def _tips(intent: Intent, rows: Index, fraction: Array) -> tuple[Array, Array]:
-    return intent.tip(rows, fraction), actual_tip(intent, rows, fraction)

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.double import looks_corrected
-from ncfix.compensate.findings import Array, Mask
+from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.simulation import TipError, batches, samples
+from ncfix.compensate.ragged import slices
+from ncfix.compensate.simulation import BATCH, Tip
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves, Rule
@@ -21,23 +22,21 @@ Correct = Callable[[Array, Array, float], Array]
 """Positions of all axes (k, n_axes) [mm, rad], ways (k, n_axes), tool length [mm] -> what the control adds to them."""
 
 
-def tip_error_with(machine: Machine, moves: Moves, correct: Correct, state: State = State()) -> TipError:  # noqa: B008
-    """The error of a program as this machine runs it with tables: see `tip_error`, which is that without them."""
-    intent = Intent(machine, moves, state)
-    rows, fraction = samples(intent)
-    intended, actual = np.empty((len(rows), 3)), np.empty((len(rows), 3))
-    for part in batches(len(rows)):
-        q = intent.joints_at(rows[part], fraction[part])
-        states = intent.states(rows[part], fraction[part])
+def tip_with(correct: Correct) -> Tip:
+    """Where the tip of the real machine is with tables active: see `simulation.actual_tip`, which is without them."""
+
+    def tip(intent: Intent, rows: Index, fraction: Array) -> Array:
+        q, states = intent.joints_at(rows, fraction), intent.states(rows, fraction)
         lengths = np.broadcast_to(np.asarray(states.tool_length, dtype=np.float64), (len(q),))
         ways = np.broadcast_to(np.asarray(states.direction, dtype=np.float64), q.shape)
         corrected = q.copy()
         for length in np.unique(lengths):
             some = lengths == length
             corrected[some] += correct(q[some], ways[some], float(length))
-        intended[part] = intent.tip(rows[part], fraction[part])
-        actual[part] = machine.actual_tip(corrected, states)
-    return TipError(rows, fraction, intended, actual)
+        actual: Array = intent.machine.actual_tip(corrected, states)
+        return actual
+
+    return tip
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
     shift = np.zeros_like(moves.end)
     intent = Intent(machine, moves, State())
     rows = np.flatnonzero(~kept)
-    for part in batches(len(rows)):
+    for part in slices(len(rows), BATCH):
         some = rows[part]
         ends = np.ones(len(some))
         corrected = get_strategy(FixOptions().strategy).correct(

@@ -27,11 +27,13 @@ class Unit:
 
     head       that motion and its block; None for the first part
     direction  (n_axes,) the way in which the axes came to where that motion begins
+    machine    with the workpiece in its place
     """
 
     part: Part
     head: Part | None
     direction: Signs
+    machine: Machine
 
     @cached_property
     def together(self) -> Part:
@@ -41,6 +43,11 @@ class Unit:
         program = joined([self.head.program, self.part.program])
         moves = joined_moves([self.head.moves, self.part.moves], [1, len(self.part.program)])
         return Part(program, moves, self.part.last)
+
+    @cached_property
+    def intent(self) -> Intent:
+        """The part behind that motion on the machine."""
+        return Intent(self.machine, self.together.moves, State(direction=self.direction))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -87,7 +94,10 @@ class Units(Parts):
         return (*self.follower.assumed, *self.tools)
 
     def __iter__(self) -> Iterator[Unit]:
-        """The parts; none any more once something is lacking. Raises what reading and following do."""
+        """The parts; none any more once something is lacking.
+
+        Raises what reading and following do, and at last UsageError for what the setup does not give.
+        """
         head, direction = None, np.zeros(len(self.machine.axes), dtype=np.int8)
         for found in self.parts():
             part = replace(found, moves=self._known(found))
@@ -95,17 +105,14 @@ class Units(Parts):
                 continue
             if self.look is not None:
                 self.look(part)
-            unit = Unit(part, head, direction)
+            unit = Unit(part, head, direction, self.placed)
             self._check_units(part.moves, head is None)
             if not part.last:
                 head, direction = self._head(unit)
             self.count += 1
             yield unit
-
-    def missing(self) -> UsageError | None:
-        """What the setup does not give, as an error."""
-        found = (*self.follower.lacking,) or (*self.lacking.values(),)
-        return UsageError.collected(found) if found else None
+        if missing := (*self.follower.lacking,) or (*self.lacking.values(),):
+            raise UsageError.collected(missing)
 
     def _known(self, part: Part) -> Moves:
         """The motions of a part with every tool length known; notes what is lacking."""
@@ -130,8 +137,7 @@ class Units(Parts):
         part, direction = unit.part, unit.direction
         head = Part(*last_of(part.program, part.moves), False)
         if self.sided:
-            moves = unit.together.moves
-            arrival = Intent(self.placed, moves, State(direction=direction)).arrival
+            arrival = unit.intent.arrival
             assert arrival is not None
-            direction = arrival[-2] if len(moves) > 1 else direction
+            direction = arrival[-2] if len(arrival) > 1 else direction
         return head, direction

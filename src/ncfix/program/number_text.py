@@ -171,7 +171,7 @@ def laid_out(numbers: Spelling) -> Texts:
     for k in range(QUAD * len(heads)):
         length += heads[0] & np.uint32(0xFF << 8 * k) != 0
     point = numbers.point * np.uint8(POINT)
-    return Texts(_without_zeros([*heads, numbers.sign, *before, point, *behind]), length)
+    return Texts(without_zeros([*heads, numbers.sign, *before, point, *behind]), length)
 
 
 def _digits(values: NDArray[Any]) -> IntArray:
@@ -201,7 +201,7 @@ def _in_quads(values: NDArray[Any], digits: int) -> list[NDArray[np.uint32]]:
     return quads
 
 
-def _without_zeros(columns: list[NDArray[Any]]) -> bytes:
+def without_zeros(columns: list[NDArray[Any]]) -> bytes:
     """The bytes of columns, row by row, but for zeros."""
     cells = np.empty((len(columns[0]), sum(column.itemsize for column in columns)), dtype=np.uint8)
     at = 0
