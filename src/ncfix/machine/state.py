@@ -13,7 +13,7 @@ from ncfix.diagnostics import UsageError
 from ncfix.machine.axis import Axis
 from ncfix.machine.se3 import Array
 
-CHUNK = 4096
+CHUNK = 8192
 """Poses handled at a time: few enough that the intermediate columns stay in the processor's cache."""
 LARGE = 1 << 15
 """The same where compiled loops go through them, which take them by the handful."""

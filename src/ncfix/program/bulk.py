@@ -34,7 +34,7 @@ Mask = NDArray[np.bool_]
 SHORTEST = 16
 """Stretches of fewer motions go one by one."""
 SWAPPED = bytes.maketrans(b".,", b",.")
-LONGEST = 1 << 12
+LONGEST = 1 << 14
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
