@@ -19,12 +19,16 @@ from ncfix import fast
 from ncfix.program.numbers import (
     BLANK,
     BLANKS,
+    EIGHT,
     EXACT_DIGITS,
     NUMERIC,
+    OWN,
     POINT,
     POWERS,
     SIGN,
     UNSIGNED_AFTER,
+    Numbers,
+    eight_at,
     fill,
     find_numbers,
     is_numeric,
@@ -54,7 +58,7 @@ class Scan:
     """What the scan of a text found, columns over its n blocks and m numbers.
 
     shapes        n keys: blocks with equal keys have equal shapes; None for a block that must be taken as it is
-    group         (n,) index into `shapes`, if they are given once each; None: one for each block
+    group         (n,) index into `shapes`, if most are given but once; None: one for each block
     comment       (n,) where the comment that ends the block starts, -1 without one
     first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
     spans         (m, 2) start and stop byte of each number
@@ -67,6 +71,20 @@ class Scan:
     spans: NDArray[np.int64]
     values: NDArray[np.float64]
     group: NDArray[np.int64] | None = None
+
+    @classmethod
+    def of(
+        cls, keys: bytes, blocks: NDArray[np.int64], comment: NDArray[np.int64], numbers: Numbers, apart: set[int]
+    ) -> Scan:
+        """Of the keys of all blocks, see `shape_keys`; the blocks `apart` must be taken as they are."""
+        shapes: list[bytes | None]
+        if apart:
+            shapes, group = list(keys.split(b"\n")[: len(blocks)]), None
+        else:
+            shapes, group = distinct(keys)
+        for block in apart:
+            shapes[block] = None
+        return cls(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values, group)
 
     def expanded(self) -> Scan:
         """The same, with a shape for each block."""
@@ -111,10 +129,9 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
     if pointless:
         marks[without_point(text, numbers.spans)] = POINTLESS_MARK
     ending = np.stack((starts[last], stops[last]), axis=1)
-    shapes = shape_keys(text, blocks, numbers.spans, ending, marks, numbers.covered)
-    for block in {*block_of(blocks, numbers.spans[numbers.broken, 0]).tolist(), *odd_blocks(text, blocks)}:
-        shapes[block] = None
-    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
+    keys = shape_keys(text, blocks, numbers.spans, ending, marks, numbers.covered)
+    apart = {*block_of(blocks, numbers.spans[numbers.broken, 0]).tolist(), *odd_blocks(text, blocks)}
+    return Scan.of(keys, blocks, comment, numbers, apart)
 
 
 def scan_compiled(
@@ -204,8 +221,8 @@ def shape_keys(
     comments: NDArray[np.int64],
     marks: NDArray[np.uint8],
     covered: NDArray[np.bool_],
-) -> list[bytes | None]:
-    """The key of each block: its bytes, with one mark for each number and for the comment at its end.
+) -> bytes:
+    """The key of each block and a line feed: its bytes, with one mark for each number and for the comment at its end.
 
     covered  (n,) the bytes that belong to numbers
     """
@@ -215,7 +232,38 @@ def shape_keys(
     for places, mark in ((numbers[:, 0], marks), (comments[:, 0], COMMENT_MARK), (blocks[:, 1], ord("\n"))):
         marked[places] = mark
     fill(marked, np.stack((np.append(0, blocks[:, 1] + 1), np.append(blocks[:, 0], len(text) + 1)), axis=1), 0)
-    return list(marked.tobytes().translate(None, b"\0").split(b"\n")[: len(blocks)])
+    return marked.tobytes().translate(None, b"\0")
+
+
+LONG = 8 * EIGHT
+"""Longer keys are not compared with others."""
+KINDS = 16
+"""So many of the different keys are sought among all others; the rest are rare."""
+
+
+def distinct(keys: bytes) -> tuple[list[bytes | None], NDArray[np.int64]]:
+    """The different ones of some keys, each with a line feed; rare ones more than once. And which one each of them is.
+
+    They are compared eight characters at a time, from the last one on.
+    """
+    padded = np.zeros((len(keys) + LONG) // EIGHT * EIGHT + 2 * EIGHT, dtype=np.uint8)
+    padded[LONG : LONG + len(keys)] = np.frombuffer(keys, dtype=np.uint8)
+    stops = np.flatnonzero(padded == ord("\n")) - LONG
+    starts = np.append(0, stops[:-1] + 1)
+    lengths, lanes = stops - starts, padded.view("<u8")
+    compared = range(0, min(int(lengths.max(initial=0)), LONG), EIGHT)
+    words = [eight_at(lanes, stops + LONG - EIGHT - k) & OWN.take(lengths - k, mode="clip") for k in compared]
+    group, rows = np.full(len(stops), -1), list[int]()
+    left = np.flatnonzero(lengths <= LONG)
+    while len(left) and len(rows) < KINDS:
+        same = reduce(np.logical_and, (word.take(left) == word[left[0]] for word in words), np.ones(len(left), bool))
+        group[left.compress(same)] = len(rows)
+        rows.append(int(left[0]))
+        left = left.compress(~same)
+    alone = np.flatnonzero(group < 0)
+    group[alone] = np.arange(len(rows), len(rows) + len(alone))
+    rows += alone.tolist()
+    return [keys[slice(*edges)] for edges in zip(starts[rows].tolist(), stops[rows].tolist(), strict=True)], group
 
 
 def without_point(text: NDArray[np.uint8], numbers: NDArray[np.int64]) -> NDArray[np.bool_]:

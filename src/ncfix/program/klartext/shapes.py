@@ -14,7 +14,6 @@ from ncfix.program.shapes import (
     ODD,
     Scan,
     block_of,
-    first_numbers,
     odd_blocks,
     scan_compiled,
     shape_keys,
@@ -88,11 +87,10 @@ def scan_plain(source: bytes, text: NDArray[np.uint8], blocks: NDArray[np.int64]
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    shapes = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
+    keys = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
     broken = block_of(blocks, numbers.spans[numbers.broken, 0]).tolist()
-    for block in {*broken, *odd_blocks(text, blocks), *of_several_lines(text, blocks)}:
-        shapes[block] = None
-    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
+    apart = {*broken, *odd_blocks(text, blocks), *of_several_lines(text, blocks)}
+    return Scan.of(keys, blocks, comment, numbers, apart)
 
 
 def inside(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.bool_]:

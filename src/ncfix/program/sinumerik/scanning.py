@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.numbers import fill, find_numbers, is_numeric, runs_of, table
-from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, first_numbers, matches, odd_blocks, shape_keys
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, matches, odd_blocks, shape_keys
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -44,13 +44,12 @@ def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     comment = np.full(len(blocks), -1, dtype=np.int64)
     comment[block_of(blocks, comments[:, 0])] = comments[:, 0]
     marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
-    shapes = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
+    keys = shape_keys(text, blocks, numbers.spans, comments, marks, numbers.covered)
     paths = PATH.finditer(source) if b";" in source else ()
     heads = np.array([match.start() for match in paths], dtype=np.int64)
     broken = block_of(blocks, numbers.spans[numbers.broken, 0])
-    for block in {*broken.tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}:
-        shapes[block] = None
-    return Scan(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values)
+    apart = {*broken.tolist(), *odd_blocks(text, blocks), *block_of(blocks, heads).tolist()}
+    return Scan.of(keys, blocks, comment, numbers, apart)
 
 
 def in_names(text: NDArray[np.uint8], source: bytes) -> NDArray[np.bool_]:
