@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ncfix.compensate.findings import Array
 from ncfix.compensate.idle import standing_still
 from ncfix.compensate.plain import Course
-from ncfix.compensate.rows import lengths
+from ncfix.compensate.rows import squares
 from ncfix.program.bulk import Bulk
 from ncfix.program.emit import Emission, emit
 from ncfix.program.language import Language
@@ -29,4 +31,4 @@ def written(language: Language, course: Course, position: Array, steps: Array) -
 def largest_shift(course: Course, emission: Emission) -> float:
     """The largest shift of the linear axes at the end of a motion, mm."""
     moves = course.part.moves
-    return float(lengths((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max())
+    return float(np.sqrt(squares((course.last(emission.end) - moves.end)[:, ~moves.rotary]).max()))

@@ -91,6 +91,8 @@ def differences(settled: Settled, again: Moves, own: Mask | None = None) -> Mask
         return None
     meant = emission.end if own is None else picked(emission.end, rows)
     differs: Mask = differ(again.end, meant) | _strayed(settled, again, rows)
+    if not pieces.arc.any():
+        return differs
     arcs = np.flatnonzero((pieces.arc & ~pieces.kept)[rows])
     if not arcs.size:
         return differs

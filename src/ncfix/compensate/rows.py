@@ -68,8 +68,13 @@ def extent(table: Array) -> tuple[Array, Array]:
 
 def lengths(vectors: Array) -> Array:
     """The lengths (n,) of vectors (n, k)."""
-    size: Array = np.sqrt(sum((column * column for column in vectors.T), np.zeros(len(vectors))))
+    size: Array = np.sqrt(squares(vectors))
     return size
+
+
+def squares(vectors: Array) -> Array:
+    """The squares of the lengths (n,) of vectors (n, k)."""
+    return sum((column * column for column in vectors.T), np.zeros(len(vectors)))
 
 
 def vector_product(first: Array, second: Array) -> Array:

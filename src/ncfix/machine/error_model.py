@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -70,13 +71,13 @@ class Group:
         return u, np.broadcast_to(way, u.shape)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ErrorModel:
     """The compiled effects of a machine."""
 
     groups: tuple[Group, ...]
 
-    @property
+    @cached_property
     def signals(self) -> frozenset[Signal]:
         """Every signal that matters."""
         found = [signal for group in self.groups for signal in (group.signal, group.factor)]

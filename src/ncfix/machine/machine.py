@@ -82,7 +82,7 @@ class Machine:
         """Lowest and highest position of each axis, shape (n_axes, 2), mm and rad; infinite where endless."""
         return np.array([axis.range for axis in self.axes], dtype=np.float64).reshape(-1, 2)
 
-    @property
+    @cached_property
     def is_perfect(self) -> bool:
         """Whether no effect has a coefficient that is not zero."""
         return not any(effect.active for effect in self.effects)

@@ -76,9 +76,12 @@ def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset
     length = np.asarray(state.tool_length, dtype=np.float64)
     direction = np.asarray(state.direction, dtype=np.float64)
     inputs = {name: _input(state, name) for name in sorted(names)}
-    parts = [q.shape[:-1], length.shape, direction.shape[:-1], *(values.shape for values in inputs.values())]
-    shape = np.broadcast_shapes(*parts)
-    columns = np.ascontiguousarray(np.broadcast_to(q, (*shape, len(axes))).reshape(-1, len(axes)).T)
+    parts = {q.shape[:-1], length.shape, direction.shape[:-1], *(values.shape for values in inputs.values())}
+    shape = q.shape[:-1]
+    if not parts <= {shape, ()}:
+        shape = np.broadcast_shapes(*parts)
+        q = np.broadcast_to(q, (*shape, len(axes)))
+    columns = np.ascontiguousarray(q.reshape(-1, len(axes)).T)
     flat = {name: np.broadcast_to(values, shape).reshape(-1) for name, values in inputs.items()}
     return shape, Poses(columns, _column(length, shape), _directions(direction, shape, len(axes)), flat)
 
@@ -100,7 +103,9 @@ def _column(values: Array, shape: tuple[int, ...]) -> Array:
 
 def _directions(values: Array, shape: tuple[int, ...], n_axes: int) -> Array:
     if values.ndim <= 1:
-        return np.array(np.broadcast_to(values, (n_axes,))).reshape(n_axes, 1)
+        same: Array = np.empty((n_axes, 1))
+        same[:, 0] = values
+        return same
     return np.broadcast_to(values, (*shape, n_axes)).reshape(-1, n_axes).T
 
 

@@ -89,9 +89,9 @@ def check_length(dialect: Dialect, length: int) -> None:
 
 
 class Columns(NamedTuple):
-    """The columns of a part of a program: how many numbers each block has; spans and values of these."""
+    """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
 
-    counts: NDArray[np.int64]
+    first: NDArray[np.int64]
     spans: NDArray[np.int64]
     values: NDArray[np.float64]
 
@@ -131,8 +131,8 @@ class Reading:
         """Read all parts, then what follows the end of the tape."""
         parts = [self.part(first, stop) for first, stop in self.parts()]
         parts.append(self.tail())
-        parts = [part for part in parts if len(part.counts)] or parts[:1]
-        counts, spans, values = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts, strict=True))
+        parts = [part for part in parts if len(part.first) > 1] or parts[:1]
+        first, spans, values = parts[0] if len(parts) == 1 else joined(parts)
         return Program(
             source=self.source,
             path=self.path,
@@ -140,7 +140,7 @@ class Reading:
             templates=tuple(self.templates),
             template=self.rows,
             blocks=self.blocks,
-            first_number=np.concatenate(([0], np.cumsum(counts))),
+            first_number=first,
             number_spans=spans,
             numbers=values,
             first_line=self.first_line,
@@ -166,7 +166,7 @@ class Reading:
         if None not in known:
             shapes = np.array(known, dtype=np.int32)
             self.take(shapes if found.group is None else shapes[found.group])
-            return Columns(np.diff(found.first_number), moved_by(found.spans, self.blocks[first, 0]), found.values)
+            return Columns(found.first_number, moved_by(found.spans, self.blocks[first, 0]), found.values)
         exact: dict[int, Parsed] = {}
         if found.group is not None:
             known = [known[group] for group in found.group.tolist()]
@@ -176,8 +176,8 @@ class Reading:
         for row in lacking:
             template = self.index.get(found.shapes[row])
             self.rows[first + row] = self.learn(first, row, found, exact) if template is None else template
-        counts, spans, values = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
-        return Columns(counts, spans + self.blocks[first, 0], values)
+        columns = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
+        return columns._replace(spans=columns.spans + self.blocks[first, 0])
 
     def learned(self, first: int, found: Scan, known: list[int | None]) -> bool:
         """Learn the shapes that are not known yet from the first block of each; whether that will do."""
@@ -208,7 +208,7 @@ class Reading:
         count = len(self.blocks) - self.done
         if count:
             self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
-        return Columns(np.zeros(count, np.int64), np.empty((0, 2), np.int64), np.empty(0))
+        return Columns(np.zeros(count + 1, np.int64), np.empty((0, 2), np.int64), np.empty(0))
 
     def take(self, templates: NDArray[np.int32]) -> None:
         """Note the templates of the next blocks."""
@@ -295,9 +295,9 @@ def agrees(found: Scan, row: int, parsed: Parsed, start: int) -> bool:
 
 def with_exact(found: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
     """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
-    counts = np.diff(found.first_number)
     if not exact:
-        return Columns(counts, found.spans, found.values)
+        return Columns(found.first_number, found.spans, found.values)
+    counts = np.diff(found.first_number)
     owner = np.repeat(np.arange(len(counts)), counts)
     keep = ~np.isin(owner, list(exact))
     parts = [(owner[keep], found.spans[keep], found.values[keep])]
@@ -306,4 +306,15 @@ def with_exact(found: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64])
         parts.append((np.full(len(spans), row), spans, np.array(parsed.values)))
     owner, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.argsort(owner, kind="stable")
-    return Columns(np.bincount(owner, minlength=len(counts)), spans[order], values[order])
+    return Columns(firsts(np.bincount(owner, minlength=len(counts))), spans[order], values[order])
+
+
+def joined(parts: list[Columns]) -> Columns:
+    """The columns of parts that follow each other."""
+    counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
+    return Columns(firsts(counts), spans, values)
+
+
+def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
+    return np.concatenate(([0], np.cumsum(counts)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,13 +75,6 @@ class Stretch:
     end: FloatArray
     adrift: IntArray
     path: FloatArray | None = None
-
-    def only(self, rows: NDArray[np.bool_]) -> Stretch:
-        """Some of the motions, (n,)."""
-        if rows.all():
-            return self
-        names = (each.name for each in fields(self) if each.name != "path")
-        return Stretch(*(getattr(self, name).compress(rows, axis=0) for name in names))
 
     def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
         """Where the motions start and end, by some of the letters; views of one path where they go on."""

@@ -104,14 +104,14 @@ def take(control: Control, stage: Stage, block: int, main: bool) -> None:
         modal.feed_given = modal.feed != 0.0
     if not moving.any():
         return
-    blocks = np.arange(block, block + len(moving)) if main else np.full(len(moving), control.row_block)
-    styles = np.where(stage.motion == 0, style(control, Kind.RAPID), style(control, Kind.FEED))
+    blocks, stage = np.arange(block, block + len(moving)), stage.only(moving)
+    blocks = blocks.compress(moving) if main else np.full(len(stage.mask), control.row_block)
     control.places.begun = True
-    plane, adrift = control.still_beside(0), np.full(len(moving), control.places.adrift)
+    plane, adrift = control.still_beside(0), np.full(len(blocks), control.places.adrift)
     if plane:
         adrift |= np.where(stage.mask & plane != 0, 0, plane)
     path = stage.path
-    stretch = Stretch(blocks, stage.mask, styles, stage.feed, path[:-1], path[1:], adrift, path).only(moving)
+    stretch = Stretch(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
     if plane:
         control.builder.many_rest(resting_of_many(control, stretch.programmed, stretch.start, stretch.end))
     control.builder.extend(stretch)
@@ -119,6 +119,9 @@ def take(control: Control, stage: Stage, block: int, main: bool) -> None:
     modal.cycle.initial = None
 
 
-def style(control: Control, kind: Kind) -> int:
-    """The style of motions whose start and end are known."""
-    return control.style_of(kind, 0 if kind == Kind.RAPID else 10)
+def styles(control: Control, stage: Stage) -> IntArray:
+    """The styles of motions whose start and end are known, (n,)."""
+    rapid = stage.motion == 0
+    if not rapid.any():
+        return np.full(len(rapid), control.style_of(Kind.FEED, 10))
+    return np.where(rapid, control.style_of(Kind.RAPID, 0), control.style_of(Kind.FEED, 10))

@@ -61,6 +61,14 @@ class Stage:
         path = self.path[start : stop + 1]
         return Stage(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own])
 
+    def only(self, moving: Mask) -> Stage:
+        """The blocks that move anything, (n,): the others lead nowhere."""
+        if moving.all():
+            return self
+        path = np.concatenate((self.path[:1], self.path[1:].compress(moving, axis=0)))
+        columns = self.feed, self.fed, self.motion, self.coded, self.mask
+        return Stage(path, *(column.compress(moving) for column in columns))
+
 
 def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
     """What blocks say, and where they lead."""
