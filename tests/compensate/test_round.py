@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_machine
 from compensate.motions import Arc, dense_errors, motions
 from ncfix.compensate.budget import Closure
+from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.path import plan
 from ncfix.compensate.round import SHORTEST, WIDEST
 from ncfix.compensate.strategies import get_strategy
-from ncfix.machine import Effect, Machine
+from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Polynomial
 from ncfix.program.moves import Moves
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup
 
 TOLERANCE = 1e-3
 TURN = 2 * np.pi
@@ -101,3 +106,14 @@ def test_where_rounding_could_break_the_closure_pieces_are_straight() -> None:
         arc_pieces=True,
     )
     assert not result.pieces.arc[1:].any()
+
+
+def test_a_short_piece_that_would_bend_the_other_way_is_straight(root: Path) -> None:
+    """The error bends more than the arc does in so short a piece: as an arc, a control would go the long way round."""
+    arc = "G2 I8.660254 J5.000000 X31.160254 Y1.000000 Z1.500000"
+    text = f"G21 G90 G17 F100\nG0 X0 Y0 Z20\nG1 X19.500000 Y4.500000 Z8.000000\nG0 X22.5 Y6. Z5.\n{arc}\nM2\n"
+    program = read(text.encode(), "a.ngc", "linuxcnc")
+    machine = load(str(root / "examples/machines/wCBXFZYSt.toml"))
+    fixed = fix_program(program, machine, Setup(assume_zero=True), FixOptions(tolerance_um=2.0))
+    assert fixed.text.count(b"G1 ") == 2
+    assert fixed.report.error_after_um["max"] < 2.0

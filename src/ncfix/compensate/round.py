@@ -3,12 +3,13 @@
 A corrected arc need not be an arc: scales that differ make an ellipse of it, play a step where an axis reverses. Short
 arcs follow it with far fewer blocks than straight pieces, and as smoothly. The centre of a piece lies on the
 perpendicular bisector of its ends, so that the radii agree; where along the bisector is found by least squares over
-the nodes between. Pieces too short for a control to tell their centre are straight.
+the nodes between. Pieces too short for a control to tell their centre are straight, and so are those that bend the
+other way than the arc turns: a control would go the long way round.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -123,7 +124,9 @@ class RoundGrid:
         squares = sums(np.einsum("ki,ki->k", slope, slope), inner)
         miss = (command[node] - here)[:, self.columns]
         amount = sums(np.einsum("ki,ki->k", slope, miss), inner) / np.maximum(squares, 1e-12)
-        return _on_bisector(pieces, way, height + np.where(squares > 0, amount, 0.0)), share
+        best = _on_bisector(pieces, way, height + np.where(squares > 0, amount, 0.0))
+        same = best.sweep * turn > 0
+        return replace(best, arc=best.arc & same, centre=np.where(same[:, None], best.centre, np.nan)), share
 
     def _off(self, pieces: Segments, first: Index, inner: Index, share: Array) -> Array:
         piece = owners(inner)
