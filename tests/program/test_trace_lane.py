@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from random import Random
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -15,8 +17,10 @@ from hypothesis import strategies as st
 from ncfix import fast
 from ncfix.diagnostics import NcfixError
 from ncfix.program.follow import lane
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Kind, Moves
+from ncfix.program.rs274 import arc_motion
 from ncfix.program.setup import Setup
+from program.arcs import full_of_arcs
 from program.tracing import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1
@@ -94,6 +98,31 @@ def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
     assert_same("\n".join([head, *body]), dialect)
 
 
+def without_a_word(random: Random, block: str) -> str:
+    """A block that lacks one of its words, or has it with another letter."""
+    words = block.split(" ")
+    at = random.randrange(len(words))
+    words[at] = random.choice(["", random.choice("XYZIJKR") + words[at][1:]])
+    return " ".join(words)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso"]))
+def test_both_lanes_make_the_same_arcs(seed: int, dialect: str) -> None:
+    random = Random(seed)
+    body = full_of_arcs(seed, 60)
+    for place in random.sample(range(60), random.randint(0, 5)):
+        body.insert(place, random.choice([*SETTINGS, "G41 D1", "G40", "F0", "G90.1", "G91.1", "M5", "G2", "X1 Y1 Z1"]))
+    if random.random() < 0.5:
+        body[-5] = without_a_word(random, body[-5])
+    assert_same("\n".join(["G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.9 else "X0 Y0", *body]), dialect)
+
+
+def test_arcs_with_centres_that_count_from_zero() -> None:
+    blocks = [f"G3 X{math.cos(turn):.4f} Y{math.sin(turn):.4f} I0 J0" for turn in np.linspace(0.5, 6, 12)]
+    assert_same("\n".join(["G90.1 G55 F100 G0 X1 Y0 Z0 B0 C0", *blocks, "X1 Y0 I0 J.2", *blocks]))
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -103,6 +132,11 @@ def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
         "G41 D1 F1\nG1 X1\nX2\nG40 X3",
         "o1 repeat [3]\nG91 G1 F1 X1\nY1\nX-1\no1 endrepeat\nG90\nX0\nX1",
         "G0 X1\nG0 X2 A5\nX3",
+        "F1 G1 X1\nX2 I1\nX3",
+        "G18 F1 G2 X1 I.5\nX2 J.5\nX3",
+        "F1 G2 X2 R1\nX2 R1\nX3 I1 J1 R1",
+        "F1 G3 I1\nJ1\nI1 P2\nR1",
+        "F0 G1 X1\nG2 X2 I.5\nG1 X3",
     ],
 )
 def test_what_is_not_for_the_lane_is_left_alone(text: str) -> None:
@@ -159,3 +193,11 @@ def test_the_lane_takes_what_it_should() -> None:
         moves = follow(text, "XYZBC").moves
     assert moves.end[1:, 0].tolist() == list(range(100))
     assert np.array_equal(moves.start[1:], moves.end[:-1])
+
+
+def test_the_lane_takes_arcs() -> None:
+    body = [f"G{2 + i % 2} X{i} I.25\nX{i + 0.5} R.25" for i in range(1, 100)]
+    with mock.patch.object(arc_motion, "circle", side_effect=arc_motion.circle) as one_by_one:
+        moves = follow("\n".join(["G0 X0 Y0 Z0 B0 C0 F100\nG3 X.5 R.25", *body]), "XYZBC").moves
+    assert np.count_nonzero(moves.kind == Kind.ARC) == 199
+    assert one_by_one.call_count == 1

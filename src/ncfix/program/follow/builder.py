@@ -60,6 +60,15 @@ class Arc(NamedTuple):
     fixed: bool = False
 
 
+class Circles(NamedTuple):
+    """The circles of k arcs in one plane, as columns of `Arc`; `row` (k,): which of some motions these are."""
+
+    row: IntArray
+    centre: FloatArray
+    normal: tuple[float, float, float]
+    sweep: FloatArray
+
+
 @dataclass(slots=True)
 class Stretch:
     """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
@@ -134,6 +143,7 @@ class Builder:
         self._reasons: dict[str, int] = {"": 0}
         self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
         self._arcs: dict[int, Arc] = {}
+        self._circles: list[Circles] = []
         self._approaches: dict[int, Vector] = {}
         self._counted: dict[int, int] = {}
         self._resting: dict[int, int] = {}
@@ -196,6 +206,10 @@ class Builder:
     def arc(self, arc: Arc) -> None:
         """The circle of the motion that is added next."""
         self._arcs[self.count] = arc
+
+    def circles(self, circles: Circles) -> None:
+        """The circles among the motions that are added next."""
+        self._circles.append(circles._replace(row=circles.row + self.count))
 
     def approach(self, command: Vector) -> None:
         """The command at the level R of the canned cycle that is added next."""
@@ -281,7 +295,7 @@ class Builder:
         """Forget the motions so far; styles, reasons and frames keep their numbers."""
         self.count = 0
         self.overturned = self.brought_back = None
-        self._said, self._resting = [], {}
+        self._said, self._resting, self._circles = [], {}, []
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
@@ -358,12 +372,14 @@ class Builder:
 
     def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         rows, nowhere, none = list(self._arcs), np.broadcast_to(np.nan, (count, 3)), np.broadcast_to(np.nan, count)
-        centre, normal, sweep = nowhere, nowhere, none
+        if not (rows or self._circles):
+            return nowhere, nowhere, none
+        centre, normal, sweep = nowhere.copy(), nowhere.copy(), none.copy()
         if rows:
-            centre, normal, sweep = nowhere.copy(), nowhere.copy(), none.copy()
-            centre[rows] = [arc.centre for arc in self._arcs.values()]
-            normal[rows] = [arc.normal for arc in self._arcs.values()]
-            sweep[rows] = [arc.sweep for arc in self._arcs.values()]
+            columns = list(zip(*self._arcs.values(), strict=True))
+            centre[rows], normal[rows], sweep[rows] = columns[:3]
+        for each in self._circles:
+            centre[each.row], normal[each.row], sweep[each.row] = each.centre, each.normal, each.sweep
         return centre, normal, sweep
 
 

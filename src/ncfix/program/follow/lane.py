@@ -1,4 +1,4 @@
-"""The fast lane: stretches of straight motions with plain numbers, taken all at once.
+"""The fast lane: stretches of straight motions and arcs with plain numbers, taken all at once.
 
 It does what the interpreter would do block by block, with the same operations in the same order, so that the
 results are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
@@ -6,20 +6,23 @@ results are the same to the last bit; a test holds the two together. What it can
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from ncfix.program.follow.ahead import Ahead, rows_before
-from ncfix.program.follow.builder import Stretch
+from ncfix.program.follow.arcs import CLOCKWISE, COUNTER
+from ncfix.program.follow.builder import Circles, Stretch
 from ncfix.program.follow.contour import resting_of_many
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.lane_tables import Lane
-from ncfix.program.follow.stage import LONGEST, IntArray, Stage, Text
+from ncfix.program.follow.stage import LONGEST, IntArray, Mask, Stage, Text
 from ncfix.program.moves import FeedMode, Kind
 
 SHORTEST = 16
 """Stretches of fewer blocks go one by one."""
+ARCS = (CLOCKWISE, COUNTER)
 
 
 class HasLane(Protocol):
@@ -44,17 +47,32 @@ class Unit(Text, Protocol):
         """The first block from `block` on that cannot go through the fast lane."""
 
 
-def run_lane(control: Control, unit: Unit, block: int, main: bool) -> int:
-    """Take the stretch that begins with a block; the number of blocks taken, 0 for none."""
+Turned = tuple[Circles | None, int]
+"""The circles of the arcs of a stage, and how many of its blocks run before one that the lane cannot take."""
+
+
+def run_lane(
+    control: Control,
+    unit: Unit,
+    block: int,
+    main: bool,
+    turned: Callable[[int, Stage], Turned] | None = None,
+) -> int:
+    """Take the stretch that begins with a block; the number of blocks taken, 0 for none.
+
+    turned  of languages that have arcs in the fast lane: finds the circles of a stage that begins with a block
+    """
     stop = min(unit.lane_end(block), block + LONGEST)
     if stop - block < SHORTEST or not is_open(control, unit, block):
         return 0
     stage = unit.ahead.stretch(control, unit, block, stop)
-    count = min(before_placing(control, stage.mask, 0), count_allowed(control, stage))
+    count, circles = min(before_placing(control, stage.mask, 0), count_allowed(control, stage)), None
+    if turned is not None and stage.turns is not None and count >= SHORTEST:
+        circles, count = turned(block, stage.rows(0, count))
     if count < SHORTEST:
         return 0
     unit.ahead.done = block + count
-    take(control, stage.rows(0, count), block, main)
+    take(control, stage.rows(0, count), block, main, circles)
     return count
 
 
@@ -62,7 +80,7 @@ def is_open(control: Control, unit: Unit, block: int) -> bool:
     """Whether the state allows the fast lane at all."""
     modal = control.modal
     lane = unit.plan(block).lane
-    begun = modal.motion in (0, 10) or (lane is not None and lane.motion >= 0)
+    begun = modal.motion in (0, 10) or (lane is not None and (lane.motion >= 0 or lane.turns))
     known = not (control.unknown or control.shaky or control.is_rotated)
     return begun and known and (modal.incremental or control.offset_checked)
 
@@ -84,7 +102,7 @@ def count_allowed(control: Control, stage: Stage) -> int:
     exact = control.needs_feed or modal.feed_mode == FeedMode.INVERSE_TIME
     if not exact or (modal.feed_mode == FeedMode.PER_MINUTE and modal.feed_given and stage.feed.all()):
         return count
-    at_feed = (stage.motion == 10) & ((stage.mask != 0) | stage.coded)
+    at_feed = (stage.motion >= 10) & (moving(stage) | stage.coded)
     if modal.feed_mode == FeedMode.INVERSE_TIME:
         refused = at_feed & ~stage.fed
     elif modal.feed_mode == FeedMode.PER_REVOLUTION and modal.speed == 0.0:
@@ -95,17 +113,21 @@ def count_allowed(control: Control, stage: Stage) -> int:
     return int(np.argmax(refused)) if refused.any() else count
 
 
-def take(control: Control, stage: Stage, block: int, main: bool) -> None:
-    """Add the motions of a stretch, and leave the control as they leave it."""
-    modal, moving = control.modal, stage.mask != 0
-    modal.motion = modal.straight = int(stage.motion[-1])
-    if stage.fed.any():
-        modal.feed = float(stage.feed[-1])
-        modal.feed_given = modal.feed != 0.0
-    if not moving.any():
+def moving(stage: Stage) -> Mask:
+    """(n,) blocks that make a motion."""
+    named: Mask = stage.mask != 0
+    return named if stage.turns is None else named | stage.turns
+
+
+def take(control: Control, stage: Stage, block: int, main: bool, circles: Circles | None = None) -> None:
+    """Add the motions of a stretch, and leave the control as they leave it; `circles`: of its arcs, by their block."""
+    modal, moves = control.modal, moving(stage)
+    note_codes(control, stage)
+    if not moves.any():
         return
-    blocks, stage = np.arange(block, block + len(moving)), stage.only(moving)
-    blocks = blocks.compress(moving) if main else np.full(len(stage.mask), control.row_block)
+    rows = np.empty(0, dtype=np.int64) if circles is None else np.cumsum(moves)[circles.row] - 1
+    blocks, stage = np.arange(block, block + len(moves)), stage.only(moves)
+    blocks = blocks.compress(moves) if main else np.full(len(stage.mask), control.row_block)
     control.places.begun = True
     plane, adrift = control.still_beside(0), np.full(len(blocks), control.places.adrift)
     if plane:
@@ -113,15 +135,34 @@ def take(control: Control, stage: Stage, block: int, main: bool) -> None:
     path = stage.path
     stretch = Stretch(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
     if plane:
-        control.builder.many_rest(resting_of_many(control, stretch.programmed, stretch.start, stretch.end))
+        resting = resting_of_many(control, stretch.programmed, stretch.start, stretch.end)
+        resting[rows] = 0
+        control.builder.many_rest(resting)
+    if circles is not None:
+        control.builder.circles(circles._replace(row=rows))
     control.builder.extend(stretch)
     control.position = path[-1].tolist()
     modal.cycle.initial = None
 
 
+def note_codes(control: Control, stage: Stage) -> None:
+    """Leave feed and motion codes in force as a stretch leaves them."""
+    modal, straight = control.modal, stage.motion <= 10
+    modal.motion = int(stage.motion[-1])
+    if straight.any():
+        modal.straight = int(stage.motion[np.flatnonzero(straight)[-1]])
+    if stage.fed.any():
+        modal.feed = float(stage.feed[-1])
+        modal.feed_given = modal.feed != 0.0
+
+
 def styles(control: Control, stage: Stage) -> IntArray:
     """The styles of motions whose start and end are known, (n,)."""
+    found = np.full(len(stage.motion), control.style_of(Kind.FEED, 10))
     rapid = stage.motion == 0
-    if not rapid.any():
-        return np.full(len(rapid), control.style_of(Kind.FEED, 10))
-    return np.where(rapid, control.style_of(Kind.RAPID, 0), control.style_of(Kind.FEED, 10))
+    if rapid.any():
+        found[rapid] = control.style_of(Kind.RAPID, 0)
+    for code in () if stage.turns is None else ARCS:
+        if (round_ := stage.motion == code).any():
+            found[round_] = control.style_of(Kind.ARC, code)
+    return found

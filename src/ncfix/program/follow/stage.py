@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -46,6 +46,7 @@ class Stage:
     feed    (n,) feed in force, mm/min, 1/min or mm/rev; `fed` where the block has an F
     motion  (n,) motion code in force, in tenths; `coded` where the block has one
     mask    (n,) axis words, as bits
+    turns   (n,) arcs; None: no block can be one
     """
 
     path: FloatArray
@@ -54,12 +55,14 @@ class Stage:
     motion: FloatArray
     coded: Mask
     mask: IntArray
+    turns: Mask | None = None
 
     def rows(self, start: int, stop: int) -> Stage:
         """Some of the blocks."""
         own = slice(start, stop)
         path = self.path[start : stop + 1]
-        return Stage(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own])
+        turns = None if self.turns is None else self.turns[own]
+        return Stage(path, self.feed[own], self.fed[own], self.motion[own], self.coded[own], self.mask[own], turns)
 
     def only(self, moving: Mask) -> Stage:
         """The blocks that move anything, (n,): the others lead nowhere."""
@@ -67,7 +70,8 @@ class Stage:
             return self
         path = np.concatenate((self.path[:1], self.path[1:].compress(moving, axis=0)))
         columns = self.feed, self.fed, self.motion, self.coded, self.mask
-        return Stage(path, *(column.compress(moving) for column in columns))
+        turns = None if self.turns is None else self.turns.compress(moving)
+        return Stage(path, *(column.compress(moving) for column in columns), turns)
 
 
 def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
@@ -76,7 +80,8 @@ def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
     shapes, first = program.template[start:stop], program.first_number[start:stop]
     follow = followed_compiled if fast.engaged() else followed
     before = feed_unit(control), control.modal.feed, float(control.modal.motion)
-    return follow(control, program.numbers, first, shapes, unit.lanes, before)
+    stage = follow(control, program.numbers, first, shapes, unit.lanes, before)
+    return replace(stage, turns=unit.lanes.turns.take(shapes)) if unit.lanes.turns.any() else stage
 
 
 def feed_unit(control: Control) -> float:

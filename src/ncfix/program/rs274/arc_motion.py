@@ -96,9 +96,13 @@ def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clock
     if control.modal.arc_absolute:
         here = control.program_position()
         first, second = first - here[plane.first], second - here[plane.second]
-    tolerance = control.dialect.closure_mm * (1.0 if unit == 1.0 else INCH / 10)
-    check_closure((first, second), end, tolerance, control.dialect.closure_relative)
+    check_closure((first, second), end, closure_mm(control), control.dialect.closure_relative)
     return first, second
+
+
+def closure_mm(control: Control) -> float:
+    """By how much the radii at both ends of an arc may differ, mm."""
+    return control.dialect.closure_mm * (1.0 if control.modal.unit == 1.0 else INCH / 10)
 
 
 def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
@@ -13,6 +14,7 @@ from ncfix.program.follow.lane import run_lane
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.rs274 import predefined, systems
+from ncfix.program.rs274.arc_lane import turned
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
@@ -107,7 +109,8 @@ class Interpreter:
                 return
             plan = flow.unit.plan(flow.block)
             if plan.lane is not None and self.takes_stretches():
-                done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main)
+                circles = partial(turned, self.control, flow.unit)
+                done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
                 if done:
                     if self.recorder:
                         self.recorder.stretch(flow.unit, flow.block, done)

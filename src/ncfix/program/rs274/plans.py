@@ -43,6 +43,7 @@ SMOOTHING = 51
 """G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
+ARC_LETTERS = frozenset("IJKR")
 CONFLICT = "NCF208"
 UNKNOWN_M = "NCF229"
 MAX_M_CODES = 4
@@ -138,7 +139,7 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     take_values(plan, rules)
     take_statements(plan, rules)
     take_codes(plan, rules)
-    plan.lane = lane_of(plan)
+    plan.lane = lane_of(plan, rules)
     return plan
 
 
@@ -258,16 +259,27 @@ def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
         raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
 
 
-def lane_of(plan: Plan) -> Lane | None:
-    """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
-    codes = plan.codes
+def lane_of(plan: Plan, rules: Rules) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers.
+
+    Arcs of dialects with steps of their own go one by one.
+    """
+    codes, slots = plan.codes, dict(plan.literals)
     plain = all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
-    if not plain or plan.unread or plan.command or codes is None or plan.computed or not plan.letters <= LANE_LETTERS:
+    if not plain or plan.unread or plan.command or codes is None or plan.computed:
         return None
-    if any(letter in INDEX for letter in plan.pointless):
+    if any(letter in INDEX for letter in plan.pointless) or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
         return None
-    if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION} or codes.motion not in (None, 0, 10):
+    lane = Lane(
+        tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX),
+        slots.get("F", -1),
+        -1 if codes.motion is None else codes.motion,
+        (slots.get("I", -1), slots.get("J", -1), slots.get("K", -1)),
+        slots.get("R", -1),
+    )
+    if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION}:
         return None
-    axes = tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX)
-    feed = dict(plan.literals).get("F", -1)
-    return Lane(axes, feed, -1 if codes.motion is None else codes.motion)
+    if not lane.turns:
+        return lane if lane.motion in (-1, 0, 10) else None
+    ambiguous = lane.radius >= 0 and max(lane.centre) >= 0
+    return None if rules.steps or ambiguous or lane.motion not in (-1, 20, 30) else lane

@@ -1,0 +1,96 @@
+"""Arcs in the fast lane: the circles of all arcs of a stretch, as `arc_motion.arc` finds that of one block.
+
+What blocks say is read as columns; where a centre lies, whether the control accepts the arc, and how far it turns, is
+asked of `follow.arcs`, arc by arc.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ncfix.program.follow.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
+from ncfix.program.follow.builder import Circles
+from ncfix.program.follow.coordinates import IDENTITY
+from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.lane_tables import LaneTables
+from ncfix.program.follow.stage import FloatArray, IntArray, Mask, Stage, words
+from ncfix.program.rs274.arc_motion import closure_mm
+from ncfix.program.rs274.control import Control
+from ncfix.program.rs274.unit import Unit
+
+
+def turned(control: Control, unit: Unit, block: int, stage: Stage) -> tuple[Circles | None, int]:
+    """The circles of the arcs of a stage that begins with a block, and how many blocks run before one for `arc`.
+
+    That is what the lane cannot take: an arc that the control refuses, or one without the words that it needs.
+    """
+    count = fitting(control, unit, block, stage)
+    assert stage.turns is not None
+    rows = np.flatnonzero(stage.turns[:count])
+    if not rows.size:
+        return None, count
+    plane = control.modal.plane
+    columns = [plane.first, plane.second]
+    begin, end = stage.path[rows], stage.path[rows + 1]
+    centre, radius = said(control, unit, block + rows, begin)
+    found = []
+    step, clockwise = (end - begin)[:, columns].tolist(), (stage.motion[rows] == CLOCKWISE).tolist()
+    for way, middle, size, right in zip(step, centre.tolist(), radius.tolist(), clockwise, strict=True):
+        try:
+            point = on_circle(control, way, middle, size, clockwise=right)
+        except Fault:
+            break
+        found.append((*point, control.handedness * sweep_angle(point, way, 1, clockwise=right)))
+    if len(found) < len(rows):
+        rows, begin, count = rows[: len(found)], begin[: len(found)], int(rows[len(found)])
+    table = np.array(found, dtype=np.float64).reshape(-1, 3)
+    local = np.zeros((len(rows), 3))
+    local[:, columns] = table[:, :2]
+    return Circles(rows, begin[:, :3] + local, IDENTITY[plane.across], table[:, 2]), count
+
+
+def on_circle(
+    control: Control, end: list[float], centre: list[float], radius: float, *, clockwise: bool
+) -> tuple[float, float]:
+    """The centre relative to the start, from R (NaN without) or from what centre words say; raises `Fault`."""
+    way = end[0], end[1]
+    if not math.isnan(radius):
+        return centre_from_radius(way, radius, clockwise=clockwise)
+    point = centre[0], centre[1]
+    check_closure(point, way, closure_mm(control), control.dialect.closure_relative)
+    return point
+
+
+def fitting(control: Control, unit: Unit, block: int, stage: Stage) -> int:
+    """How many blocks run before an arc without the words that it needs, or a straight motion with those of one."""
+    assert stage.turns is not None
+    able, shapes = named(control, unit.lanes), unit.program.template[block : block + len(stage.mask)]
+    arcs = (stage.motion == CLOCKWISE) | (stage.motion == COUNTER)
+    odd = (stage.turns | (stage.mask != 0)) & (stage.turns != arcs) | stage.turns & ~able[shapes]
+    return int(np.argmax(odd)) if odd.any() else len(odd)
+
+
+def named(control: Control, lanes: LaneTables) -> Mask:
+    """(s,) shapes with the words that an arc needs in the plane in force, as `arc_motion.check_words`; no spirals."""
+    plane = control.modal.plane
+    if plane.across > 2:
+        return np.zeros(len(lanes.turns), dtype=np.bool_)
+    first, second, across = (lanes.centre[:, letter] >= 0 for letter in (plane.first, plane.second, plane.across))
+    centre = first & second if control.modal.arc_absolute else first | second
+    ends_there = lanes.mask & (1 << plane.first | 1 << plane.second) != 0
+    able: Mask = np.where(lanes.radius >= 0, ends_there, centre & ~across)
+    return able
+
+
+def said(control: Control, unit: Unit, blocks: IntArray, begin: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
+    program, lanes, plane = unit.program, unit.lanes, control.modal.plane
+    shapes, first, unit_mm = program.template[blocks], program.first_number[blocks], control.modal.unit
+    columns = [plane.first, plane.second]
+    centre = np.stack([words(program.numbers, first, lanes.centre[shapes, letter]) for letter in columns], axis=1)
+    centre = unit_mm * np.where(np.isnan(centre), 0.0, centre)
+    if control.modal.arc_absolute:
+        centre -= (begin - np.array(control.offset))[:, columns]
+    return centre, unit_mm * words(program.numbers, first, lanes.radius[shapes])
