@@ -376,8 +376,7 @@ class Builder:
             return nowhere, nowhere, none
         centre, normal, sweep = nowhere.copy(), nowhere.copy(), none.copy()
         if rows:
-            columns = list(zip(*self._arcs.values(), strict=True))
-            centre[rows], normal[rows], sweep[rows] = columns[:3]
+            centre[rows], normal[rows], sweep[rows], _ = zip(*self._arcs.values(), strict=True)
         for each in self._circles:
             centre[each.row], normal[each.row], sweep[each.row] = each.centre, each.normal, each.sweep
         return centre, normal, sweep
