@@ -69,9 +69,8 @@ class Stage:
         if moving.all():
             return self
         path = np.concatenate((self.path[:1], self.path[1:].compress(moving, axis=0)))
-        columns = self.feed, self.fed, self.motion, self.coded, self.mask
-        turns = None if self.turns is None else self.turns.compress(moving)
-        return Stage(path, *(column.compress(moving) for column in columns), turns)
+        names = ["feed", "fed", "motion", "coded", "mask", *(["turns"] if self.turns is not None else [])]
+        return replace(self, path=path, **{name: getattr(self, name).compress(moving) for name in names})
 
 
 def stage_of(control: Control, unit: Text, start: int, stop: int) -> Stage:
