@@ -137,6 +137,14 @@ def test_a_table_is_there_when_it_is_whole(in_parts_of: Any, program: Path, tmp_
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.ngc", "motions.csv"]
 
 
+@pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="a system without a folder in which nobody can write")
+@pytest.mark.parametrize("size", [1000, WHOLE])
+def test_where_nothing_can_be_written_that_is_said(in_parts_of: Any, program: Path, size: int) -> None:
+    found = in_parts_of(size, *VERBS[1], program, *GIVEN, "-o", "/proc/motions.csv")
+    assert found.code == ExitCode.USAGE
+    assert "/proc/motions.csv: NCF007" in found.err
+
+
 def test_programs_of_the_corpus(in_parts_of: Any, shared: Callable[[str], Path]) -> None:
     """Whether they can go in parts or not."""
     files = [each for each in sorted(shared("corpus").rglob("*")) if each.is_file()]

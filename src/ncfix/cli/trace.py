@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -52,9 +51,8 @@ def trace(
     """Print the motions of PROGRAM as a table: where each leads, in machine axes and at the tool tip."""
     (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
     following = Following.of(machine_path, dialect, given)
-    form = partial(_as_json, program) if as_json else _as_csv
     with source_of(program) as source, ExitStack() as opened:
-        motions = Motions(following, source, form, Keep(None if as_json else target.file, opened))
+        motions = Motions(following, source, as_json, Keep(None if as_json else target.file, opened))
         with console.busy(f"following {shown(program)}"):
             table, messages = through([source], motions.in_parts, motions.whole)
         console.tell(*messages)
@@ -64,32 +62,26 @@ def trace(
             target.write(table)
 
 
-def _as_csv(tables: Iterable[Columns]) -> Iterator[bytes]:
-    from ncfix.cli.table import as_csv
-
-    return as_csv(tables)
-
-
-def _as_json(path: str, tables: Iterable[Columns]) -> Iterator[bytes]:
-    from ncfix.cli.table import as_json
-
-    return as_json(tables, path=shown(path))
-
-
 @dataclass(frozen=True, slots=True)
 class Motions:
-    """The motions of a program, to be written as a table: a long one in a file."""
+    """The motions of a program, to be written as a table."""
 
     following: Following
     source: Source
-    form: Callable[[Iterable[Columns]], Iterator[bytes]]
+    as_json: bool
     keep: Keep
+
+    def written(self, tables: Iterable[Columns]) -> Iterator[bytes]:
+        """The table as text."""
+        from ncfix.cli.table import as_csv, as_json
+
+        return as_json(tables, path=shown(self.source.path)) if self.as_json else as_csv(tables)
 
     def in_parts(self) -> tuple[Iterable[bytes], Sequence[Message]]:
         """The table and what there is to say, of a program that is read; raises what that does, `NotInPartsError`."""
         machine = self.following.machine
         parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
-        table = self.keep(self.form(table_of(part.program, part.moves, machine) for part in found))
+        table = self.keep(self.written(table_of(part.program, part.moves, machine) for part in found))
         parts.blocks_behind()
         return table, parts.follower.messages
 
@@ -98,7 +90,7 @@ class Motions:
         path = self.source.path
         program = self.following.read(path, self.source.everything())
         found = self.following.trace(program, path)
-        return list(self.form([table_of(program, found.moves, self.following.machine)])), found.messages
+        return list(self.written([table_of(program, found.moves, self.following.machine)])), found.messages
 
 
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
