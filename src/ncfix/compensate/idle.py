@@ -45,7 +45,7 @@ def standing_still(pieces: Pieces, end: Array, start: Array, first: int = 0) -> 
         return found
     move, end = pieces.move[rows], end[rows]
     inner = move[1:] == move[:-1]
-    plain = ~(pieces.arc | pieces.kept)[rows] & (move >= first)
+    plain = ~(pieces.arc[rows] | pieces.kept[rows]) & (move >= first)
     stays = np.zeros(len(rows), dtype=bool)
     stays[1:] = inner & (end[1:] == end[:-1]).all(axis=1)
     begins = np.flatnonzero(np.append(True, ~inner))

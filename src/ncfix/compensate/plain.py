@@ -149,7 +149,7 @@ class Planner:
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
             pieces = on_digits(self.machine, moves, pieces, inner)
-            if not self._fine_inside(poses, real, pieces, inner, found.q - poses.meant):
+            if not self._fine_inside(poses, real, pieces, inner, found.q):
                 return None
         behind_rapid = bool(unit.head.moves.kind[-1] == Kind.RAPID)
         return Course(part, plain, intent, real, pieces, first, found.before[1:], findings, behind_rapid)
@@ -241,8 +241,8 @@ class Planner:
         shift = done - meant
         return self._small(shift) and self._steady(shift[1:] - shift[:-1])
 
-    def _fine_inside(self, poses: Poses, real: Segments, pieces: Pieces, inner: Index, shift: Array) -> bool:
-        """The same of pieces that end inside of motions (k,); `shift` (n + 1, n_axes) between motions."""
+    def _fine_inside(self, poses: Poses, real: Segments, pieces: Pieces, inner: Index, done: Array) -> bool:
+        """The same of pieces that end inside of motions (k,); `done` (n + 1, n_axes) poses between these, corrected."""
         near = distinct(np.concatenate([inner, inner + 1]))
         own, ends, fraction = pieces.move[near], pieces.end[near], pieces.fraction[near]
         at_start = pieces.move[np.maximum(near - 1, 0)] != own
@@ -251,7 +251,7 @@ class Planner:
         positions = poses.joints(ends)
         change = positions - poses.joints(programmed.at(own, fraction))
         before = np.concatenate([np.zeros_like(change[:1]), change[:-1]])
-        before[at_start] = shift[own[at_start]]
+        before[at_start] = done[own[at_start]] - poses.meant[own[at_start]]
         low, high = self.machine.ranges.T
         within = bool((low - positions <= FUZZ).all() and (positions - high <= FUZZ).all())
         if within and poses.led:
