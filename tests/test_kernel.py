@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ncfix import fast, kernel
+
 pytest.importorskip("numba", reason="the `fast` extra is not installed")
 
 MODULE = '''
@@ -17,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from ncfix.kernel import Library
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__name__)
 
 class Pair(NamedTuple):
     low: object
@@ -43,25 +45,33 @@ PROGRAM = """
 import sys
 import numpy as np
 import module
+from ncfix import kernel
+said = []
+kernel.ready([module.LIBRARY], said.append)
+assert "numba" not in sys.modules
 values, found = np.array([[1.0, 2.0], [30.0, 4.0], [5.0, -6.0]]), np.zeros(6, dtype=bool)
 limits = module.Pair(np.zeros(2), np.array([10.0, 2.0]))
-print(module.within(values, (2, limits), found), found.astype(int).tolist(), "numba" in sys.modules)
+print(module.within(values, (2, limits), found), found.astype(int).tolist(), bool(said))
 """
+"""What comes out, and whether something was said: that it is compiled."""
 
 
 def run(folder: Path, code: str = PROGRAM) -> str:
     """What a process of its own prints that imports `module` from a folder."""
+    return start(folder, code).communicate()[0].strip()
+
+
+def start(folder: Path, code: str = PROGRAM) -> subprocess.Popen[str]:
     path = os.pathsep.join((str(folder), *sys.path))
     environment = {**os.environ, "PYTHONPATH": path, "XDG_CACHE_HOME": str(folder / "cache")}
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
-    return done.stdout.strip()
+    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, env=environment)
 
 
 def kept(folder: Path) -> list[Path]:
     return sorted(folder.glob("__pycache__/module.*.o"))
 
 
-def test_compiled_once_and_loaded_without_numba(tmp_path: Path) -> None:
+def test_compiled_once_and_loaded_without_it(tmp_path: Path) -> None:
     (tmp_path / "module.py").write_text(MODULE)
     assert run(tmp_path) == "4 [1, 1, 0, 1, 1, 0] True"
     assert len(kept(tmp_path)) == 1
@@ -93,24 +103,69 @@ def test_arrays_of_another_type_are_refused() -> None:
         fewest(counts, nodes, commands.T, follow, 1e-3, ends, worst)
 
 
+def test_numbers_from_elsewhere_that_have_changed(tmp_path: Path) -> None:
+    (tmp_path / "other.py").write_text("FACTOR = 2.0\n")
+    (tmp_path / "module.py").write_text(MODULE.replace("FACTOR = 2.0", "from other import FACTOR"))
+    assert run(tmp_path) == "4 [1, 1, 0, 1, 1, 0] True"
+    (tmp_path / "other.py").write_text("FACTOR = 1.50\n")
+    assert run(tmp_path) == "3 [1, 1, 0, 0, 1, 0] True"
+
+
+def test_two_processes_do_not_compile_the_same(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(MODULE)
+    counting = "import module; from ncfix import kernel; build = kernel.build\n"
+    counting += "kernel.build = lambda libraries: (open('built', 'a').write('x' * len(libraries)), build(libraries))\n"
+    counting = counting.replace("'built'", repr(str(tmp_path / "built")))
+    both = [start(tmp_path, counting + PROGRAM) for _ in range(2)]
+    assert {process.communicate()[0].split(" ", 1)[0] for process in both} == {"4"}
+    assert (tmp_path / "built").read_text() == "x"
+
+
+def test_nothing_can_be_kept(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(MODULE)
+    (tmp_path / "cache").write_text("not a folder")
+    nowhere = "from ncfix import kernel\nfrom pathlib import Path\n"
+    nowhere += f"kernel.places = lambda source, kind: (Path({str(tmp_path)!r}) / 'cache' / str(n) for n in range(2))\n"
+    for _ in range(2):
+        assert run(tmp_path, nowhere + PROGRAM) == "4 [1, 1, 0, 1, 1, 0] True"
+
+
+def test_every_module_with_kernels_is_compiled_beforehand(root: Path) -> None:
+    sources = root / "src"
+    having = [path for path in sources.rglob("*.py") if "\nLIBRARY = Library(" in path.read_text()]
+    names = {".".join(path.relative_to(sources).with_suffix("").parts) for path in having}
+    assert names - {kernel.TRIAL} == set(fast.KERNELS)
+
+
+def test_work_is_dealt_out_to_processors() -> None:
+    libraries = [kernel.Library(str(size), parts=(len,) * size) for size in (1, 9, 4, 3)]
+    assert [[each.module for each in share] for share in kernel.dealt(libraries, 2)] == [["9"], ["4", "3", "1"]]
+    assert [[each.module for each in share] for share in kernel.dealt(libraries[:1], 8)] == [["1"]]
+
+
 def test_the_way_in_which_arguments_are_passed_is_tried() -> None:
-    from ncfix import kernel, kernel_trial
+    from ncfix import kernel_trial
 
     assert kernel_trial.passes()
-    assert kernel.trusted()
 
 
-def test_an_environment_that_fails_the_trial_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from ncfix import kernel
-
-    (tmp_path / "failing_trial.py").write_text("import os; os.abort()")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    assert not kernel.trusted("failing_trial")
-    (tmp_path / "failing_trial.py").write_text("def passes():\n    return False\n")
-    assert not kernel.trusted("failing_trial")
-    (tmp_path / "failing_trial.py").write_text("def passes():\n    return True\n")
-    monkeypatch.setattr(kernel, "places", lambda source, kind: iter([tmp_path / kind]))
-    assert kernel.trusted("failing_trial")
-    assert (tmp_path / "passed").exists()
-    monkeypatch.setattr(kernel.subprocess, "run", None)
-    assert kernel.trusted("failing_trial")
+@pytest.mark.parametrize("trial", ["import os; os.abort()", "def passes():\n    return False\n"])
+def test_an_environment_that_fails_the_trial_is_not_used(
+    trial: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "failing_trial.py").write_text(trial)
+    (tmp_path / "module.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "module", raising=False)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), *sys.path)))
+    monkeypatch.setattr(kernel, "TRIAL", "failing_trial")
+    monkeypatch.setattr(fast, "KERNELS", ("module",))
+    monkeypatch.setattr(fast, "_engaged", False)
+    monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
+    said: list[str] = []
+    assert not fast.engage(said.append)
+    assert said == [kernel.WAIT, fast.FAILED]
+    assert not kept(tmp_path)
+    monkeypatch.setattr(kernel, "TRIAL", "ncfix.kernel_trial")
+    assert fast.engage()
+    assert len(kept(tmp_path)) == 1

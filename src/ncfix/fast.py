@@ -7,15 +7,32 @@ much to do says `engage`. `NCFIX_NO_FAST=1` forces the plain way; what comes out
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from importlib import import_module
 from importlib.util import find_spec
+
+KERNELS = (
+    "ncfix.compensate.kernels",
+    "ncfix.compensate.nearest_kernels",
+    "ncfix.compensate.plain_kernels",
+    "ncfix.machine.kernels",
+    "ncfix.program.follow.lane_kernel",
+    "ncfix.program.kernels",
+    "ncfix.program.writing_kernels",
+)
+"""The modules that have kernels: all are compiled when one is asked for, side by side."""
+FAILED = "The loops of ncfix[fast] cannot be compiled here; without them it takes two or three times as long."
 
 _engaged = False
 
 
-def engage() -> bool:
-    """Use compiled kernels from here on, if they are installed and wanted; whether they are."""
+def engage(say: Callable[[str], object] = lambda text: None) -> bool:
+    """Use compiled kernels from here on, if they are installed and wanted; whether they are.
+
+    The first time they are compiled, which takes a while; `say` is told so before.
+    """
     global _engaged
-    _engaged = _engaged or (wanted() and _usable())
+    _engaged = _engaged or (wanted() and _ready(say))
     return _engaged
 
 
@@ -30,13 +47,18 @@ def disengage() -> None:
     _engaged = False
 
 
-def _usable() -> bool:
-    """Whether numba is installed, and one that kernels can be compiled with."""
+def _ready(say: Callable[[str], object]) -> bool:
+    """Whether numba is installed, and one that kernels can be compiled with; they are ready then."""
     if find_spec("numba") is None:
         return False
-    from ncfix.kernel import trusted
+    from ncfix.kernel import CompilingError, ready
 
-    return trusted()
+    try:
+        ready([import_module(name).LIBRARY for name in KERNELS], say)
+    except CompilingError:
+        say(FAILED)
+        return False
+    return True
 
 
 def wanted() -> bool:

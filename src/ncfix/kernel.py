@@ -2,8 +2,8 @@
 
 Importing numba and reading its own cache takes 0.6 s and 130 MB; to hand kept code to the linker of LLVM takes a tenth
 of the time and half of the memory. So a loop is a plain function that makes no arrays and is given room for its
-results; those of a module form a `Library`, which is compiled together. The code is good until its sources, numba,
-Python or the processor change.
+results; those of a module form a `Library`, which is compiled together, in another process (`kernel_build`). The code
+is good until its sources, the numbers that it takes from elsewhere, numba, Python or the processor change.
 """
 
 from __future__ import annotations
@@ -11,15 +11,16 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import numpy as np
 
@@ -28,17 +29,19 @@ Argument = Any
 """What an argument is: "i8" or "f8", with "[:]" or "[:,:]" for an array (there "u1", "b1" and "i4", too), or a tuple of
 such; a tuple with names begins with its class."""
 
-OPTIONS: dict[str, Any] = {
-    "error_model": "numpy",
-    "_nrt": False,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
-"""Of numba: divisions as numpy does them, and nothing that needs Python or numba when it runs."""
+TRIAL = "ncfix.kernel_trial"
+"""What is tried before anything is compiled: whether this numba passes arguments as `Kernel` says."""
+LOWERED_ONLY = {"NUMBA_OPT": "0", "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
+"""What numba reads when it is imported: machine code of its own is not wanted, nor colours in what it tries in vain."""
+WAIT = "The loops of ncfix[fast] are compiled for this computer, once; that takes some 15 s."
 NUMBERS = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
 DATA = object.__basicsize__
 """Where an array has the address of its numbers: the first thing behind what every object has (numpy's C interface).
 To ask the array for it takes longer than to hand over all the rest."""
+
+
+class CompilingError(Exception):
+    """Loops could not be compiled: numba is one that does not fit, or a process was ended."""
 
 
 @dataclass(slots=True)
@@ -61,7 +64,7 @@ class Kernel:
     def __call__(self, *given: Any) -> int:
         """Run it. Raises TypeError for other arguments than those declared."""
         if self.code is None:
-            self.library.load()
+            ready([self.library])
         assert self.code is not None
         values: list[Any] = []
         for value, (kind, dimensions) in zip(flat(given), self.kinds, strict=True):
@@ -79,6 +82,11 @@ class Kernel:
             raise AssertionError(f"{self.loop.__name__} has failed")
         return result.value
 
+    @property
+    def symbol(self) -> str:
+        """The name of its machine code."""
+        return f"{self.loop.__module__}.{self.loop.__name__}"
+
     def bind(self, address: int) -> None:
         """Take the machine code at an address: numba hands over results by a pointer, and arrays by their parts."""
         types: list[Any] = [ctypes.c_void_p, ctypes.c_void_p]
@@ -95,15 +103,16 @@ class Kernel:
 class Library:
     """The kernels of a module.
 
-    source   the file of the module
+    module   its name
     parts    functions of other modules that its loops are made of
     helpers  those of its own
     """
 
-    source: str
+    module: str
     parts: tuple[Callable[..., Any], ...] = ()
     helpers: list[Callable[..., Any]] = field(default_factory=list)
     kernels: list[Kernel] = field(default_factory=list)
+    loaded: bool = False
 
     def helper(self, function: Function) -> Function:
         """Take a function that loops are made of."""
@@ -119,76 +128,129 @@ class Library:
 
         return taken
 
-    def load(self) -> None:
-        """Make the kernels ready to run: by what is kept on the disk, or by compiling them."""
-        llvm = binding()
-        code = self._kept()
-        if code is None:
-            code = self._compiled()
-            self._keep(code)
+    @property
+    def source(self) -> str:
+        """The file of the module."""
+        return str(sys.modules[self.module].__file__)
+
+    @property
+    def functions(self) -> tuple[Callable[..., Any], ...]:
+        """All that its machine code is made of."""
+        return (*self.parts, *self.helpers, *(kernel.loop for kernel in self.kernels))
+
+    def load(self) -> bool:
+        """Make the kernels ready to run if there is code that is kept, of these sources; whether they are."""
+        for place in () if self.loaded else places(self.source, "o"):
+            with suppress(OSError):
+                if self.take(place.read_bytes()):
+                    break
+        return self.loaded
+
+    def take(self, data: bytes) -> bool:
+        """Make the kernels ready to run by code as `sealed` gives it, if it is of these sources; whether it is."""
+        code = data[64:]
+        if data[:64] == self._digest(code):
+            self.link(code)
+        return self.loaded
+
+    def link(self, code: bytes) -> None:
+        """Make the kernels ready to run by their machine code."""
         engine = linker()
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.add_object_file(binding().ObjectFileRef.from_data(code))
         engine.finalize_object()
         for kernel in self.kernels:
-            kernel.bind(engine.get_function_address(self._symbol(kernel)))
+            kernel.bind(engine.get_function_address(kernel.symbol))
+        self.loaded = True
 
-    def _symbol(self, kernel: Kernel) -> str:
-        return f"{kernel.loop.__module__}.{kernel.loop.__name__}"
-
-    def _compiled(self) -> bytes:
-        """The machine code of all kernels. Takes seconds."""
-        from numba import njit, types
-        from numba.extending import register_jitable
-
-        for function in (*self.parts, *self.helpers):  # to hand arrays over to one takes longer than most of them do
-            register_jitable(forceinline=True)(function)
-        llvm = binding()
-        module = llvm.parse_assembly("")
-        for kernel in self.kernels:
-            compiled = njit(typed(kernel.arguments, types), **OPTIONS)(kernel.loop)
-            (signature, found), *_ = compiled.overloads.items()
-            text = compiled.inspect_llvm(signature).replace(found.fndesc.llvm_func_name, self._symbol(kernel))
-            module.link_in(llvm.parse_assembly(text))
-        code: bytes = target().emit_object(module)
-        return code
-
-    # -- on the disk --------------------------------------------------------------------------------------------------
-
-    def _kept(self) -> bytes | None:
-        """The code that is kept, if it is of these sources."""
-        for place in places(self.source, "o"):
-            with suppress(OSError):
-                data = place.read_bytes()
-                if data[:64] == self._digest(data[64:]):
-                    return data[64:]
-        return None
-
-    def _keep(self, code: bytes) -> None:
-        keep(self.source, "o", self._digest(code) + code)
+    def sealed(self, code: bytes) -> bytes:
+        """Machine code as it is kept: behind what tells that it is of these sources, and whole."""
+        return self._digest(code) + code
 
     def _digest(self, code: bytes) -> bytes:
-        """What tells whether code belongs to the sources, and is whole."""
-        files = {self.source, *(function.__code__.co_filename for function in self.parts)}
+        files = {self.source, str(Path(__file__).with_name("kernel_build.py"))}
+        files.update(function.__code__.co_filename for function in self.functions)
         found = hashlib.sha256(environment().encode())
         for text in (*(Path(file).read_bytes() for file in sorted(files)), code):
             found.update(hashlib.sha256(text).digest())
+        for function in self.functions:
+            found.update(repr(constants(function)).encode())
         return found.hexdigest().encode()
 
 
-def trusted(trial: str = "ncfix.kernel_trial") -> bool:
-    """Whether this numba passes arguments as `Kernel` says, which it does not promise.
+def constants(function: Callable[..., Any]) -> list[tuple[str, Any]]:
+    """Numbers that a function takes from its module, which may have them from others."""
+    known = ((name, function.__globals__.get(name)) for name in function.__code__.co_names)
+    return [(name, np.asarray(it).tolist()) for name, it in known if isinstance(it, int | float | tuple | np.ndarray)]
 
-    Tried once for each environment in a process of its own, where a wrong guess can do no harm.
+
+# -- compiling --------------------------------------------------------------------------------------------------------
+
+
+def ready(libraries: Sequence[Library], say: Callable[[str], object] = lambda text: None) -> None:
+    """Make libraries ready to run. What is not kept yet, or of other sources, is compiled; `say` is told of it before.
+
+    Raises CompilingError.
     """
-    source = str(Path(__file__).parent / f"{trial.rpartition('.')[2]}.py")
-    if not any(place.exists() for place in places(source, "passed")):
-        script = f"import sys, {trial} as trial; sys.exit(not trial.passes())"
-        try:
-            subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
-        except (OSError, subprocess.SubprocessError):
-            return False
-        keep(source, "passed", b"")
-    return True
+    missing = [library for library in libraries if not library.load()]
+    if missing:
+        say(WAIT)
+        with alone():
+            build([library for library in missing if not library.load()])
+
+
+def build(libraries: Sequence[Library]) -> None:
+    """Compile libraries in processes of their own, as many as there are processors. Raises CompilingError."""
+    shares = dealt(libraries, os.cpu_count() or 1)
+    started = [_started(share) for share in shares]
+    done = [(share, process, *process.communicate()) for share, process in zip(shares, started, strict=True)]
+    for share, process, found, trouble in done:
+        if process.returncode:
+            raise CompilingError(trouble.decode(errors="replace").strip() or f"ended with {process.returncode}")
+        for library, data in zip(share, pickle.loads(found), strict=True):
+            if not library.take(data):
+                raise CompilingError(f"{library.source} was changed while it was compiled")
+            keep(library.source, "o", data)
+
+
+def _started(share: Iterable[Library]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "ncfix.kernel_build", TRIAL, *(library.module for library in share)]
+    try:
+        return subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **LOWERED_ONLY}
+        )
+    except OSError as error:
+        raise CompilingError(str(error)) from error
+
+
+def dealt(libraries: Iterable[Library], most: int) -> list[list[Library]]:
+    """Libraries in at most so many shares of work; that is about as much as there are functions."""
+    shares: list[list[Library]] = [[] for _ in range(most)]
+    for library in sorted(libraries, key=lambda each: -len(each.functions)):
+        min(shares, key=lambda share: sum(len(each.functions) for each in share)).append(library)
+    return [share for share in shares if share]
+
+
+@contextmanager
+def alone() -> Iterator[None]:
+    """Wait until no other process compiles, so that nothing is compiled twice; where nothing is kept, it is."""
+    with ExitStack() as held:
+        with suppress(ImportError, OSError):  # Windows; or no place can be written to
+            from fcntl import LOCK_EX, flock
+
+            flock(held.enter_context(_lock()), LOCK_EX)
+        yield
+
+
+def _lock() -> IO[bytes]:
+    """A file at the first place that can be written to; raises OSError if none can."""
+    beside, elsewhere = places(__file__, "lock")
+    with suppress(OSError):
+        return beside.open("wb")
+    elsewhere.parent.mkdir(parents=True, exist_ok=True)
+    return elsewhere.open("wb")
+
+
+# -- on the disk ------------------------------------------------------------------------------------------------------
 
 
 def places(source: str, kind: str) -> Iterator[Path]:
@@ -219,21 +281,6 @@ def flat(nested: Any) -> list[Any]:
         else:
             found.append(each)
     return found
-
-
-def typed(arguments: tuple[Argument, ...], types: Any) -> Any:
-    """The types of arguments, as numba has them."""
-    return tuple(_type(each, types) for each in arguments)
-
-
-def _type(argument: Argument, types: Any) -> Any:
-    if isinstance(argument, tuple):
-        named = isinstance(argument[0], type)
-        found = typed(argument[1:] if named else argument, types)
-        return types.NamedTuple(found, argument[0]) if named else types.Tuple(found)
-    names = {"i8": types.int64, "i4": types.int32, "u1": types.uint8, "b1": types.boolean, "f8": types.float64}
-    dimensions = argument.count(":")
-    return types.Array(names[argument[:2]], dimensions, "C") if dimensions else names[argument[:2]]
 
 
 def binding() -> Any:

@@ -47,6 +47,17 @@ def say(text: str) -> None:
         click.echo(text, err=True, color=colour())
 
 
+def forewarn(text: str) -> None:
+    """A line about what takes a while from here on, on a terminal."""
+    if _watched():
+        say(text)
+
+
+def _watched() -> bool:
+    """Whether somebody sees on a terminal what is said while it is said."""
+    return _kept.get() is None and sys.stderr is not None and sys.stderr.isatty()
+
+
 @contextmanager
 def keeping() -> Iterator[list[str]]:
     """Keep what is said, instead of saying it, in this thread; `say` may say it elsewhere."""
@@ -157,7 +168,7 @@ def _drawn(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 @contextmanager
 def busy(what: str) -> Iterator[None]:
     """Show what is going on while it lasts, on a terminal, if it lasts."""
-    if _kept.get() is not None or sys.stderr is None or not sys.stderr.isatty():
+    if not _watched():
         yield
         return
     from rich.console import Console

@@ -107,7 +107,7 @@ class Job:
         from ncfix.compensate.task import Task
 
         if source.size is None or source.size >= compiled_from():
-            fast.engage()
+            fast.engage(console.forewarn)
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
             task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes())

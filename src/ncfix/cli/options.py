@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix import fast
+from ncfix.cli import console
 from ncfix.cli.parts import compiled_from
 from ncfix.cli.targets import STREAM, read, shown
 
@@ -113,7 +114,7 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None,
 
     source = read(path) if text is None else text
     if len(source) >= compiled_from():
-        fast.engage()
+        fast.engage(console.forewarn)
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
 
 

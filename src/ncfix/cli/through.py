@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from ncfix import fast
+from ncfix.cli import console
 from ncfix.cli.following import ROTARY, Following, axes_of
 from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Source, part_bytes
@@ -29,7 +30,7 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
     if any(long):
         from ncfix.program.parts import NotInPartsError
 
-        fast.engage()
+        fast.engage(console.forewarn)
         try:
             found = in_parts()
             for source in sources:

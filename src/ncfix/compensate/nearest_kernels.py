@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__name__)
 
 
 class Path(NamedTuple):

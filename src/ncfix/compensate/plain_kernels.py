@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__name__)
 
 
 @LIBRARY.kernel("f8[:,:]", "f8[:,:]", ("f8[:]", "f8[:]", "f8[:]", "f8[:]"), ("f8", "f8", "f8"))

@@ -14,7 +14,7 @@ from ncfix.machine import aim_loops, loops, steps
 
 Array = NDArray[np.float64]
 
-LIBRARY = Library(__file__, (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS))
+LIBRARY = Library(__name__, (*steps.FORMULAS, *loops.HELPERS, *aim_loops.HELPERS))
 ROUTE = "i8[:]", "f8[:]"
 COLUMNS = loops.Columns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
 

@@ -19,7 +19,7 @@ Rows = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 Tables = tuple[Bytes, Mask, Mask, Mask]
 
-LIBRARY = Library(__file__, (word_at,))
+LIBRARY = Library(__name__, (word_at,))
 
 POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
 UNTOUCHED = -1

@@ -29,7 +29,7 @@ Digits = tuple[Ints, Floats, int]
 Lines = tuple[Bytes, Ints, Bytes, Bytes]
 """Of further pieces: the end of a line, and `leads`, `openings`, `closings` of `Layouts`."""
 
-LIBRARY = Library(__file__, HELPERS)
+LIBRARY = Library(__name__, HELPERS)
 
 
 @LIBRARY.helper

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-LIBRARY = Library(__file__)
+LIBRARY = Library(__name__)
 
 
 @LIBRARY.kernel(
