@@ -148,3 +148,23 @@ def test_blocks_that_are_missing_or_too_many(machine: Machine, change: object, l
     # the distance rises by up to 0.006 mm in half a block of 0.67 mm: by so much between two dense points at the peak
     assert tuple(each.max for each in found) == pytest.approx(truth(perfect, meant, done), abs=3e-4)
     assert max(each.max for each in found) >= least_mm
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_blocks_exchanged_on_a_line_give_the_same_in_any_parts(machine: Machine, seed: int) -> None:
+    """Rows to and fro, so near to each other that the next one is mistaken for the one that is meant."""
+    rng, perfect = np.random.default_rng(seed), replace_errors(machine)
+    row, place = np.divmod(np.arange(3000), 60)
+    x = 0.4 * np.where(row % 2, 59 - place, place)
+    lines = [f"G1 X{x:.4f} Y{y:.4f} F900\n" for x, y in zip(x, 0.05 * row, strict=True)]
+    other = list(lines)
+    for at in rng.integers(2, 2995, 5).tolist():
+        other[at : at + 4] = [*other[at + 2 : at + 4], *other[at : at + 2]]
+    head = "G21 G90 G94 G17\nG0 X0 Y0 Z1\n"
+    meant, done = (moves_of(head + "".join(each) + "M2\n", perfect) for each in (lines, other))
+    whole = compared(perfect, meant, done)
+    for parts in (2, 5, 17):
+        for found, expected in zip(compared(perfect, meant, done, parts=parts), whole, strict=True):
+            assert found.max == pytest.approx(expected.max, abs=1e-9)
+            assert found.rms == pytest.approx(expected.rms, abs=1e-9)
+            assert found.lines_beyond == expected.lines_beyond

@@ -13,12 +13,12 @@ from ncfix.compensate.nearest import Nearest, Search
 from ncfix.compensate.ragged import owners, places
 
 
-def over_holes(search: Search, path: Curve, samples: Samples, first: Index, found: Nearest) -> tuple[Samples, Nearest]:
+def over_holes(search: Search, path: Curve, samples: Samples, before: Index, found: Nearest) -> tuple[Samples, Nearest]:
     """Samples of a path and what is nearest to them, and the same for where the path goes over holes of the other one.
 
-    first  (1,) the parabola of the other one that is nearest to where the path begins
+    before  (n,) the parabola of the other one that is nearest to the place before each sample
     """
-    rows, middles = _crossed(search, samples, np.append(first, found.piece[:-1]), found.piece)
+    rows, middles = _crossed(search, samples, before, found.piece)
     if not len(rows):
         return samples, found
     piece, share = samples.piece[rows], _beside(path, samples, rows, middles)

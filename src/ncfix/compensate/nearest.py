@@ -28,8 +28,6 @@ HOPS = 40
 """Most parabolas on which a nearest point is looked for one after the other."""
 STRAIGHT = 0.1
 """rad: a path that turns by less leads no nearer to a point than 1 - cos of it, half a per cent, of its distance."""
-TOGETHER = 4096
-"""Points for which the difference of the two lengths of path is taken as the same, at first."""
 SUDDEN = 0.5
 """mm by which one path is longer than the other on the way of these: there is something wrong, and it is looked for."""
 FEWEST = 16
@@ -84,21 +82,24 @@ class Search:
     begins: bool = True
     ends: bool = True
 
-    def all(self, points: Array, lengths: Array) -> Nearest:
-        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `LostError`."""
-        found = [
-            each
-            for at in range(0, len(points), TOGETHER)
-            for each in self._together(points[at : at + TOGETHER], lengths[at : at + TOGETHER])
-        ]
+    def all(self, points: Array, lengths: Array, groups: Index) -> Nearest:
+        """For points (n, 3) of another path, in order, at lengths (n,) of it. Raises `LostError`.
+
+        groups  where others begin for which the difference of the two lengths of path is taken as the same, at first
+        """
+        parts = zip(np.split(points, groups), np.split(lengths, groups), strict=True)
+        found = [each for part in parts for each in self._together(*part)]
         columns = ([getattr(each, name) for each in found] for name in ("piece", "share", "gap"))
-        none = (np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
-        return Nearest(*(np.concatenate([empty, *each]) for empty, each in zip(none, columns, strict=True)))
+        return Nearest(*map(np.concatenate, columns))
 
     def _together(self, points: Array, lengths: Array) -> list[Nearest]:
-        """For points of a short way; of ever shorter ones where one path suddenly is longer than the other."""
+        """For points of a short way; of ever shorter ones where one path suddenly is longer than the other.
+
+        How much longer it is, is seen at the last of them that is near enough, or at the nearest one if none is.
+        """
         found, half = self.around(points, lengths + self.ahead), len(points) // 2
-        surest = half + int(np.argmin(found.gap[half:]))
+        sure = np.flatnonzero(found.gap[half:] <= self.near)
+        surest = half + int(sure[-1] if sure.size else np.argmin(found.gap[half:]))
         ahead = float(self.curve.way(found.piece, found.share)[surest] - lengths[surest])
         if abs(ahead - self.ahead) > SUDDEN and half >= FEWEST:
             return self._together(points[:half], lengths[:half]) + self._together(points[half:], lengths[half:])

@@ -33,6 +33,8 @@ UNLIKE = 0.02
 """Paths whose lengths differ by more than this share are not the same cut."""
 KEPT = 100.0
 """mm of path before and behind a place that are at hand: enough for whatever is less than 2 mm off."""
+GROUP = 2048
+"""Parabolas from which one looks together, counted from where the path begins: the same however it is read."""
 
 
 @dataclass(slots=True)
@@ -99,6 +101,7 @@ class Match:
     near   as `Search` has it
     done   parabolas of the path that have been looked at
     ahead  how much farther one is along the other path at the end of these, mm
+    last   the parabola of the other path, counted from its begin, that is nearest to that end
     """
 
     path: Track
@@ -107,24 +110,28 @@ class Match:
     along: Along
     done: int = 0
     ahead: float = 0.0
+    last: int | None = None
 
     def go_on(self) -> None:
-        """Look from as much of the path as there is enough of the other for."""
+        """Look from as much of the path as there is enough of the other for, by whole groups but at its end."""
         curve, other = self.path.curve, self.other
         start, stop = self.done - self.path.dropped, len(curve)
         if not other.complete:
             stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * KEPT))
+        if stop < len(curve) or not self.path.complete:
+            stop -= (stop - start) % GROUP
         if stop <= start or not len(other.curve):
             return
         self.done += stop - start
         part = self.path.part(start, stop)
         samples = Samples.of(part)
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
-        first = search.around(part.begin[:1], part.lengths[:1] + self.ahead).piece
-        found = search.all(samples.points, part.way(samples.piece, samples.share))
-        self.ahead = search.ahead
+        groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
+        found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
+        before = np.append(found.piece[0] if self.last is None else self.last - other.dropped, found.piece[:-1])
+        self.ahead, self.last = search.ahead, int(found.piece[-1]) + other.dropped
         if self.path.flank is None:
-            samples, found = over_holes(search, part, samples, first, found)
+            samples, found = over_holes(search, part, samples, before, found)
         gap = found.gap
         if self.path.flank is not None:
             gap = self.path.flank.taken(slice(start, stop)).there(search, samples, found)
