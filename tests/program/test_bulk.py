@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ncfix import fast
 from ncfix.diagnostics import SourceError
-from ncfix.program import bulk, number_text
+from ncfix.program import bulk, bulk_arcs, number_text
 from ncfix.program.bulk import Stretch
 from ncfix.program.bulk_arcs import CentreWords
 from ncfix.program.emit import Emission, emit
@@ -59,7 +59,7 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
     found = []
     for switch in (fast.disengage, fast.engage):
         switch()
-        with mock.patch.object(bulk, "SHORTEST", 1):
+        with mock.patch.object(bulk, "SHORTEST", 1), mock.patch.object(bulk_arcs, "FEWEST", 1):
             found.append(emit(program, moves, pieces, STEPS))
     fast.disengage()
     one_by_one = replace(language_of(program.dialect), bulk=None)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.bulk_arcs import CentreWords, Manner, whole_arcs
+from ncfix.program.bulk_arcs import CentreWords, Manner, whole_arcs, without_lone_ones
 from ncfix.program.bulk_fit import qualified, sound
 from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
@@ -92,7 +92,7 @@ class Bulk:
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         if language.one_by_one is not None and fit.any():
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        stop = _stops(fit)
+        stop = _stops(without_lone_ones(fit, moves))
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
         return cls(program, moves, pieces, first_piece, layouts, stop, bool(pieces.arc.any()))
@@ -134,7 +134,7 @@ class Bulk:
             fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        return cls(program, moves, pieces, first_piece, layouts, _stops(fit), turning)
+        return cls(program, moves, pieces, first_piece, layouts, _stops(without_lone_ones(fit, moves)), turning)
 
     def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Taken | None:
         """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.

@@ -30,6 +30,8 @@ CIRCLE_MM = 1e-3
 """Ends that are nearer to each other may be those of a full circle: that is for the renderer to say."""
 SEMICIRCLE = 1e-6
 """Program units: a radius that is so near to half the chord says too little of where the centre is."""
+FEWEST = 4
+"""Arcs of a stretch: of fewer, each is written by itself, which takes a third of a millisecond, as two of these do."""
 TIE = 1e-4
 """Half output steps: so near to what is allowed between two centres, which side it is on is for the renderer to say."""
 
@@ -50,6 +52,16 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, 
     known = np.isfinite(pieces.centre[first[rows]]).all(axis=1)
     fit[rows] = known & (np.abs(chord) >= CIRCLE_MM).any(axis=1)
     return fit
+
+
+def without_lone_ones(fit: Mask, moves: Moves) -> Mask:
+    """Motions `fit` (n,) for stretches without the arcs that would be among few others in theirs."""
+    arcs, stretch = fit & (moves.kind == Kind.ARC), np.cumsum(~fit)
+    if not arcs.any():
+        return fit
+    many: Mask = np.bincount(stretch[arcs], minlength=int(stretch[-1]) + 1) >= FEWEST
+    kept: Mask = fit & (many[stretch] | ~arcs)
+    return kept
 
 
 def _planes(moves: Moves, rows: IntArray) -> IntArray:
