@@ -23,14 +23,14 @@ from ncfix.program.setup import Setup
 from program.arcs import full_of_arcs
 from program.tracing import KNOWN, follow
 
-ALWAYS, NEVER, COMPILED = 1, 10**9, -1
+ALWAYS, NEVER = 1, 10**9
 
 
 @contextmanager
 def stretches_of(shortest: int) -> Iterator[None]:
-    """Which stretches go through the fast lane; `COMPILED`: all of them, compiled if that is installed."""
+    """Which stretches go through the fast lane; a negative number: compiled if that is installed."""
     before, lane.SHORTEST = lane.SHORTEST, abs(shortest)
-    if shortest == COMPILED:
+    if shortest < 0:
         fast.engage()
     try:
         yield
@@ -54,9 +54,10 @@ def columns(text: str, shortest: int, dialect: str, setup: Setup = KNOWN) -> dic
     return table
 
 
-def assert_same(text: str, dialect: str = "linuxcnc") -> None:
-    other = columns(text, NEVER, dialect)
-    for one in (columns(text, ALWAYS, dialect), columns(text, COMPILED, dialect)):
+def assert_same(text: str, dialect: str = "linuxcnc", setup: Setup = KNOWN, shortest: int = ALWAYS) -> None:
+    """The same motions, or the same error; `shortest` stretch that goes through the lane, compiled or not."""
+    other = columns(text, NEVER, dialect, setup)
+    for one in (columns(text, shortest, dialect, setup), columns(text, -shortest, dialect, setup)):
         if isinstance(one, str) or isinstance(other, str):
             assert one == other
             continue
@@ -87,15 +88,34 @@ def line(random: Random) -> str:
     return head + " ".join(words) + random.choice(["", "", " (comment)", " ; more"])
 
 
+LEADING_ELSEWHERE = {
+    "linuxcnc": (
+        ("o1 repeat [3]", "o1 endrepeat"),
+        ("o2 sub", "o2 endsub\no2 call\nX1\no2 call"),
+        ("#9=0\no3 while [#9 LT 3]", "#9=[#9+1]\no3 endwhile"),
+    ),
+    "fanuc": (
+        ("#9=0\nN7001", "#9=#9+1\nIF[#9LT3]GOTO7001"),
+        ("#9=0\nWHILE[#9LT3]DO1", "#9=#9+1\nEND1"),
+        ("GOTO7002\nX7.\nX8.\nN7002", ""),
+        ("M98P100L2\nX7.\nM98P100\nM30\nO100", "M99"),
+    ),
+}
+"""What stands before and behind blocks that are come to more than once, or passed over."""
+
+
 @settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso"]))
+@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso", "fanuc"]))
 def test_both_lanes_are_the_same(seed: int, dialect: str) -> None:
     random = Random(seed)
+    parts = [[line(random) for _ in range(random.randint(1, 25))] for _ in range(3)]
+    if dialect in LEADING_ELSEWHERE and random.random() < 0.5:
+        before, behind = random.choice(LEADING_ELSEWHERE[dialect])
+        parts[1:2] = [[before], parts[1], [behind]]
     head = "G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.8 else "G0 X1"
-    body = [line(random) for _ in range(random.randint(1, 40))]
-    if dialect == "linuxcnc" and random.random() < 0.3:
-        body = ["o1 repeat [3]", *body, "o1 endrepeat"]
-    assert_same("\n".join([head, *body]), dialect)
+    text = "\n".join([head, *(block for part in parts for block in part)])
+    setup = random.choice([KNOWN, Setup(assume_zero=True, no_point="calculator")])
+    assert_same(text, dialect, setup, random.choice([ALWAYS, 4, lane.SHORTEST]))
 
 
 def without_a_word(random: Random, block: str) -> str:
