@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from compensate.streaming import run
+from ncfix.compensate import double, stream
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.task import Task
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, load
+from ncfix.program import dialects
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup
 
@@ -65,3 +70,30 @@ def test_a_few_round_numbers_are_no_proof(machine: Machine) -> None:
     once, _ = corrected(b"".join([*lines[:11], lines[-1]]), machine)
     _, codes = corrected(unstamped(once), machine)
     assert "NCF438" not in codes
+
+
+@pytest.mark.parametrize("size", [500, 1500])
+def test_a_program_in_parts_is_judged_by_more_than_the_first(machine: Machine, size: int) -> None:
+    """Too little is in each part to tell; it is told before anything of the program is passed on."""
+    once, _ = corrected(pocket(2, seed=1), machine)
+    again = unstamped(once)
+    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", dialects.get("linuxcnc"), size)
+    for jobs in (1, 2):
+        with pytest.raises(RefusedError) as caught:
+            run(task, again, jobs)
+        assert caught.value.code == "NCF438"
+    _, done = run(replace(task, options=FixOptions(force=True)), again, 1)
+    whole = fix_program(read(again, "part.ngc", "linuxcnc"), machine, SETUP, FixOptions(force=True))
+    assert [message.code for message in done.report.warnings] == [message.code for message in whole.report.warnings]
+
+
+def test_the_beginning_of_a_long_program_is_judged(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a whole and in parts: what comes behind those lines makes no difference."""
+    once, _ = corrected(pocket(2, seed=1), machine)
+    again = unstamped(once)
+    monkeypatch.setattr(double, "LOOKED", 10)
+    monkeypatch.setattr(stream, "LOOKED", 10)
+    _, codes = corrected(again, machine)
+    assert "NCF438" not in codes
+    task = Task(machine, SETUP, FixOptions(), None, "part.ngc", dialects.get("linuxcnc"), 500)
+    assert "NCF438" not in {message.code for message in run(task, again, 1)[1].report.warnings}

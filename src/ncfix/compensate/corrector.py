@@ -9,7 +9,6 @@ import numpy as np
 
 from ncfix import fast
 from ncfix.compensate.crew import Read, Share
-from ncfix.compensate.double import suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import stamp_of
 from ncfix.compensate.partition import Part
@@ -22,7 +21,7 @@ from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Unit, Units
 from ncfix.compensate.verify import path_error
-from ncfix.diagnostics import Message, NcfixError
+from ncfix.diagnostics import NcfixError
 from ncfix.files import put_at
 from ncfix.machine import State
 from ncfix.program import stamp
@@ -38,15 +37,16 @@ FRAMES = "the program takes frames or values from where the machine stands"
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A part that has been corrected and proved; of the first one, what makes one think that it was corrected before.
+    """A part that has been corrected and proved.
 
-    text   what it is now; how many bytes that are, where it has been put into a file
-    tally  what there is to report of it
+    text       what it is now; how many bytes that are, where it has been put into a file
+    tally      what there is to report of it
+    next_line  of the program, with which the next part begins
     """
 
     text: bytes | int
     tally: Tally
-    suspicion: tuple[Message, ...] = ()
+    next_line: int
 
     def placed(self, file: int, at: int) -> Done:
         """The same with the text put into a file, from a byte on."""
@@ -128,11 +128,11 @@ class Corrector:
             share.leave(number, left, len(text))
         settled = course.settled(plain)
         _check(differences(settled, self._read_again(text, part, plain.splices)))
-        tally = Tally()
+        tally = Tally(self.machine.least_increment[0])
         tally.add_plain(part.program, settled, largest_shift(course, plain))
         if self.task.options.verify:
             tally.figures(figures(course, plain, self.task.options.split_rapids), part.program, moves)
-        return Done(text, tally)
+        return Done(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _agreed(self, unit: Unit) -> Agreed:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
@@ -158,14 +158,11 @@ class Corrector:
         own = np.ones(len(moves), dtype=bool)
         own[:1] = unit.head is None
         self._prove(text, settled, own, unit)
-        tally = Tally()
+        tally = Tally(self.machine.least_increment[0])
         tally.add(part.program, settled, own, increments(self.machine))
         if task.options.verify:
             self._look(part, settled, own, unit, tally)
-        return Done(text, tally, self._suspicion(settled) if before is None else ())
-
-    def _suspicion(self, settled: Settled) -> tuple[Message, ...]:
-        return suspected(settled, self.machine.least_increment[0], self.task.path, self.task.options.force)
+        return Done(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _text(self, program: Program, settled: Settled, first: bool) -> bytes:
         """The corrected text of a part."""

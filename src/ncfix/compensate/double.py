@@ -12,6 +12,7 @@ numbers with all digits used as many become round as cease to be, by chance; not
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Mask
 from ncfix.diagnostics import Message, Place, RefusedError
 from ncfix.program.moves import Moves
+from ncfix.program.tree import Program
 
 COARSE = 10
 """Steps of the grid of round numbers, in steps of the control's digits."""
@@ -28,19 +30,10 @@ ENOUGH = 30
 """Different numbers that have to become round."""
 SURE = 6.0
 """Standard deviations by which more have to become round than cease to be; by chance, one program in 10^9."""
+LOOKED = 10_000
+"""Lines of a program that are looked at: parts of the usual size have more, so that nothing is in a pipe by then."""
 MOVED = 0.75
 """Steps by which a number has to be corrected to say anything."""
-
-
-def suspected(settled: Changed, step: float, path: str, force: bool) -> tuple[Message, ...]:
-    """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
-    if not looks_corrected(settled, step):
-        return ()
-    text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
-    message = Message("NCF438", text, Place(path), "fix the original program, or say --force if this is it")
-    if not force:
-        raise RefusedError((message,))
-    return (message,)
 
 
 class Changed(Protocol):
@@ -59,26 +52,58 @@ class Changed(Protocol):
         """What is added, (n, n_axes) mm and rad."""
 
 
-def looks_corrected(settled: Changed, step: float) -> bool:
-    """Whether the program seems to have been corrected before, for this machine.
+Numbers = Mapping[int, tuple[Array, Array]]
+"""Of each linear axis, by its column: the different commands (k,), and what is added to them (k,), mm."""
+
+
+def numbers_of(settled: Changed, step: float, among: Mask | bool = True) -> Numbers:
+    """The commands that change their axis and are corrected, of motions `among` (n,) which they shall be.
+
+    step  of the control's digits, mm
+    """
+    moves, change = settled.moves, settled.shift
+    new = np.abs(moves.end - moves.start) > step / 2
+    told = ~settled.kept & among
+    said = new & told[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
+    rows = ((axis, np.flatnonzero(each)) for axis, each in enumerate(said.T))
+    return {axis: _different(moves.end[row, axis], change[row, axis], step) for axis, row in rows if len(row)}
+
+
+def numbers_at_the_beginning(program: Program, settled: Changed, step: float, own: Mask | bool = True) -> Numbers:
+    """The numbers in the first lines of a program, of which this is a part; `own` (n,) motions of the part."""
+    if program.first_line > LOOKED:
+        return {}
+    return numbers_of(settled, step, own & (program.lines(settled.moves.block) <= LOOKED))
+
+
+def together(one: Numbers, other: Numbers, step: float) -> Numbers:
+    """The different numbers of both; of equal ones those that come first."""
+    both = {axis: np.hstack([each[axis] for each in (one, other) if axis in each]) for axis in {**one, **other}}
+    return {axis: _different(values, change, step) for axis, (values, change) in both.items()}
+
+
+def suspected(numbers: Numbers, step: float, path: str, force: bool) -> tuple[Message, ...]:
+    """Raise RefusedError NCF438 for a program that seems to have been corrected before; with `force`, only say so."""
+    if not looks_corrected(numbers, step):
+        return ()
+    text = "seems to have been corrected already: with this machine's errors put in, its numbers become round"
+    message = Message("NCF438", text, Place(path), "fix the original program, or say --force if this is it")
+    if not force:
+        raise RefusedError((message,))
+    return (message,)
+
+
+def looks_corrected(numbers: Numbers, step: float) -> bool:
+    """Whether the program with these numbers seems to have been corrected before, for this machine.
 
     step  of the control's digits, mm
     """
     gained, lost = 0, 0
-    for before, change in _numbers(settled, step):
+    for before, change in numbers.values():
         crooked, straightened = ~_round(before, step), _round(before - change, step)
         gained += int((straightened & crooked).sum())
         lost += int((~straightened & ~crooked).sum())
     return gained >= ENOUGH and gained - lost > SURE * math.sqrt(gained + lost)
-
-
-def _numbers(settled: Changed, step: float) -> list[tuple[Array, Array]]:
-    """For each linear axis the different commands that change it, and their corrections, mm."""
-    moves, change = settled.moves, settled.shift
-    new = np.abs(moves.end - moves.start) > step / 2
-    said = new & ~settled.kept[:, None] & (np.abs(change) > MOVED * step) & ~moves.rotary
-    rows = (np.flatnonzero(each) for each in said.T)
-    return [_different(moves.end[row, axis], change[row, axis], step) for axis, row in enumerate(rows) if len(row)]
 
 
 def _different(values: Array, change: Array, step: float) -> tuple[Array, Array]:

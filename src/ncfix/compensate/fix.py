@@ -14,7 +14,7 @@ import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
-from ncfix.compensate.double import suspected
+from ncfix.compensate.double import numbers_at_the_beginning, suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.left import left_where_they_stand
@@ -80,7 +80,9 @@ def fix_program(
         return settled, _written(program, settled, machine, options, followed)
 
     proof = proven(program, attempt, follow)
-    suspicion = suspected(proof.settled, machine.least_increment[0], program.path, options.force)
+    step = machine.least_increment[0]
+    numbers = numbers_at_the_beginning(program, proof.settled, step)
+    suspicion = suspected(numbers, step, program.path, options.force)
     errors = _errors(on_machine, proof.settled, options.split_rapids) if options.verify else None
     if errors is not None:
         _check_sane(program, proof.settled, errors)

@@ -19,6 +19,7 @@ from functools import partial
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.corrector import Corrector, Done
 from ncfix.compensate.crew import Ground, Read, crew
+from ncfix.compensate.double import LOOKED, suspected
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
@@ -52,6 +53,7 @@ class Stream:
     write  takes the corrected text, part by part; or how much of it stands where it belongs already (`Ground.out`)
     jobs   processes that work on it
     ground  the files, which all of them have; without it there is one process
+    suspicion  what makes one think that the program was corrected before; None: not judged yet
     """
 
     task: Task
@@ -59,9 +61,12 @@ class Stream:
     write: Callable[[bytes | int], object]
     jobs: int = 1
     ground: Ground | None = None
-    tally: Tally = field(default_factory=Tally)
-    suspicion: tuple[Message, ...] = ()
+    tally: Tally = field(init=False)
+    suspicion: tuple[Message, ...] | None = None
     corrector: Corrector | None = None
+
+    def __post_init__(self) -> None:
+        self.tally = Tally(self.task.machine.least_increment[0])
 
     @property
     def stamped(self) -> bytes:
@@ -82,17 +87,25 @@ class Stream:
         self._pass_on(own.units.rest, own.units.read)
         self.tally.blocks += own.units.blocks
         self.tally.notes = own.units.notes
-        messages = (*self.suspicion, *own.units.follower.messages)
+        messages = (*self._judged(), *own.units.follower.messages)
         report = self.tally.report(task.path, messages, get_strategy(task.options.strategy).leaves, task.options)
         return Streamed(report, Stamp(own.at, own.stamped, own.stamp() if self.tally.changed else b""))
 
     def _take(self, parts: Iterator[Done]) -> None:
         """Write parts, and report them."""
         for done in parts:
-            self.suspicion += done.suspicion
             self.tally.take(done.tally)
+            if done.next_line > LOOKED:
+                self._judged()
             if self.task.options.allow_refused or not self.tally.refused:
                 self.write(done.text)
+
+    def _judged(self) -> tuple[Message, ...]:
+        """Judge the program by its beginning, once; raises RefusedError NCF438 (see `suspected`)."""
+        if self.suspicion is None:
+            force = self.task.options.force
+            self.suspicion = suspected(self.tally.numbers, self.tally.step, self.task.path, force)
+        return self.suspicion
 
     def _pass_on(self, text: bytes, read: Read) -> None:
         """What comes after the end of the program goes out as it came in."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from ncfix.compensate.checking import Checked, refused, remarks_of, stamped, together, travel_findings
 from ncfix.compensate.corrector import Corrector
 from ncfix.compensate.crew import Read, Share
+from ncfix.compensate.double import suspected
 from ncfix.compensate.notes import Notes
 from ncfix.compensate.partition import Part, Parts
 from ncfix.compensate.strategies import get_strategy
@@ -76,14 +77,13 @@ def survey_on(task: Task, read: Read) -> Checked:
 def _corrected(task: Task, read: Read) -> Checked:
     """On a machine with errors."""
     task.check()
-    corrector, tally = Corrector(task, read), Tally()
+    corrector, tally = Corrector(task, read), Tally(task.machine.least_increment[0])
     survey = Survey(corrector.machine)
     corrector.units.look = survey.look
-    suspicion: tuple[Message, ...] = ()
     for _, done in corrector.work(Share()):
-        suspicion += done.suspicion
         tally.take(done.tally)
     tally.notes = corrector.units.notes
+    suspicion = suspected(tally.numbers, tally.step, task.path, task.options.force)
     messages = (*suspicion, *corrector.units.follower.messages)
     report = tally.report(task.path, messages, get_strategy(task.options.strategy).leaves, task.options)
     return survey.checked(corrector.units, remarks_of(report))

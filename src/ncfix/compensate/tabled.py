@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.compensate.double import looks_corrected
+from ncfix.compensate.double import looks_corrected, numbers_of
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
@@ -62,4 +62,5 @@ def seems_corrected(machine: Machine, moves: Moves) -> bool:
         )
         commands = commands_from_joints(machine, corrected, moves.tcp[some], moves.tool_length[some])
         shift[some] = commands - moves.end[some]
-    return looks_corrected(_Ends(moves, kept, shift), machine.least_increment[0])
+    step = machine.least_increment[0]
+    return looks_corrected(numbers_of(_Ends(moves, kept, shift), step), step)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.double import Numbers, numbers_at_the_beginning, together
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import largest_correction, refusals
 from ncfix.compensate.left import Left, joined, left_where_they_stand
@@ -49,8 +50,13 @@ class Side:
 
 @dataclass(slots=True)
 class Tally:
-    """What has been done to the parts so far."""
+    """What has been done to the parts so far.
 
+    step     of the control's digits, mm
+    numbers  those in the first lines, by which a program is known that was corrected before
+    """
+
+    step: float
     blocks: int = 0
     moves: int = 0
     compensated: int = 0
@@ -65,6 +71,7 @@ class Tally:
     notes: dict[tuple[str, str], Message] = field(default_factory=dict)
     found: Notes = field(default_factory=Notes)
     left: dict[str, Left] = field(default_factory=dict)
+    numbers: Numbers = field(default_factory=dict)
 
     def add(self, program: Program, settled: Settled, own: Mask, steps: NDArray[np.float64]) -> None:
         """Take in a part.
@@ -84,6 +91,7 @@ class Tally:
         self.largest = max(self.largest, largest_correction(moves, settled, own))
         refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
         self.refused += refusals(program, Account(account.compensated, account.passed, refused))
+        self.numbers = numbers_at_the_beginning(program, settled, self.step, own)
         for finding in settled.plan.findings:
             self.found.add(finding, program, moves, own)
 
@@ -97,6 +105,7 @@ class Tally:
         self.inserted += settled.emission.added_blocks
         self.largest = max(self.largest, largest)
         self.changed |= len(settled.emission.splices) > 0
+        self.numbers = numbers_at_the_beginning(program, settled, self.step)
         for finding in settled.plan.findings:
             self.found.add(finding, program, settled.moves)
 
@@ -116,6 +125,8 @@ class Tally:
         self.notes = other.notes | self.notes
         self.left = joined(self.left, other.left)
         self.found.take(other.found)
+        if other.numbers:
+            self.numbers = together(self.numbers, other.numbers, self.step)
 
     def figures(self, errors: PathError, program: Program, moves: Moves) -> None:
         """Take in the tip errors of a part."""
