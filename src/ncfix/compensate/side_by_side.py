@@ -120,21 +120,24 @@ class Match:
             stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * KEPT))
         if stop < len(curve) or not self.path.complete:
             stop -= (stop - start) % GROUP
-        if stop <= start or not len(other.curve):
-            return
-        self.done += stop - start
-        part = self.path.part(start, stop)
+        if stop > start and len(other.curve):
+            self.done += stop - start
+            self._look(start, stop)
+
+    def _look(self, start: int, stop: int) -> None:
+        """Look from some parabolas of what is at hand."""
+        part, other, flank = self.path.part(start, stop), self.other, self.path.flank
         samples = Samples.of(part)
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
         before = np.append(found.piece[0] if self.last is None else self.last - other.dropped, found.piece[:-1])
         self.ahead, self.last = search.ahead, int(found.piece[-1]) + other.dropped
-        if self.path.flank is None:
+        if flank is None:
             samples, found = over_holes(search, part, samples, before, found)
-        gap = found.gap
-        if self.path.flank is not None:
-            gap = self.path.flank.taken(slice(start, stop)).there(search, samples, found)
+            gap = found.gap
+        else:
+            gap = flank.taken(slice(start, stop)).there(search, samples, found)
         if other.flank is not None:
             gap = other.flank.back(search.near, samples.points, found)
         self.along.add(part.rows[samples.piece], gap, samples.weight)
