@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,24 @@ def test_a_program_that_cuts_nothing_has_no_error() -> None:
     found = figures(LONG, "G0 X10 Y0 Z5\n")
     assert (found.max, found.rms, found.where) == (0.0, 0.0, None)
     assert figures(LONG, "G0 X10 Y0 Z5\nG1 X10\n").rms == pytest.approx(1e-3)
+
+
+@pytest.mark.parametrize("unknown", [(), (170, 400)])
+def test_figures_are_the_same_to_the_last_bit_in_whatever_parts(unknown: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(3)
+    lines, size, weight = np.arange(1000) // 3, rng.exponential(size=1000), rng.random(1000)
+    size[list(unknown)] = np.nan
+    whole, parts = Along(1.0), Along(1.0)
+    whole.add(lines, size, weight)
+    cuts = [0, 0, 1, 250, 251, 600, 1000]
+    for start, stop in pairwise(cuts):
+        parts.add(lines[start:stop], size[start:stop], weight[start:stop])
+    figures = [(each.where, each.count, str(each.max), str(each.rms)) for each in (whole, parts)]
+    assert figures[0] == figures[1]
+    assert whole.where == (lines[unknown[0]] if unknown else lines[np.argmax(size)])
+    if not unknown:
+        assert whole.rms == pytest.approx(np.sqrt(np.average(size**2, weights=weight)), rel=1e-13)
+        assert whole.lines_beyond == parts.lines_beyond == np.unique(lines[size > 1.0]).tolist()
 
 
 # -- two programs -----------------------------------------------------------------------------------------------------
