@@ -11,11 +11,14 @@ import pytest
 
 from machine import chains
 from ncfix import fast
-from ncfix.machine import Effect, Machine, State, load
+from ncfix.machine import Effect, Machine, State, load, loads
 from ncfix.machine.piecewise import Spline, Table
 from ncfix.machine.smooth import Periodic, Polynomial
 
 SHIPPED = ("angle_head", "dmu50", "three_axis", "wCAYFXZSt", "wCBXFZYSt")
+TABLE_TABLE = "w C B F X Y Z S t"
+ELSEWHERE = ("w C F X Y Z B S t", "w F X Y Z C B S t", "w B X F Y C Z S t", "w C B X F Y Z S t")
+"""The same machine with its rotary axes elsewhere: behind X, Y and Z, before them, and between them."""
 NM = 1e-6
 
 
@@ -38,7 +41,9 @@ def poses(machine: Machine, n: int) -> np.ndarray:
 
 def shipped(root: Path) -> list[Machine]:
     found = [load(root / "examples" / "machines" / f"{name}.toml") for name in SHIPPED]
-    return [*found, load(root / "benchmarks" / "five_axis.toml"), with_curves(found[1])]
+    five = (root / "benchmarks" / "five_axis.toml").read_text(encoding="utf-8")
+    elsewhere = [loads(five.replace(TABLE_TABLE, order)) for order in (TABLE_TABLE, *ELSEWHERE)]
+    return [*found, *elsewhere, with_curves(found[1])]
 
 
 def with_curves(machine: Machine) -> Machine:
