@@ -162,8 +162,8 @@ class Samples:
     weight: Array
 
     @classmethod
-    def of(cls, curve: Curve) -> Samples:
-        """Of a curve."""
+    def of(cls, curve: Curve, after: float = 0.0) -> Samples:
+        """Of a curve, at the end of which another parabola goes on that is so long, mm."""
         hole = curve.ways == 0
         counts = np.where(hole, 1, 2 + curve.opens)
         piece = owners(counts)
@@ -175,8 +175,7 @@ class Samples:
         joined = np.flatnonzero(~curve.opens[1:])
         last = np.cumsum(counts) - 1
         weight[last[joined]] += curve.ways[joined + 1] / 6
-        if len(curve) and not curve.opens[0]:
-            weight[0] += curve.ways[0] / 6
+        weight[-1:] += after / 6
         return cls(piece, share, points, weight)
 
     def and_more(self, other: Samples) -> Samples:

@@ -87,6 +87,11 @@ class Track:
             self.flank = self.flank and self.flank.taken(slice(count, None))
             self.dropped += count
 
+    def joined(self, at: int) -> float:
+        """The length of a parabola at hand that begins where the one before ends, mm; 0 if there is none."""
+        curve = self.curve
+        return float(curve.ways[at]) if at < len(curve) and not curve.opens[at] else 0.0
+
     def part(self, start: int, stop: int) -> Curve:
         """Some parabolas of what is at hand."""
         curve = self.curve
@@ -119,6 +124,7 @@ class Match:
         if not other.complete:
             stop = int(np.searchsorted(curve.lengths + curve.ways, other.reached - self.ahead - 2 * KEPT))
         if stop < len(curve) or not self.path.complete:
+            stop = min(stop, len(curve) - 1)  # what goes on at its end is to be known
             stop -= (stop - start) % GROUP
         if stop > start and len(other.curve):
             self.done += stop - start
@@ -127,7 +133,7 @@ class Match:
     def _look(self, start: int, stop: int) -> None:
         """Look from some parabolas of what is at hand."""
         part, other, flank = self.path.part(start, stop), self.other, self.path.flank
-        samples = Samples.of(part)
+        samples = Samples.of(part, self.path.joined(stop))
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
