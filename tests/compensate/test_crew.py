@@ -97,7 +97,7 @@ def test_a_process_that_is_gone(
 
 
 def test_what_cannot_be_told(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
-    in_another_process(monkeypatch, Corrector, "_corrected", lambda *_: Done(b"", lambda: None))  # type: ignore[arg-type]
+    in_another_process(monkeypatch, Corrector, "_corrected", lambda *_: Done(b"", lambda: None, 1))  # type: ignore[arg-type]
     with pytest.raises(Exception, match="pickle"):
         streamed(program(5, 400, 0.0), machine, 1000, jobs=2)
 
