@@ -7,18 +7,21 @@ centre moved by the mean correction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.rows import vector_product
-from ncfix.compensate.segments import Segments, sweep_between
+from ncfix.compensate.ragged import slices
+from ncfix.compensate.rows import picked, vector_product
+from ncfix.compensate.segments import Circles, Segments, sweep_between
 
-LOOKS = 12
-"""Places on each arc, ends left out, at which the corrected path is looked at to find the centre."""
+LOOKS = np.arange(1, 13) / 13
+"""Fractions of each arc at which the corrected path is looked at to find the centre."""
+BATCH = 1024
+"""Arcs worked on at a time: what is known of them at so many places stays in the processor's cache."""
 NUDGE = 1e-3
 """mm by which the centre is moved to see what that does."""
 CLOSED = 1e-6
@@ -53,14 +56,22 @@ def fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, ro
     closure   what the control accepts; half of it is used
     rounding  how far a point may move when it is rounded to the control's digits, mm
     """
+    parts = [_fitted(intent, standing, rows[part], closure, rounding) for part in slices(len(rows), BATCH)]
+    if len(parts) == 1:
+        return parts[0]
+    names = [each.name for each in fields(Fitted)]
+    return Fitted(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+
+
+def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, rounding: float) -> Fitted:
     arcs = standing.rows(rows)
     ends = arcs.start[:, intent.columns], arcs.end[:, intent.columns]
-    programmed, wanted, fraction = _corrected_path(intent, standing, rows)
-    mean = intent.moves.centre[rows] + (wanted - programmed).mean(axis=1)
+    programmed, wanted = _corrected_path(intent, standing, rows)
+    mean = intent.moves.centre[rows] + (wanted - programmed).mean(axis=1).T
     centre = _in_plane(arcs.centre, arcs.normal, mean)
     closed = full_circles(intent, rows) & (np.linalg.norm(across(ends[1] - ends[0], arcs.normal), axis=1) < CLOSED)
     centre = np.where(closed[:, None], centre, _onto_bisector(*ends, arcs.normal, centre))
-    best = _best_on_bisector(arcs, ends, centre, wanted, fraction)
+    best = _best_on_bisector(arcs, ends, centre, wanted)
     centre = np.where(closed[:, None], centre, best)
     sweep = np.where(closed, arcs.sweep, sweep_between(*ends, centre, arcs.normal, arcs.sweep))
     return Fitted(centre, sweep, _sound(arcs, ends, centre, sweep, closed, closure, rounding))
@@ -71,28 +82,27 @@ def full_circles(intent: Intent, rows: Index) -> Mask:
     moves = intent.moves
     turns = moves.sweep[rows] / (2 * np.pi)
     whole = (np.abs(turns) > 0.5) & (np.abs(turns - np.round(turns)) < 1e-6)
-    chord = (moves.end - moves.start)[rows[:, None], intent.columns]
+    chord = (picked(moves.end, rows) - picked(moves.start, rows))[:, intent.columns]
     result: Mask = whole & (np.linalg.norm(across(chord, moves.normal[rows]), axis=1) < CLOSED)
     return result
 
 
-def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array, Array]:
-    """X Y Z of the program at `LOOKS` fractions of each arc, what the corrected path wants, and the fractions.
-
-    The first two are (k, LOOKS, 3).
+def _corrected_path(intent: Intent, real: Segments, rows: Index) -> tuple[Array, Array]:
+    """X Y Z of the program at `LOOKS` of each arc, and what the corrected path wants there, (3, looks, k) both.
 
     Of axes that get no word it wants what they can do: their way as programmed, from where they stand.
     """
-    fraction = np.arange(1, LOOKS + 1) / (LOOKS + 1)
-    each, at = np.repeat(rows, LOOKS), np.tile(fraction, len(rows))
-    commands = intent.segments.at(each, at)
-    wanted = intent.guessed(real, each, at, commands)[:, intent.columns]
+    each, at = np.tile(rows, len(LOOKS)), np.repeat(LOOKS, len(rows))
+    commands, chords = (
+        table.reshape(len(at), -1) for table in (intent.segments.evenly(rows, LOOKS), real.chords(rows, LOOKS))
+    )
     programmed = commands[:, intent.columns]
+    wanted = intent.improved(each, at, commands, chords)[:, intent.columns]
     if intent.mute is not None:
-        off = (real.start - intent.moves.start)[each[:, None], intent.columns]
+        off = (picked(real.start, each) - picked(intent.moves.start, each))[:, intent.columns]
         wanted = np.where(intent.mute[each], programmed + off, wanted)
-    shape = len(rows), LOOKS, 3
-    return programmed.reshape(shape), wanted.reshape(shape), fraction
+    shape = 3, len(LOOKS), len(rows)
+    return programmed.T.reshape(shape), wanted.T.reshape(shape)
 
 
 def across(vectors: Array, normal: Array) -> Array:
@@ -116,25 +126,25 @@ def _onto_bisector(start: Array, end: Array, normal: Array, centre: Array) -> Ar
     return result
 
 
-def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array, fraction: Array) -> Array:
+def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) -> Array:
     """Centres moved along the bisector so that the arcs come closest to the wanted points, by least squares."""
     chord = across(ends[1] - ends[0], arcs.normal)
     way = vector_product(arcs.normal, chord)
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
-    here = _points(arcs, ends, centre, fraction)
-    slope = (_points(arcs, ends, centre + NUDGE * way, fraction) - here) / NUDGE
-    squares = np.einsum("kij,kij->k", slope, slope)
-    amount = np.einsum("kij,kij->k", slope, wanted - here) / np.maximum(squares, 1e-12)
-    limit = 10 * np.linalg.norm(wanted - here, axis=2).max(axis=1) + NUDGE
+    here = _points(arcs, ends, centre)
+    slope = (_points(arcs, ends, centre + NUDGE * way) - here) / NUDGE
+    off = wanted - here
+    squares, share = (np.einsum("ijk,ijk->k", slope, each) for each in (slope, off))
+    amount = share / np.maximum(squares, 1e-12)
+    limit = 10 * np.sqrt((off * off).sum(axis=0).max(axis=0)) + NUDGE
     result: Array = centre + np.clip(amount, -limit, limit)[:, None] * way
     return result
 
 
-def _points(arcs: Segments, ends: Pair, centre: Array, fraction: Array) -> Array:
+def _points(arcs: Segments, ends: Pair, centre: Array) -> Array:
+    """X Y Z at `LOOKS` of arcs about other centres, (3, looks, k)."""
     sweep = sweep_between(*ends, centre, arcs.normal, arcs.sweep)
-    moved = replace(arcs, centre=centre, sweep=sweep)
-    each, at = np.repeat(np.arange(len(centre)), len(fraction)), np.tile(fraction, len(centre))
-    return moved.at(each, at)[:, arcs.columns].reshape(len(centre), len(fraction), 3)
+    return Circles.of(replace(arcs, centre=centre, sweep=sweep), np.arange(len(centre))).at(LOOKS[:, None])
 
 
 def _sound(

@@ -189,11 +189,15 @@ class Intent:
         return self.machine.gaps(programmed, done, states, tip)
 
     def follows(self, rows: Index, commands: Array) -> Array:
-        """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k, 3, 3) mm per mm."""
-        tcp = self.moves.tcp[rows]
-        programmed = np.where(tcp[:, None] & self.machine.rotary, 0.0, commands[:1] if tcp.all() else commands)
-        maps = regular(tip_maps(self.machine, programmed))[0]
-        return np.broadcast_to(maps, (len(rows), 3, 3))
+        """How the tip follows X Y Z of commands (k, n_axes) of motions `rows`: (k or 1, 3, 3) mm per mm.
+
+        One is for all where the rotary axes stand alike, or do not matter.
+        """
+        turning = commands.copy()
+        turning[:, self.columns] = 0.0
+        turning[self.moves.tcp[rows]] = 0.0
+        alike = len(rows) > 0 and bool((turning == turning[0]).all())
+        return regular(tip_maps(self.machine, turning[:1] if alike else turning))[0]
 
     def aimed(self, rows: Index, fraction: Array, commands: Array) -> tuple[Array, Mask]:
         """Commands (k, n_axes) with X Y Z that bring the tip of the real machine where it should be at the fractions.
@@ -205,16 +209,16 @@ class Intent:
         q, arrived = steer(self.machine, begin, target, self.states(rows, fraction))
         return commands_from_joints(self.machine, q, moves.tcp[rows], moves.tool_length[rows]), arrived
 
-    def guessed(self, real: Segments, rows: Index, fraction: Array, programmed: Array | None = None) -> Array:
-        """Nearly the corrected commands at fractions of motions, (k, n_axes).
+    def guessed(self, real: Segments, rows: Index, fraction: Array) -> Array:
+        """Nearly the corrected commands at fractions of motions, (k, n_axes), see `improved`."""
+        return self.improved(rows, fraction, self.segments.at(rows, fraction), real.linearly(rows, fraction))
 
-        X Y Z by one Newton step from those of the program, with the rotary axes where `real` has them: good to the
-        errors times their gradient, some tens of nanometres.
+    def improved(self, rows: Index, fraction: Array, programmed: Array, commands: Array) -> Array:
+        """Nearly the corrected commands, (k, n_axes), where the program has `programmed` at fractions of motions.
 
-        programmed  (k, n_axes) the commands of the program there, if known
+        X Y Z by one Newton step from those of the program, with the rotary axes as `commands` have them: good to the
+        errors times their gradient, some tens of nanometres. X Y Z of `commands` are overwritten.
         """
-        programmed = self.segments.at(rows, fraction) if programmed is None else programmed
-        commands = real.linearly(rows, fraction)
         commands[:, self.columns] = programmed[:, self.columns]
         gap = self.gaps(rows, programmed, [self.joints(rows, commands)], self.states(rows, fraction))[0]
         commands[:, self.columns] -= solve(self.follows(rows, commands), gap)

@@ -8,7 +8,7 @@ from ncfix.compensate.budget import DENSITY
 from ncfix.compensate.excursion import accelerations
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.ragged import owners, places
+from ncfix.compensate.ragged import offsets, owners, places
 from ncfix.compensate.rows import picked, vector_product
 from ncfix.compensate.segments import Segments
 from ncfix.machine import Machine
@@ -138,6 +138,8 @@ def with_kinks(
     owner, at = _nodes(intent.curved[rows], counts, fraction)
     q = intent.joints(rows[owner], real.at(rows[owner], at))
     where, found = crossed(intent, owner, at, q)
+    if not where.size:
+        return counts, fraction
     sides = [(where, found)] if not beside else [(where, np.clip(found + way, 0.0, 1.0)) for way in (-beside, beside)]
     return merged(len(rows), (owners(counts), fraction), *sides)
 
@@ -177,11 +179,12 @@ def crossed(intent: Intent, owner: Index, fraction: Array, q: Array) -> tuple[In
 
 def _nodes(curved: Mask, counts: Index, fraction: Array) -> tuple[Index, Array]:
     """Samples and both ends of curved motions, the ends only of others: owner and fraction, flat."""
-    inner = curved[owners(counts)]
-    each = np.arange(len(counts))
-    lists = [(owners(counts)[inner], fraction[inner]), (each, np.zeros(len(each))), (each, np.ones(len(each)))]
-    many, at = merged(len(counts), *lists)
-    return owners(many), at
+    many = np.where(curved, counts, 0) + 2
+    owner, last = owners(many), offsets(many)[1:] - 1
+    at, inside = np.zeros(len(owner)), np.ones(len(owner), dtype=bool)
+    at[last], inside[last], inside[last - many + 1] = 1.0, False, False
+    at[inside] = fraction[curved[owners(counts)]]
+    return owner, at
 
 
 def _unrolled(before: Array, after: Array, points: Array) -> tuple[Array, Array, Array]:

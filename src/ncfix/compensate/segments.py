@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
+from ncfix.compensate.ragged import owners
 from ncfix.compensate.rows import picked, spread, vector_product
+from ncfix.machine.steps import dot
+from ncfix.machine.transport import turn
 from ncfix.program.moves import Kind, Moves
 
 
@@ -56,8 +59,25 @@ class Segments:
         if self.arc.any():
             on_arc = np.flatnonzero(self.arc[rows] & (fraction != 1))
             if on_arc.size:
-                command[on_arc[:, None], self.columns] = self._on_arc(rows[on_arc], fraction[on_arc])
+                self._onto(command[None], on_arc, Circles.each(self, rows[on_arc]).at(fraction[on_arc])[:, None])
         return command
+
+    def evenly(self, rows: Index, fraction: Array) -> Array:
+        """The commands at the same fractions (m,), not at ends, of all `rows` (k,), which are arcs, (m, k, n_axes)."""
+        commands = self.chords(rows, fraction)
+        self._onto(commands, slice(None), Circles.of(self, rows).at(fraction[:, None]))
+        return commands
+
+    def chords(self, rows: Index, fraction: Array) -> Array:
+        """As `evenly`, with X Y Z of arcs on their chords."""
+        share = fraction[:, None, None]
+        commands: Array = (1 - share) * picked(self.start, rows) + share * picked(self.end, rows)
+        return commands
+
+    def _onto(self, command: Array, rows: Index | slice, found: Array) -> None:
+        """Put X Y Z (3, m, k) of some rows into commands (m, ., n_axes)."""
+        for column, value in zip(self.columns.tolist(), found, strict=True):
+            command[:, rows, column] = value
 
     def linearly(self, rows: Index, fraction: Array) -> Array:
         """As `at`, with X Y Z of arcs on their chords."""
@@ -79,30 +99,66 @@ class Segments:
         result += end
         return result
 
-    def _on_arc(self, rows: Index, fraction: Array) -> Array:
-        """X Y Z at fractions of arcs, (k, 3)."""
-        centre, normal = picked(self.centre, rows), picked(self.normal, rows)
-        sweep, f = self.sweep[rows], fraction[:, None]
-        start, end = (picked(points, rows).take(self.columns, axis=1) - centre for points in (self.start, self.end))
-        low, high = height(start, normal), height(end, normal)
-        from_start = _turned(start - low * normal, normal, fraction * sweep)
-        from_end = _turned(end - high * normal, normal, (fraction - 1) * sweep)
-        between = (1 - f) * low + f * high
-        result: Array = centre + between * normal + (1 - f) * from_start + f * from_end
-        return result
+
+@dataclass(frozen=True, slots=True)
+class Circles:
+    """Arcs in columns, X Y Z first: at their starts and at their ends where these are, and two ways from the axis.
+
+    start, end  (9, k) mm: the point, the way to it from the axis, and that turned on by a right angle
+    sweep       (k,) rad
+    """
+
+    start: Array
+    end: Array
+    sweep: Array
+
+    @classmethod
+    def of(cls, arcs: Segments, rows: Index) -> Circles:
+        """Some of the motions, all of which are arcs."""
+        centre, normal = _columns(arcs.centre, rows), _columns(arcs.normal, rows)
+        points = (picked(table, rows).T[arcs.columns] for table in (arcs.start, arcs.end))
+        start, end = (_about_axis(each, centre, normal) for each in points)
+        return cls(start, end, arcs.sweep[rows])
+
+    @classmethod
+    def each(cls, arcs: Segments, rows: Index) -> Circles:
+        """As `of`, of motions that come several times, one after the other."""
+        first = np.flatnonzero(np.diff(rows, prepend=-1))
+        found = cls.of(arcs, rows[first])
+        if len(first) == len(rows):
+            return found
+        own = owners(np.diff(first, append=len(rows)))
+        return cls(found.start.take(own, axis=1), found.end.take(own, axis=1), found.sweep[own])
+
+    def at(self, fraction: Array) -> Array:
+        """X Y Z at a fraction of each arc (k,), (3, k); or at the same fractions (m, 1) of all, (3, m, k)."""
+        rest, found = 1 - fraction, np.empty((3, *np.broadcast_shapes(fraction.shape, self.sweep.shape)))
+        (sine, versine), (back, least) = turn(fraction * self.sweep), turn((fraction - 1) * self.sweep)
+        for i in range(3):
+            (a, r, q), (b, s, t) = self.start[i::3], self.end[i::3]
+            found[i] = rest * (a - versine * r + sine * q) + fraction * (b - least * s + back * t)
+        return found
+
+
+def _columns(table: Array, rows: Index) -> Array:
+    """Rows (k,) of a table (n, 3) as columns (3, k)."""
+    return np.ascontiguousarray(picked(table, rows).T)
+
+
+def _about_axis(point: Array, centre: Array, normal: Array) -> Array:
+    """Points of arcs about axes, all (3, k), the ways to them from the axes, and these turned on by a right angle."""
+    result = np.empty((9, point.shape[1]))
+    result[:3], arm = point, point - centre
+    arm -= dot(normal, arm) * normal
+    (a, b, c), (x, y, z) = normal, arm
+    result[3:6], result[6], result[7], result[8] = arm, b * z - c * y, c * x - a * z, a * y - b * x
+    return result
 
 
 def height(points: Array, normal: Array) -> Array:
     """How far vectors (k, 3) go along the normals, (k, 1)."""
     along: Array = np.einsum("ij,ij->i", points, normal)[:, None]
     return along
-
-
-def _turned(radius: Array, normal: Array, angle: Array) -> Array:
-    """Radius vectors turned about the normal that they are perpendicular to."""
-    across = vector_product(normal, radius)
-    result: Array = np.cos(angle)[:, None] * radius + np.sin(angle)[:, None] * across
-    return result
 
 
 def sweep_between(start: Array, end: Array, centre: Array, normal: Array, like: Array) -> Array:

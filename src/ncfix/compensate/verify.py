@@ -18,7 +18,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import finite, lengths, picked, some
+from ncfix.compensate.rows import finite, lengths, picked, some, vector_product
 from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
@@ -26,7 +26,7 @@ from ncfix.machine import Machine, State
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 
-BATCH = 50_000
+BATCH = 16_384
 """Samples worked on at a time."""
 STRAIGHT = 0.05
 """Pieces over which the error may bend by less than that many times are looked at where they end: an eighth of a wave
@@ -238,17 +238,16 @@ def _way(written: Written, piece: Index) -> Array:
     """The part of the way that each sample stands for, mm: its piece's chord shared out, or arc length."""
     segments = written.segments
     first = np.flatnonzero(np.diff(piece, prepend=-1))
-    counts = np.diff(first, append=len(piece))
-    chord = picked(segments.end - segments.start, piece)[:, ~written.intent.machine.rotary]
+    counts, own = np.diff(first, append=len(piece)), piece[first]
+    chord = (picked(segments.end, own) - picked(segments.start, own))[:, ~written.intent.machine.rotary]
     way = lengths(np.nan_to_num(chord))
-    on_arc = np.flatnonzero(segments.arc[piece])
+    on_arc = np.flatnonzero(segments.arc[own])
     if on_arc.size:
-        arc = piece[on_arc]
-        spoke = segments.start[arc[:, None], segments.columns] - segments.centre[arc]
-        radius = np.linalg.norm(np.cross(segments.normal[arc], spoke), axis=1)
+        arc = own[on_arc]
+        spoke = picked(segments.start, arc)[:, segments.columns] - segments.centre[arc]
+        radius = np.linalg.norm(vector_product(segments.normal[arc], spoke), axis=1)
         way[on_arc] = np.hypot(way[on_arc], radius * np.abs(segments.sweep[arc]))
-    share: Array = way / np.repeat(counts, counts)
-    return share
+    return np.repeat(way / counts, counts)
 
 
 def _kept_motions(written: Written) -> Mask:
