@@ -137,6 +137,21 @@ def test_a_table_is_there_when_it_is_whole(in_parts_of: Any, program: Path, tmp_
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.ngc", "motions.csv"]
 
 
+@pytest.mark.parametrize("size", PARTS)
+def test_the_dialect_is_told_by_the_same_text_in_any_parts(in_parts_of: Any, program: Path, size: int) -> None:
+    """It shows behind the first part only: G47 is a cycle of Haas, and its end is not known."""
+    start, end = text().split(b"M30")
+    program.write_bytes(
+        start[:3000].rsplit(b"\n", 1)[0]
+        + b"\nG47 P0 (HAAS) X.01 Y-2.95 I0. J0.1 R0.05 Z-0.005 F15. E10.\n"
+        + start[3000:].split(b"\n", 1)[1]
+        + b"M30"
+        + end
+    )
+    whole = in_parts_of(WHOLE, "trace", program, "--assume-zero")
+    assert in_parts_of(size, "trace", program, "--assume-zero") == whole
+
+
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="a system without a folder in which nobody can write")
 @pytest.mark.parametrize("size", [1000, WHOLE])
 def test_where_nothing_can_be_written_that_is_said(in_parts_of: Any, program: Path, size: int) -> None:
