@@ -130,6 +130,59 @@ def test_nothing_can_be_kept(tmp_path: Path) -> None:
         assert run(tmp_path, nowhere + PROGRAM) == "4 [1, 1, 0, 1, 1, 0] True"
 
 
+def test_a_user_without_a_home(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(MODULE)
+    homeless = """
+import os
+from pathlib import Path
+def home():
+    raise RuntimeError("Could not determine home directory.")
+Path.home = home
+del os.environ["XDG_CACHE_HOME"]
+"""
+    assert run(tmp_path, homeless + PROGRAM) == "4 [1, 1, 0, 1, 1, 0] True"
+    assert run(tmp_path, homeless + PROGRAM) == "4 [1, 1, 0, 1, 1, 0] False"
+
+
+def test_compiled_from_where_it_was_imported_and_not_from_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "module.py").write_text(MODULE)
+    (tmp_path / "numba.py").write_text("open('imported', 'w').close()")
+    monkeypatch.chdir(tmp_path)
+    found = f"import sys\nsys.path.remove('')\nsys.path.insert(0, {str(tmp_path / 'elsewhere')!r})\n"
+    path = os.pathsep.join(each for each in sys.path if each)
+    monkeypatch.setenv("PYTHONPATH", path)
+    done = subprocess.run([sys.executable, "-c", found + PROGRAM], capture_output=True, text=True)
+    assert done.stdout.strip() == "4 [1, 1, 0, 1, 1, 0] True", done.stderr
+    assert not Path("imported").exists()
+
+
+@pytest.mark.parametrize("executable", [None, "", sys.executable + ".none", "/bin/true", "/bin/echo"])
+def test_no_python_to_compile_with(executable: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", executable)
+    with pytest.raises(kernel.CompilingError):
+        kernel.build([kernel.Library("module", parts=(len,))])
+
+
+def test_llvm_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "llvmlite.binding", None)
+    with pytest.raises(kernel.CompilingError, match="llvmlite"):
+        kernel.binding()
+
+
+def test_a_full_disk_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(place: Path, data: bytes) -> int:
+        place.open("wb").close()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    kernel.keep(str(tmp_path / "module.py"), "o", b"code")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
 def test_every_module_with_kernels_is_compiled_beforehand(root: Path) -> None:
     sources = root / "src"
     having = [path for path in sources.rglob("*.py") if "\nLIBRARY = Library(" in path.read_text()]
@@ -161,11 +214,14 @@ def test_an_environment_that_fails_the_trial_is_not_used(
     monkeypatch.setattr(kernel, "TRIAL", "failing_trial")
     monkeypatch.setattr(fast, "KERNELS", ("module",))
     monkeypatch.setattr(fast, "_engaged", False)
+    monkeypatch.setattr(fast, "_failed", False)
     monkeypatch.delenv("NCFIX_NO_FAST", raising=False)
     said: list[str] = []
     assert not fast.engage(said.append)
-    assert said == [kernel.WAIT, fast.FAILED]
+    assert not fast.engage(said.append)
+    assert said == [kernel.WAIT, fast.FAILED]  # not tried twice
     assert not kept(tmp_path)
+    monkeypatch.setattr(fast, "_failed", False)
     monkeypatch.setattr(kernel, "TRIAL", "ncfix.kernel_trial")
     assert fast.engage()
     assert len(kept(tmp_path)) == 1

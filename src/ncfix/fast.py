@@ -24,15 +24,16 @@ KERNELS = (
 FAILED = "The loops of ncfix[fast] cannot be compiled here; without them it takes two or three times as long."
 
 _engaged = False
+_failed = False
 
 
 def engage(say: Callable[[str], object] = lambda text: None) -> bool:
     """Use compiled kernels from here on, if they are installed and wanted; whether they are.
 
-    The first time they are compiled, which takes a while; `say` is told so before.
+    The first time they are compiled, which takes a while; `say` is told so before. What failed is not tried again.
     """
     global _engaged
-    _engaged = _engaged or (wanted() and _ready(say))
+    _engaged = _engaged or (wanted() and not _failed and _ready(say))
     return _engaged
 
 
@@ -49,6 +50,7 @@ def disengage() -> None:
 
 def _ready(say: Callable[[str], object]) -> bool:
     """Whether numba is installed, and one that kernels can be compiled with; they are ready then."""
+    global _failed
     if find_spec("numba") is None:
         return False
     from ncfix.kernel import CompilingError, ready
@@ -56,6 +58,7 @@ def _ready(say: Callable[[str], object]) -> bool:
     try:
         ready([import_module(name).LIBRARY for name in KERNELS], say)
     except CompilingError:
+        _failed = True
         say(FAILED)
         return False
     return True

@@ -206,20 +206,30 @@ def build(libraries: Sequence[Library]) -> None:
     for share, process, found, trouble in done:
         if process.returncode:
             raise CompilingError(trouble.decode(errors="replace").strip() or f"ended with {process.returncode}")
-        for library, data in zip(share, pickle.loads(found), strict=True):
+        for library, data in zip(share, _received(found), strict=True):
             if not library.take(data):
                 raise CompilingError(f"{library.source} was changed while it was compiled")
             keep(library.source, "o", data)
 
 
 def _started(share: Iterable[Library]) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "ncfix.kernel_build", TRIAL, *(library.module for library in share)]
+    """A process that compiles libraries; it imports from where this one does, and not from the working folder."""
+    modules = [TRIAL, *(library.module for library in share)]
+    command = [sys.executable or "", "-P", "-m", "ncfix.kernel_build", *modules]
+    known = {**os.environ, **LOWERED_ONLY, "PYTHONPATH": os.pathsep.join(sys.path)}
     try:
-        return subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **LOWERED_ONLY}
-        )
+        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=known)
     except OSError as error:
         raise CompilingError(str(error)) from error
+
+
+def _received(found: bytes) -> list[bytes]:
+    """What a process that compiles has written. Raises CompilingError if something else came."""
+    try:
+        codes: list[bytes] = pickle.loads(found)
+    except Exception as error:  # pickle says in any way that something is none
+        raise CompilingError(f"instead of machine code came {found[:80]!r}") from error
+    return codes
 
 
 def dealt(libraries: Iterable[Library], most: int) -> list[list[Library]]:
@@ -243,11 +253,11 @@ def alone() -> Iterator[None]:
 
 def _lock() -> IO[bytes]:
     """A file at the first place that can be written to; raises OSError if none can."""
-    beside, elsewhere = places(__file__, "lock")
-    with suppress(OSError):
-        return beside.open("wb")
-    elsewhere.parent.mkdir(parents=True, exist_ok=True)
-    return elsewhere.open("wb")
+    for place in places(__file__, "lock"):
+        with suppress(OSError):
+            place.parent.mkdir(parents=True, exist_ok=True)
+            return place.open("wb")
+    raise OSError("nothing can be kept")
 
 
 # -- on the disk ------------------------------------------------------------------------------------------------------
@@ -257,19 +267,22 @@ def places(source: str, kind: str) -> Iterator[Path]:
     """Where something about a module may be kept: beside what Python keeps of it, or in the user's own cache."""
     name = f"{Path(source).stem}.{environment()[:12]}.{kind}"
     yield Path(source).parent / "__pycache__" / name
-    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    yield caches / "ncfix" / f"{Path(source).parent.name}-{name}"
+    with suppress(RuntimeError):  # a user without a home
+        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        yield caches / "ncfix" / f"{Path(source).parent.name}-{name}"
 
 
 def keep(source: str, kind: str, data: bytes) -> None:
     """Keep it at the first place that can be written to."""
     for place in places(source, kind):
+        temporary = place.with_suffix(f".{os.getpid()}")
         with suppress(OSError):
             place.parent.mkdir(parents=True, exist_ok=True)
-            temporary = place.with_suffix(f".{os.getpid()}")
             temporary.write_bytes(data)
             os.replace(temporary, place)
             return
+        with suppress(OSError):  # a full disk
+            temporary.unlink()
 
 
 def flat(nested: Any) -> list[Any]:
@@ -284,8 +297,11 @@ def flat(nested: Any) -> list[Any]:
 
 
 def binding() -> Any:
-    """LLVM, which numba brings along."""
-    import llvmlite.binding  # type: ignore[import-untyped]
+    """LLVM, which numba brings along. Raises CompilingError where it is missing or cannot be opened."""
+    try:
+        import llvmlite.binding  # type: ignore[import-untyped]
+    except (ImportError, OSError) as error:
+        raise CompilingError(f"llvmlite: {error}") from error
 
     return llvmlite.binding
 
