@@ -21,7 +21,7 @@ from ncfix.machine.loops import (
     unpacked,
     work_out,
 )
-from ncfix.machine.steps import SHIFT, TURN, Steps, dot, has_arrived, turned, twice_crossed, volume
+from ncfix.machine.steps import PARTS, SHIFT, TURN, Steps, dot, has_arrived, turned, twice_crossed, volume
 
 
 class Goal(NamedTuple):
@@ -60,8 +60,9 @@ def aim(
     nominal, _ = unpacked(perfect[0], perfect[1])
     steps, functions = unpacked(within[0], within[1])
     undone, more = unpacked(behind[0], behind[1])
-    most = max(len(functions.order), len(more.order)), max(len(steps.kind), len(undone.kind), len(nominal.kind))
-    hand, spare = laid_out(work, columns, most[0], most[1])
+    small = len(steps.kind) + len(undone.kind)
+    hand, spare = laid_out(work, columns, max(len(functions.order), len(more.order)), small)
+    ahead = with_values_from(hand, PARTS * len(steps.kind))
     goal = Goal(spare[:4], spare[4:13], spare[13])
     close, flat, passes = limits[0], limits[1], limits[2]
     n = columns.q.shape[1]
@@ -70,8 +71,8 @@ def aim(
         take_up(columns, begin, count, hand)
         set_goal(nominal, hand, count, target, begin, goal.point)
         used = work_out(more, hand, count, 0)
-        add_up(more, hand, count)
-        carry(undone, hand, count, goal.point)
+        add_up(more, ahead, count)
+        carry(undone, ahead, count, goal.point)
         left = set_out(steps, axes, hand, count, flat, goal)
         for k in range(count):
             at = np.uint64(begin + k)
@@ -87,6 +88,11 @@ def aim(
         for i in range(3):
             for k in range(count):
                 out[i, np.uint64(begin + k)] = hand.q[axes[i], k]
+
+
+def with_values_from(hand: Hand, row: int) -> Hand:
+    """The same poses, with small motions of their own: those of another route must not be found there."""
+    return Hand(hand.q, hand.sine, hand.versine, hand.others, hand.length, hand.found, hand.values[row:], hand.tip)
 
 
 def set_goal(perfect: Steps, hand: Hand, count: int, target: Array, begin: int, point: Array) -> None:
@@ -238,5 +244,5 @@ def bring_back(steps: Steps, first: int, axes: Ints, hand: Hand, count: int, poi
                 point[2, k] = point[2, k] - dz * way
 
 
-HELPERS = (set_goal, set_out, step_closer, follow, first_of, is_one_of, bring_back)
+HELPERS = (with_values_from, set_goal, set_out, step_closer, follow, first_of, is_one_of, bring_back)
 """Loops that others are made of."""

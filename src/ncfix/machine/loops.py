@@ -113,8 +113,11 @@ def unpacked(ints: Ints, reals: Array) -> tuple[Steps, Functions]:
 
 
 def room(columns: Columns, *routes: Packed) -> Array:
-    """Room for a handful of poses on any of some routes, and `SPARE` rows more, as `laid_out` divides it."""
-    m, f = (max(int(route[0][at]) for route in routes) for at in (0, 2))
+    """Room for a handful of poses on some routes, and `SPARE` rows more, as `laid_out` divides it.
+
+    Each route has small motions of its own: what none of its functions adds to has to stay zero.
+    """
+    m, f = sum(int(route[0][0]) for route in routes), max(int(route[0][2]) for route in routes)
     rows = len(columns.q) + 2 * len(columns.sine) + len(columns.others) + f + PARTS * m
     count = (rows + 5 + SPARE) * HANDFUL
     memory = np.zeros(count + LINE)
