@@ -24,6 +24,8 @@ from typing import IO, Any, TypeVar
 
 import numpy as np
 
+from ncfix import caches
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 Argument = Any
 """What an argument is: "i8" or "f8", with "[:]" or "[:,:]" for an array (there "u1", "b1" and "i4", too), or a tuple of
@@ -266,10 +268,9 @@ def _lock() -> IO[bytes]:
 def places(source: str, kind: str) -> Iterator[Path]:
     """Where something about a module may be kept: beside what Python keeps of it, or in the user's own cache."""
     name = f"{Path(source).stem}.{environment()[:12]}.{kind}"
-    yield Path(source).parent / "__pycache__" / name
-    with suppress(RuntimeError):  # a user without a home
-        caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        yield caches / "ncfix" / f"{Path(source).parent.name}-{name}"
+    beside, *elsewhere = caches.folders(source)
+    yield beside / name
+    yield from (folder / f"{Path(source).parent.name}-{name}" for folder in elsewhere)
 
 
 def keep(source: str, kind: str, data: bytes) -> None:

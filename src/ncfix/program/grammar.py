@@ -16,6 +16,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ncfix import caches
+
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
 
@@ -73,8 +75,7 @@ def place_of_tables(grammar: Path) -> str | None:
     and version of Lark.
     """
     name = f"{grammar.stem}.{sha256(str(grammar).encode()).hexdigest()[:12]}.{sys.implementation.cache_tag}.tables"
-    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for folder in (Path(__file__).parent / "__pycache__", caches / "ncfix"):
+    for folder in caches.folders(__file__):
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             if (folder / name).exists() or os.access(folder, os.W_OK):
