@@ -160,3 +160,18 @@ def test_a_cut_that_begins_where_a_passed_rapid_ends(root: Path) -> None:
     assert report.error_after_um["max"] == pytest.approx(report.error_before_um["max"], rel=0.02)
     assert report.error_after_um["where"] == 5
     assert "NCF416" in [message.code for message in report.warnings]
+
+
+@pytest.mark.parametrize(("first", "left_um"), [("G1 X6 Y0 Z5 F500", 16.61), ("G1 X0 Y0 Z5 F500", 15.90)])
+def test_a_cut_that_begins_where_a_rapid_has_left_axes(root: Path, first: str, left_um: float) -> None:
+    """Nobody has said where X and Y stand when Z comes down: the cut begins there, and leads them to their places.
+
+    X is 14.9 um off and Y 5.6; with its play X is 0.7 um more off where the program moves it.
+    """
+    lines = ("G21 G90 G94 G17", "G0 Z5", first, "X9", "M2", "")
+    program = read("\n".join(lines).encode(), "a.nc", "iso")
+    machine = load(str(root / "examples/machines/wCBXFZYSt.toml"))
+    report = fix_program(program, machine, Setup(assume_zero=True)).report
+    assert report.error_after_um["max"] == pytest.approx(left_um, abs=0.01)
+    assert report.error_after_um["where"] == 3
+    assert {"NCF416", "NCF439"} <= {message.code for message in report.warnings}

@@ -160,20 +160,18 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
 
 
 def _uneasy(written: Written) -> Mask:
-    """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
-
-    Not behind rapids of which an axis is left where it stands: what that leaves is said by itself.
-    """
+    """Motions whose start the end of the one before does not show: also those behind rapids, (n,)."""
     found, moves = uneasy_starts(written.intent, _kept_motions(written)), written.intent.moves
-    found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
+    found[1:] |= moves.kind[:-1] == Kind.RAPID
     return found
 
 
 def _leaps(written: Written, which: Index) -> Mask:
-    """Pieces with which motions begin that lead a cut to where it should begin, from where a motion was passed."""
+    """Pieces with which motions begin that lead a cut to where it should begin, from where a motion has left axes."""
     moves, move = written.intent.moves, written.pieces.move[which]
-    behind = (move > 0) & (moves.rule[move - 1] == Rule.PASS)
-    leaps: Mask = behind & (written.span[which] <= 2 * INSTANT) & finite(picked(moves.start, move))
+    behind = (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
+    leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
+    leaps: Mask = behind & leads & finite(picked(moves.start, move))
     return leaps
 
 
