@@ -105,7 +105,7 @@ class Source:
 
     def looked_into(self) -> bool:
         """Read the first bytes, which `read` gives once more; whether there are so many that the program is long."""
-        from ncfix.program.dialects import PROBE_BYTES
+        from ncfix.program.content import PROBE_BYTES
 
         many = long_from()
         self.head = self._read(max(many, PROBE_BYTES))  # the dialect must not depend on the size of a part

@@ -7,13 +7,11 @@ from pathlib import PurePath
 
 from ncfix.diagnostics import UsageError
 from ncfix.plugins import nearest, registry
+from ncfix.program.content import PROBE_BYTES
 from ncfix.program.dialect import Dialect
 
 DEFAULT = "iso"
 """What a text is read as if neither its name nor its content says more."""
-
-PROBE_BYTES = 1 << 16
-"""How much of a text is looked at to find its dialect."""
 
 
 def names() -> tuple[str, ...]:
