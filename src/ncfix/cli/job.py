@@ -80,7 +80,7 @@ class Job:
     def fixed(self, target: Target, find: Find, jobs: int) -> Iterator[Fixed]:
         """The corrected program; a long one is corrected while it is read, if it can be."""
         with source_of(target.source) as source:
-            long = source.looked_into()
+            long = source.looked_into(named=self.dialect is not None)
             if not long or self.options.flatten:
                 yield self._whole(source, source.everything(), find)
                 return

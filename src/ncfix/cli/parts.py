@@ -103,12 +103,15 @@ class Source:
             text = "was changed while it was read"
             raise SourceError.of("NCF002", text, Place(shown(self.path)), "fix it again when it is whole")
 
-    def looked_into(self) -> bool:
-        """Read the first bytes, which `read` gives once more; whether there are so many that the program is long."""
+    def looked_into(self, named: bool = False) -> bool:
+        """Read the first bytes, which `read` gives once more; whether there are so many that the program is long.
+
+        named  its dialect was said; else there are enough of them to tell it, whatever the size of a part
+        """
         from ncfix.program.content import PROBE_BYTES
 
         many = long_from()
-        self.head = self._read(max(many, PROBE_BYTES))  # the dialect must not depend on the size of a part
+        self.head = self._read(many if named else max(many, PROBE_BYTES))
         return len(self.head) >= many
 
     @property
