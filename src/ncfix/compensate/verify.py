@@ -149,8 +149,7 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
-    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy))
-    begun = begun[along[begun] | _leaps(written, which[begun])]
+    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy) & along | _leaps(written, which))
     extra = [(begun, np.full(len(begun), START))]
     if written.intent.kinks:
         extra.append(_passed(written, which, along))
@@ -160,16 +159,20 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
 
 
 def _uneasy(written: Written) -> Mask:
-    """Motions whose start the end of the one before does not show: also those behind rapids, (n,)."""
+    """Motions whose start the end of the one before does not show: also those behind rapids, (n,).
+
+    Not behind rapids of which an axis is left where it stands: what that leaves is said by itself, and seen in a cut
+    only where it has to be led aside (`_leaps`).
+    """
     found, moves = uneasy_starts(written.intent, _kept_motions(written)), written.intent.moves
-    found[1:] |= moves.kind[:-1] == Kind.RAPID
+    found[1:] |= (moves.kind[:-1] == Kind.RAPID) & ~some(moves.wordless[:-1])
     return found
 
 
 def _leaps(written: Written, which: Index) -> Mask:
     """Pieces with which motions begin that lead a cut to where it should begin, from where a motion has left axes."""
     moves, move = written.intent.moves, written.pieces.move[which]
-    behind = (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
+    behind = written.opens[which] & (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
     leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
     leaps: Mask = behind & leads & finite(picked(moves.start, move))
     return leaps
