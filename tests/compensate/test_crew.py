@@ -141,6 +141,7 @@ def test_what_is_read_of_a_pipe_is_told(machine: Machine) -> None:
 
 def test_where_processes_cannot_be_forked_one_does_it_alone(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = streamed(program(5, 400, 0.0), machine, 1000)
+    monkeypatch.setattr(crew, "FORKS", False)
     monkeypatch.delattr(os, "fork")
     assert streamed(program(5, 400, 0.0), machine, 1000, jobs=3) == expected
 

@@ -54,7 +54,7 @@ class Batch:
     def _holds(self, target: Target, record: Record | None) -> bool:
         if record is None:
             return False
-        return record.holds(self.job.key(target), target.path, subprograms(target.source))
+        return record.holds(self.job.key(target), target.path, subprograms(self.job.setup, target.source))
 
     def _record(self, target: Target, outcome: Outcome) -> Record:
         digest = digest_of(target.path) or ""

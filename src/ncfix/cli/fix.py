@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.jobs import Jobs, settled
 from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import STREAM, Outputs, targets
-from ncfix.diagnostics import UsageError
+from ncfix.cli.targets import JSON, Outputs, check_streams, targets
 
 if TYPE_CHECKING:
     from ncfix.cli.job import Job
@@ -47,11 +47,12 @@ if TYPE_CHECKING:
 @click.option("--allow-refused", is_flag=True, help="Write the program even if motions had to be left uncorrected.")
 @click.option("--no-figures", "verify", is_flag=True, flag_value=False, default=True, help="Leave out the tip errors.")
 @click.option(
+    "-j",
     "--jobs",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    metavar="N",
+    type=Jobs(),
+    default="auto",
+    show_default="auto, as many as pay",
+    metavar="N|auto",
     help="Processes that work on a long program, or programs at a time; the result is the same.",
 )
 @click.option(
@@ -82,12 +83,11 @@ def fix(
 
     outputs = Outputs(output, in_place, force, resume)
     found = targets(programs, outputs, (machine_path, *given.files), folders=True)
-    if as_json and any(target.path == STREAM for target in found):
-        text = "the program and the JSON object would both go to standard output"
-        raise UsageError.of("NCF010", text, hint="-o FILE")
+    for target in found:
+        check_streams([JSON] * as_json, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     job = _job(machine_path, dialect, given, {**choices, "force": force})
-    outcomes = list(Batch(job, found, outputs.folder(programs), resume).run(jobs, staff(executor)))
+    outcomes = list(Batch(job, found, outputs.folder(programs), resume).run(settled(jobs, found), staff(executor)))
     if len(outcomes) > 1:
         written = sum(outcome.entry["output"] is not None for outcome in outcomes)
         console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")

@@ -65,7 +65,7 @@ class Job:
 
     def outcome(self, target: Target, jobs: int = 1) -> Outcome:
         """Fix one program and say what came of it; an error, and a fault of ncfix, ends this program only."""
-        find = Noted(subprograms(target.source))
+        find = Noted(subprograms(self.setup, target.source))
         try:
             with console.busy(f"fixing {shown(target.source)}"), self.fixed(target, find, jobs) as fixed:
                 return replace(_written(fixed, target, self.options), called=find.called)
@@ -90,13 +90,17 @@ class Job:
 
     def _whole(self, source: Source, text: bytes, find: Find) -> Fixed:
         from ncfix.compensate.fix import fix_program
-        from ncfix.compensate.flat import fix_flat
         from ncfix.program.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
-        fix = fix_flat if self.options.flatten else fix_program
-        fixed = fix(program, self.machine, self.setup, self.options, resolve=find)
+        given = program, self.machine, self.setup, self.options, find
+        if self.options.flatten:
+            from ncfix.compensate.flat import fix_flat
+
+            fixed = fix_flat(*given)
+        else:
+            fixed = fix_program(*given)
         return Fixed(fixed.text, fixed.changed, fixed.report)
 
     @contextmanager

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -25,6 +26,8 @@ from ncfix.compensate.settle import Before
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)
+FORKS = hasattr(os, "fork") and sys.platform != "darwin"
+"""Whether a process can be forked: not with Windows, and not in safety with the libraries of macOS."""
 Read = Callable[[int], bytes]
 """Gives the next so many bytes of a text, just as many but at its end."""
 
@@ -218,9 +221,9 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | Non
     """Those who work on a program: `jobs` processes, of which this is one.
 
     worker  makes what corrects a text in another process
-    ground  the files; without them, and where processes cannot be forked (Windows), this one works alone
+    ground  the files; without them, and where processes cannot be forked, this one works alone
     """
-    if jobs <= 1 or ground is None or not hasattr(os, "fork"):
+    if jobs <= 1 or ground is None or not FORKS:
         yield Crew(Share())
         return
     from multiprocessing import get_context
