@@ -20,11 +20,13 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from struct import Struct
 from typing import IO, Any, TypeVar
 
 import numpy as np
 
 from ncfix import caches
+from ncfix.processors import processors
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Argument = Any
@@ -36,10 +38,8 @@ TRIAL = "ncfix.kernel_trial"
 LOWERED_ONLY = {"NUMBA_OPT": "0", "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
 """What numba reads when it is imported: machine code of its own is not wanted, nor colours in what it tries in vain."""
 WAIT = "The loops of ncfix[fast] are compiled for this computer, once; that takes some 15 s."
-NUMBERS = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
-DATA = object.__basicsize__
-"""Where an array has the address of its numbers: the first thing behind what every object has (numpy's C interface).
-To ask the array for it takes longer than to hand over all the rest."""
+WORDS = {"i8": "q", "f8": "d"}
+"""Numbers as they are handed over, eight bytes each."""
 
 
 class CompilingError(Exception):
@@ -58,29 +58,28 @@ class Kernel:
     library: Library
     code: Callable[..., int] | None = field(default=None, init=False)
     kinds: tuple[tuple[np.dtype[Any], int], ...] = field(init=False)
+    form: Struct = field(init=False)
 
     def __post_init__(self) -> None:
         named = (each for each in flat(self.arguments) if isinstance(each, str))
         self.kinds = tuple((np.dtype(each[:2]), each.count(":")) for each in named)
+        self.form = Struct("".join("P" if dimensions else WORDS[kind.str[1:]] for kind, dimensions in self.kinds))
 
     def __call__(self, *given: Any) -> int:
         """Run it. Raises TypeError for other arguments than those declared."""
         if self.code is None:
             ready([self.library])
         assert self.code is not None
-        values: list[Any] = []
+        words: list[Any] = []
         for value, (kind, dimensions) in zip(flat(given), self.kinds, strict=True):
-            if dimensions:
-                if value.dtype != kind or value.ndim != dimensions or not value.flags.c_contiguous:
-                    raise TypeError(
-                        f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind.str[1:]}"
-                    )
-                address = ctypes.c_void_p.from_address(id(value) + DATA).value
-                values += (None, None, value.size, kind.itemsize, address, *value.shape, *value.strides)
+            if not dimensions:
+                words.append(value)
+            elif value.dtype == kind and value.ndim == dimensions and value.flags.c_contiguous:
+                words.append(id(value))
             else:
-                values.append(value)
-        result, trouble = ctypes.c_int64(), ctypes.c_void_p()
-        if self.code(ctypes.byref(result), ctypes.byref(trouble), *values):
+                raise TypeError(f"{self.loop.__name__} was given {value.dtype} {value.shape} instead of {kind.str[1:]}")
+        result = ctypes.c_int64()
+        if self.code(ctypes.byref(result), self.form.pack(*words)):
             raise AssertionError(f"{self.loop.__name__} has failed")
         return result.value
 
@@ -90,15 +89,8 @@ class Kernel:
         return f"{self.loop.__module__}.{self.loop.__name__}"
 
     def bind(self, address: int) -> None:
-        """Take the machine code at an address: numba hands over results by a pointer, and arrays by their parts."""
-        types: list[Any] = [ctypes.c_void_p, ctypes.c_void_p]
-        for kind, dimensions in self.kinds:
-            if dimensions:
-                types += [ctypes.c_void_p] * 2 + [ctypes.c_int64] * 2
-                types += [ctypes.c_void_p] + [ctypes.c_int64] * (2 * dimensions)
-            else:
-                types.append(NUMBERS[kind.str[1:]])
-        self.code = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(address)
+        """Take the machine code at an address, see `kernel_build.entry`."""
+        self.code = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_char_p)(address)
 
 
 @dataclass(slots=True)
@@ -202,7 +194,7 @@ def ready(libraries: Sequence[Library], say: Callable[[str], object] = lambda te
 
 def build(libraries: Sequence[Library]) -> None:
     """Compile libraries in processes of their own, as many as there are processors. Raises CompilingError."""
-    shares = dealt(libraries, os.cpu_count() or 1)
+    shares = dealt(libraries, processors())
     started = [_started(share) for share in shares]
     done = [(share, process, *process.communicate()) for share, process in zip(shares, started, strict=True)]
     for share, process, found, trouble in done:

@@ -5,7 +5,7 @@ into, up to the loop: that takes longer than all the rest. So numba only lowers.
 one, then over the module, in which helpers can be called by nobody else: it puts them into loops where that is worth
 it, and hands over no more of an array than is looked at. The loops are as fast as with all helpers put into them.
 
-numba takes this from the environment, before it is imported (`kernel.LOWERED_ONLY`), and needs 270 MB: so it runs in a
+numba takes this from the environment, before it is imported (`kernel.LOWERED_ONLY`), and needs 280 MB: so it runs in a
 process of its own, `python -m ncfix.kernel_build TRIAL MODULE...`, which writes the code to standard output.
 """
 
@@ -14,10 +14,12 @@ from __future__ import annotations
 import gc
 import pickle
 import sys
+from functools import reduce
 from importlib import import_module
+from itertools import chain
 from typing import Any
 
-from ncfix.kernel import Argument, Library, binding, target
+from ncfix.kernel import Argument, Kernel, Library, binding, target
 
 OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
@@ -26,6 +28,13 @@ OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": True,
 }
 """Of numba: divisions as numpy does them, and nothing that needs Python or numba when it runs."""
+SELDOM = 100_000, 20, 100
+"""How seldom garbage in circles is looked for: lowering leaves 60 MB of it, but to look for it takes time."""
+LOOP = ".loop"
+"""Behind the name of a kernel: that of its loop as numba has lowered it."""
+DATA = object.__basicsize__
+SHAPE, STEPS = DATA + 16, DATA + 24
+"""Where an array has the addresses of its numbers, its shape and its strides, in bytes (numpy's C interface)."""
 NOTHING_INSIDE = -1000
 """Limit of what a function may cost to be put into others: none is."""
 
@@ -70,9 +79,45 @@ def lowered(library: Library) -> Any:
     for kernel in library.kernels:
         compiled = njit(typed(kernel.arguments, types), **OPTIONS)(kernel.loop)
         (signature, found), *_ = compiled.overloads.items()
-        text = compiled.inspect_llvm(signature).replace(found.fndesc.llvm_func_name, kernel.symbol)
+        text = compiled.inspect_llvm(signature).replace(found.fndesc.llvm_func_name, kernel.symbol + LOOP)
         module.link_in(llvm.parse_assembly(text))
+        module.link_in(llvm.parse_assembly(entry(kernel)))
     return module
+
+
+def entry(kernel: Kernel) -> str:
+    """A function that takes all arguments of a kernel as words of eight bytes, arrays as Python has them.
+
+    To hand over an array costs next to nothing so; numba wants it in seven parts and more. Results come by a pointer.
+    """
+    from llvmlite import ir  # type: ignore[import-untyped]
+
+    word, real, place = ir.IntType(64), ir.DoubleType(), ir.IntType(8).as_pointer()
+    parts = [place, place, word, word, place]
+    types = [[*parts, *[word] * (2 * n)] if n else [real if kind == "f8" else word] for kind, n in kernel.kinds]
+    module = ir.Module()
+    module.triple, module.data_layout = binding().get_process_triple(), str(target().target_data)
+    taken = [word.as_pointer(), place.as_pointer(), *chain(*types)]
+    loop = ir.Function(module, ir.FunctionType(ir.IntType(32), taken), kernel.symbol + LOOP)
+    function = ir.Function(module, ir.FunctionType(ir.IntType(32), [word.as_pointer()] * 2), kernel.symbol)
+    code = ir.IRBuilder(function.append_basic_block())
+
+    def at(start: Any, offset: int, kind: Any) -> Any:
+        """What stands so many bytes behind an address."""
+        return code.load(code.inttoptr(code.add(start, word(offset)), kind.as_pointer()))
+
+    result, given = function.args
+    values, start = [result, code.alloca(place)], code.ptrtoint(given, word)
+    for number, (kind, dimensions) in enumerate(kernel.kinds):
+        if not dimensions:
+            values.append(at(start, 8 * number, real if kind == "f8" else word))
+            continue
+        array = at(start, 8 * number, word)
+        shape, steps = ([at(at(array, each, word), 8 * k, word) for k in range(dimensions)] for each in (SHAPE, STEPS))
+        values += [place(None), place(None), reduce(code.mul, shape), word(kind.itemsize), at(array, DATA, place)]
+        values += [*shape, *steps]
+    code.ret(code.call(loop, values))
+    return str(module)
 
 
 def typed(arguments: tuple[Argument, ...], types: Any) -> Any:
@@ -92,9 +137,12 @@ def _type(argument: Argument, types: Any) -> Any:
 
 def main(trial: str, *modules: str) -> None:
     """Try whether kernels can be trusted; compile those of these modules, and write them to standard output."""
-    gc.disable()  # next to nothing becomes garbage in circles before the process ends
+    gc.disable()  # next to nothing becomes garbage in circles while numba is imported
     if not import_module(trial).passes():
         sys.exit("this numba passes arguments in another way")
+    gc.freeze()
+    gc.set_threshold(*SELDOM)
+    gc.enable()
     libraries = [import_module(module).LIBRARY for module in modules]
     pickle.dump([library.sealed(compiled(library)) for library in libraries], sys.stdout.buffer)
 

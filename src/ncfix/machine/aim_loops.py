@@ -16,6 +16,7 @@ from ncfix.machine.loops import (
     add_up,
     carry,
     laid_out,
+    set_goal,
     set_off,
     take_up,
     unpacked,
@@ -93,17 +94,6 @@ def aim(
 def with_values_from(hand: Hand, row: int) -> Hand:
     """The same poses, with small motions of their own: those of another route must not be found there."""
     return Hand(hand.q, hand.sine, hand.versine, hand.others, hand.length, hand.found, hand.values[row:], hand.tip)
-
-
-def set_goal(perfect: Steps, hand: Hand, count: int, target: Array, begin: int, point: Array) -> None:
-    """Put down where the tips shall be, (4, .)."""
-    if target.shape[1]:
-        for k in range(count):
-            at = np.uint64(begin + k)
-            point[0, k], point[1, k], point[2, k], point[3, k] = target[0, at], target[1, at], target[2, at], 0.0
-    else:
-        set_off(perfect, hand, count, point)
-        carry(perfect, hand, count, point)
 
 
 def set_out(steps: Steps, axes: Ints, hand: Hand, count: int, flat: float, goal: Goal) -> int:
@@ -244,5 +234,5 @@ def bring_back(steps: Steps, first: int, axes: Ints, hand: Hand, count: int, poi
                 point[2, k] = point[2, k] - dz * way
 
 
-HELPERS = (with_values_from, set_goal, set_out, step_closer, follow, first_of, is_one_of, bring_back)
+HELPERS = (with_values_from, set_out, step_closer, follow, first_of, is_one_of, bring_back)
 """Loops that others are made of."""

@@ -24,12 +24,12 @@ def splines(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
 
 
 def slopes(knots: Array, degree: int, coefficients: Array, u: Array) -> Array:
-    """Their derivatives: splines of a degree less."""
+    """Their derivatives by u, as `splines`: splines of a degree less."""
     return splines(knots[1:-1], degree - 1, rates(knots, degree, coefficients), u)
 
 
 def rates(knots: Array, degree: int, coefficients: Array) -> Array:
-    """The coefficients of the derivatives, on the knots without the first and the last one."""
+    """The coefficients (m, k - 1) of the derivatives of splines (m, k), on the knots but the first and the last."""
     width = knots[degree + 1 : -1] - knots[1 : -degree - 1]
     rise = degree * np.diff(coefficients, axis=1)
     return np.where(width > 0, rise / np.where(width > 0, width, 1.0), 0.0)

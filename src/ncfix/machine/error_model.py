@@ -55,7 +55,7 @@ class Group:
     gains: Array
 
     def add_to(self, slots: dict[Slot, Array], poses: Poses) -> None:
-        """Evaluate and add."""
+        """Evaluate at n poses and add to the six components (6, n), mm and rad, of each slot."""
         values = self.basis.combine(self.gains.reshape(-1, self.gains.shape[-1]), *self.arguments(poses))
         if self.factor is not None:
             values = values * self.factor.u(poses, (-np.inf, np.inf))
@@ -63,7 +63,7 @@ class Group:
             slots[slot] = slots[slot] + value if slot in slots else value
 
     def arguments(self, poses: Poses) -> tuple[Array, Array]:
-        """u and the direction of motion, as the basis sees them."""
+        """u and the direction of motion (-1, 0, 1), as the basis sees them: (n,), or (1,) where neither varies."""
         if self.signal is None:
             return np.zeros(1), np.zeros(1)
         u = self.signal.u(poses, self.basis.domain)

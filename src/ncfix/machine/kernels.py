@@ -19,6 +19,7 @@ ROUTE = "i8[:]", "f8[:]"
 COLUMNS = loops.Columns, "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:]"
 
 tips = LIBRARY.kernel(*ROUTE, COLUMNS, "f8[:,:]", "f8[:,:]")(loops.tips)
+gaps = LIBRARY.kernel(ROUTE, ROUTE, COLUMNS, "f8[:,:]", "i8[:]", "f8[:,:]", "f8[:,:,:]", "f8[:,:]")(loops.gaps)
 aim = LIBRARY.kernel(ROUTE, ROUTE, ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:]", "f8[:,:]", "f8[:,:]")(aim_loops.aim)
 placed = LIBRARY.kernel(ROUTE, COLUMNS, "i8[:]", "f8[:,:]", "f8[:,:]", "f8[:,:]", "f8[:,:]")(aim_loops.placed)
 

@@ -154,6 +154,48 @@ def tips(ints: Ints, reals: Array, columns: Columns, work: Array, out: Array) ->
                 out[i, np.uint64(begin + k)] = hand.tip[i, k]
 
 
+def gaps(
+    perfect: Packed, real: Packed, columns: Columns, target: Array, sides: Ints, work: Array, out: Array, angle: Array
+) -> None:
+    """How far the tips of all poses are from where they shall be: out (k, n, 3) mm.
+
+    columns  of n poses as they are meant, and of others behind them, n of each kind
+    target   (3, n) mm; (3, 0): where a perfect machine has the tip as meant
+    sides    (k,) which kind each of the results is of
+    angle    (k, n) the largest squared angle of a small motion
+    """
+    nominal, _ = unpacked(perfect[0], perfect[1])
+    steps, functions = unpacked(real[0], real[1])
+    hand, spare = laid_out(work, columns, len(functions.order), len(steps.kind))
+    n, point = out.shape[1], spare[:4]
+    for begin in range(0, n, HANDFUL):
+        count = min(HANDFUL, n - begin)
+        take_up(columns, begin, count, hand)
+        set_goal(nominal, hand, count, target, begin, point)
+        for side in range(len(sides)):
+            take_up(columns, sides[side] * n + begin, count, hand)
+            work_out(functions, hand, count, 0)
+            add_up(functions, hand, count)
+            set_off(steps, hand, count, hand.tip)
+            carry(steps, hand, count, hand.tip)
+            for k in range(count):
+                at = np.uint64(begin + k)
+                angle[side, at] = hand.tip[3, k]
+                for i in range(3):
+                    out[side, at, i] = hand.tip[i, k] - point[i, k]
+
+
+def set_goal(perfect: Steps, hand: Hand, count: int, target: Array, begin: int, point: Array) -> None:
+    """Put down where the tips shall be, (4, .): at `target` (3, n) mm, or (3, 0) where a perfect machine has them."""
+    if target.shape[1]:
+        for k in range(count):
+            at = np.uint64(begin + k)
+            point[0, k], point[1, k], point[2, k], point[3, k] = target[0, at], target[1, at], target[2, at], 0.0
+    else:
+        set_off(perfect, hand, count, point)
+        carry(perfect, hand, count, point)
+
+
 def set_off(steps: Steps, hand: Hand, count: int, tip: Array) -> None:
     """Where the tips of a handful of poses are before all steps, (4, .): as `steps.at_tip`."""
     start = steps.start
@@ -311,6 +353,7 @@ def add_up(functions: Functions, hand: Hand, count: int) -> None:
 HELPERS = (
     unpacked,
     laid_out,
+    set_goal,
     set_off,
     carry,
     nudge,

@@ -18,6 +18,7 @@ from ncfix.machine.bow import Bow, bow_of
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects
 from ncfix.machine.forward import Chain, build_chain, carry
+from ncfix.machine.gap import gaps
 from ncfix.machine.jacobian import Jacobians
 from ncfix.machine.route import Approach, Route, Turns, approach_of, route_of
 from ncfix.machine.se3 import Array
@@ -202,15 +203,13 @@ class Machine:
         model, perfect = None if self.is_perfect else self._model, self._perfect_route
         assert perfect is not None
         route = perfect if model is None else self._route
-        goals, *others = (self._poses(q, state, model)[1] for q in (meant, *done))
-        found = [np.empty((3, goals.positions.shape[1])) for _ in done]
-        for part, goal in goals.chunks():
-            turns = (route or perfect).turns(goal)
-            target = self._tips_along(perfect, goal, None, turns) if tip is None else tip[part].T
-            for out, here in zip(found, (each.part(part) for each in others), strict=True):
-                alike = np.array_equal(here.positions[self.rotary], goal.positions[self.rotary])
-                out[:, part] = self._tips_along(route, here, model, turns if alike else None) - target
-        return [np.ascontiguousarray(out.T) for out in found]
+        goals = self._poses(meant, state, model)[1]
+        others = [goals if q is meant else self._poses(q, state, model)[1] for q in done]
+
+        def tips(by: Route | None, poses: Poses, turns: Turns | None) -> Array:
+            return self._tips_along(by, poses, None if by is perfect else model, turns)
+
+        return gaps(perfect, route, tips, goals, others, tip)
 
     def aim(
         self,

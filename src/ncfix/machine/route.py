@@ -118,11 +118,10 @@ class Route:
         for axis in self.rotary:
             sine[axis], versed[axis] = turn(q[axis])
         for row, (axis, low, high) in enumerate(held, start=len(q)):
-            angle = np.minimum(np.maximum(q[axis], low), high)
-            if (angle == q[axis]).all():
+            if q[axis].min(initial=low) >= low and q[axis].max(initial=high) <= high:
                 sine[row], versed[row] = sine[axis], versed[axis]
             else:
-                sine[row], versed[row] = turn(angle)
+                sine[row], versed[row] = turn(np.minimum(np.maximum(q[axis], low), high))
         return sine, versed
 
 

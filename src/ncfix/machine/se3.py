@@ -28,7 +28,7 @@ def rotation_factors(squared: Array) -> tuple[Array, Array]:
 
 
 def screw_factor(squared: Array) -> Array:
-    """The factor (a - sin a) / a^3 of a screw's translation, for squared angles."""
+    """The factor (a - sin a) / a^3 of a screw's translation, for squared angles a^2, rad^2, of any shape."""
     x = squared
     series = 1 / 6 - x / 120 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110)))
     angle = np.sqrt(np.maximum(x, _SERIES_BELOW))

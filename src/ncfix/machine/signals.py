@@ -49,14 +49,14 @@ class Signal:
         return f"{self.name} after {self.constant_s!r} s"
 
     def raw(self, poses: Poses) -> Array:
-        """x, not yet held, in the unit of the machine file."""
+        """x, (n,), not yet held, in the unit of the machine file."""
         if self.axis is None:
             return poses.inputs[self.name]
         position: Array = poses.positions[self.axis] / self.unit
         return position
 
     def u(self, poses: Poses, domain: tuple[float, float]) -> Array:
-        """What the basis sees; `domain` is the basis's own range of u."""
+        """What the basis sees, (n,), without a unit; `domain` is the basis's own range of u."""
         x = poses.inputs[self.lagged_name] if self.constant_s else self.raw(poses)
         if self.endless:
             x = turned_back(x, self.low, self.high)

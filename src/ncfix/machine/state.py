@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,6 +63,23 @@ class Poses:
             _part(self.direction, part),
             {name: values[part] for name, values in self.inputs.items()},
         )
+
+
+def behind_each_other(kinds: Sequence[Poses]) -> Poses:
+    """Poses in several positions, all else of which is alike in form, as one."""
+    if len(kinds) == 1:
+        return kinds[0]
+    return Poses(
+        np.concatenate([each.positions for each in kinds], axis=1),
+        _columns([each.tool_length for each in kinds]),
+        _columns([each.direction for each in kinds]),
+        {name: np.concatenate([each.inputs[name] for each in kinds]) for name in kinds[0].inputs},
+    )
+
+
+def _columns(values: Sequence[Array]) -> Array:
+    """What is known of each pose behind each other; of one for all as it is."""
+    return values[0] if values[0].shape[-1] == 1 else np.concatenate(values, axis=-1)
 
 
 def flatten(q: ArrayLike, state: State, axes: tuple[Axis, ...], names: frozenset[str]) -> tuple[tuple[int, ...], Poses]:

@@ -28,7 +28,7 @@ def columns(*vectors: Sequence[float]) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """The vector product along the first dimension."""
+    """The vector product along the first dimension, (3, ...) each."""
     ax, ay, az = a
     bx, by, bz = b
     x = ay * bz - az * by
@@ -174,7 +174,7 @@ def _turned(vector: Array, center: Array, moved: Array, weight: Weight) -> Array
 
 
 def rotated_by(vector: Array, arm: Array) -> Array:
-    """By how much a rotation vector moves the end of an arm: (R - 1) arm, without loss of digits for small angles."""
+    """By how much a rotation vector (3, ...) moves the end of an arm (3, ...): (R - 1) arm, to all digits if small."""
     first, second = se3.rotation_factors((vector * vector).sum(0))
     once = cross(vector, arm)
     result: Array = first * once + second * cross(vector, once)

@@ -6,7 +6,6 @@ they leave to the user's eye, whether two parameters can be told apart at all, i
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -112,11 +111,6 @@ def _combined(
     zero = algebra.ring.zero
     total = {key: first.get(key, zero) + sign * second.get(key, zero) for key in {**first, **second}}
     return {key: poly for key, poly in total.items() if poly}
-
-
-def unknowns_count(found: Iterable[Equation]) -> dict[int, int]:
-    """How many equations have how many unknowns."""
-    return dict(sorted(Counter(len(equation.unknowns) for equation in found).items()))
 
 
 Choose = Callable[[Sequence[Equation]], Equation]
