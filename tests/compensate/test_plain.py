@@ -16,12 +16,13 @@ from compensate import streaming
 from compensate import test_stream_others as others
 from compensate.test_stream import OPTIONS, streamed
 from ncfix import fast
-from ncfix.compensate import corrector
+from ncfix.compensate import corrector, plain
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.units import Unit
 from ncfix.machine import Machine, load
+from ncfix.program.moves import Kind
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.writer import Splices, spliced
 
@@ -116,6 +117,25 @@ def test_arcs_and_dwells_among_plain_motions(seed: int, machine: Machine, monkey
     assert_as_by_the_long_way(found, source, machine, 6000, options, monkeypatch)
 
 
+@pytest.mark.usefixtures("compiled")
+def test_arcs_are_planned_with_plain_motions(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = winding(2, 600, 0.03, AMONG[2:4])
+    plan, begun = Planner.plan, []
+
+    def watched(self: Planner, unit: Unit) -> Course | None:
+        course = plan(self, unit)
+        begun.append((course is not None, int(unit.part.moves.kind[0])))
+        return course
+
+    with monkeypatch.context() as patched:
+        patched.setattr(plain, "planned", None)
+        patched.setattr(Planner, "plan", watched)
+        found = streamed(source, machine, 8220)
+    assert all(planned for planned, _ in begun[1:])
+    assert (True, Kind.ARC) in begun
+    assert_as_by_the_long_way(found, source, machine, 8220, OPTIONS, monkeypatch)
+
+
 LED = {
     "short": (rb"^", rb""),
     "long": (rb"(?m)^(N\d*50 G1 X)1(.*) C[\d.]+", rb"\g<1>2\2 C140."),
@@ -157,6 +177,19 @@ def assert_as_by_the_long_way(
             assert report[name] == pytest.approx(value, abs=2e-4), name
         else:
             assert report[name] == value, name
+
+
+@pytest.mark.usefixtures("compiled")
+def test_axes_that_rest_beside_an_offset_contour(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, at, blocks = random.Random(1), [20.0, 20.0, 5.0, 10.0, 30.0], []
+    for k in range(150):
+        ways = [rng.uniform(0.01, 0.2) for _ in at]
+        at = [value + way * (k % 7 > 0 or axis > 1) for axis, (value, way) in enumerate(zip(at, ways, strict=True))]
+        blocks.append("G1 " + " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZBC", at, strict=True)))
+    head = ["%", "G21 G90 G94 G54 G17 F800.", "G0 X20. Y20. Z5. B10. C30.", "G41.1 D2."]
+    source = "\n".join([*head, *blocks, "G40", "M30", "%", ""]).encode()
+    found = streamed(source, machine, 2500)
+    assert_as_by_the_long_way(found, source, machine, 2500, OPTIONS, monkeypatch)
 
 
 def test_what_comes_near_a_limit_goes_the_long_way(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,8 +42,6 @@ def test_it_finds_what_dense_sampling_finds(tcp: bool) -> None:
     assert error.after.max == pytest.approx(after, rel=0.02)
     assert error.after.max < TOLERANCE
     assert error.after.rms < error.after.max
-    assert error.move_after.max() == error.after.max
-    assert error.move_after[0] == 0.0
 
 
 def test_figures_of_a_case_that_can_be_worked_out_by_hand() -> None:
@@ -110,6 +108,7 @@ def test_rapids_cycles_and_kept_motions() -> None:
 
 
 def test_tilt_of_the_tool() -> None:
+    """Two angles across each other, 40 and 30 urad, are 50; what is of third order in them is 1e-9 of that."""
     machine = perfect(TOPOLOGIES["table-table"]).replace(effects=(Effect("EA0S", (40e-6,)), Effect("EBX", (30e-6,))))
     b = machine.axis_names.index("B")
     poses = np.zeros((4, 5))
@@ -118,8 +117,8 @@ def test_tilt_of_the_tool() -> None:
     results = {name: plan(machine, moves, get_strategy(name), TOLERANCE) for name in ("position", "full")}
     errors = {name: path_error(machine, moves, each.pieces, each.start) for name, each in results.items()}
     for error in errors.values():
-        assert error.before.tilt == pytest.approx(50e-6, rel=1e-3)
-    assert errors["position"].after.tilt == pytest.approx(50e-6, rel=1e-3)
+        assert error.before.tilt == pytest.approx(50e-6, rel=1e-8)
+    assert errors["position"].after.tilt == pytest.approx(50e-6, rel=1e-8)
     assert errors["full"].after.tilt < 1e-6
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import owners, places, slices
-from ncfix.compensate.rows import finite, picked
+from ncfix.compensate.rows import finite, picked, some
 from ncfix.compensate.simulation import BATCH
 from ncfix.compensate.stretches import Stretches
 
@@ -53,6 +53,8 @@ class Curve:
         begin[1:] = end[:-1]
         begin[fresh] = points[2 * len(rows) :]
         there, opens = finite(begin) & finite(middle) & finite(end), stretches.opens.copy()
+        later = fresh[fresh > 0]
+        opens[later] = some(begin[later] != end[later - 1])
         opens[1:] |= ~there[:-1]
         curve = cls(rows, start, stop, begin, middle, end, opens, arc_lengths(begin, middle, end))
         return curve if there.all() else curve.taken(there)

@@ -34,10 +34,11 @@ class Cut:
 
     actual    what the machine makes of it
     intended  what it means; None of a program of which that does not matter
-    flank     the other side of the play, if there is any
+    flank     where the tip is besides, with the play of axes, if there is any
     unseen    lines of motions that cut nobody knows where
     left      linear axis -> lines of motions that cannot be corrected along it
     last      nothing comes after it
+    sides     (n, n_axes) of the play on which axes are after each motion, those that do not count, too, if there is any
     """
 
     actual: Curve
@@ -46,6 +47,7 @@ class Cut:
     unseen: Index
     left: dict[str, Index]
     last: bool
+    sides: Signs | None = None
 
     @classmethod
     def of(cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool) -> Cut:
@@ -69,10 +71,10 @@ class Cut:
         stretches = Stretches.of(intent)
         actual = Curve.through(stretches, partial(actual_tip, intent))
         intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
-        flank = Flank.of(intent, actual)
+        flank, sides = Flank.of(intent, actual) or (None, None)
         flank = flank and flank.taken(counted(actual))
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
-        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last)
+        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, sides)
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:
@@ -86,7 +88,7 @@ class Around:
 
     moves      up to twice `BESIDE`; the last `BESIDE` count when the next part is known
     lines      (n,) those in which they are
-    direction  the way in which the axes came to the first of them
+    direction  the way in which the axes came to the first of them, far enough to take up their play
     """
 
     moves: Moves
@@ -94,11 +96,10 @@ class Around:
     direction: Signs
 
     @classmethod
-    def behind(cls, intent: Intent, lines: Index) -> Around:
-        """Those at the end of motions."""
+    def behind(cls, intent: Intent, lines: Index, sides: Signs) -> Around:
+        """Those at the end of motions; `sides` (n, n_axes) of the play on which the axes are after each."""
         start = max(len(lines) - 2 * BESIDE, 0)
-        assert intent.arrival is not None
-        direction = intent.arrival[start - 1] if start else np.asarray(intent.state.direction, dtype=np.int8)
+        direction = sides[start - 1] if start else np.asarray(intent.state.direction, dtype=np.int8)
         return cls(taken(intent.moves, np.arange(start, len(lines))), lines[start:], direction)
 
 
@@ -126,8 +127,11 @@ class Cuts:
                 yield Cut.of(Intent(machine, moves, State()), lines, slice(None), unit.part.last, self.meant)
                 continue
             intent, lines, counted = _with(around, machine, moves, lines)
-            yield Cut.of(intent, lines, slice(counted, None if unit.part.last else -BESIDE), unit.part.last, self.meant)
-            around = Around.behind(intent, lines)
+            rows = slice(counted, None if unit.part.last else -BESIDE)
+            cut = Cut.of(intent, lines, rows, unit.part.last, self.meant)
+            yield cut
+            assert cut.sides is not None
+            around = Around.behind(intent, lines, cut.sides)
 
 
 def _with(around: Around | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:

@@ -28,6 +28,8 @@ HOPS = 40
 """Most parabolas on which a nearest point is looked for one after the other."""
 STRAIGHT = 0.1
 """rad: a path that turns by less leads no nearer to a point than 1 - cos of it, half a per cent, of its distance."""
+INSIDE = 1e-6
+"""Share of a parabola: from its end another nearest point may be found than from the begin of the next one."""
 SUDDEN = 0.5
 """mm by which one path is longer than the other on the way of these: there is something wrong, and it is looked for."""
 FEWEST = 16
@@ -55,6 +57,10 @@ class Nearest:
     def taken(self, which: Index) -> Nearest:
         """For some of the points."""
         return Nearest(self.piece[which], self.share[which], self.gap[which])
+
+    def way(self, curve: Curve) -> Array:
+        """The ways along the curve to there, (n,) mm; so far inside of the parabolas that rounding shows no others."""
+        return curve.way(self.piece, np.clip(self.share, INSIDE, 1 - INSIDE))
 
     def and_more(self, other: Nearest) -> Nearest:
         """For these points, and then for others."""
@@ -97,7 +103,7 @@ class Search:
 
         How much longer it is, is seen at the last of them that is near enough, or at the nearest one if none is.
         """
-        found, half = self.around(points, lengths + self.ahead), len(points) // 2
+        found, half = self.around(points, lengths + self.ahead, lengths), len(points) // 2
         sure = np.flatnonzero(found.gap[half:] <= self.near)
         surest = half + int(sure[-1] if sure.size else np.argmin(found.gap[half:]))
         ahead = float(self.curve.way(found.piece, found.share)[surest] - lengths[surest])
@@ -106,13 +112,36 @@ class Search:
         self.ahead = ahead
         return [found]
 
-    def around(self, points: Array, expected: Array) -> Nearest:
-        """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`."""
-        found = (self._down_compiled if fast.engaged() else self._down)(np.ascontiguousarray(points.T), expected)
+    def around(self, points: Array, expected: Array, lengths: Array | None = None) -> Nearest:
+        """For points (n, 3), near the lengths (n,) of the curve at which they are expected. Raises `LostError`.
+
+        lengths  (n,) of the other path to the points, if they are in order along it
+        """
+        found = self._downhill(points, expected)
         far = np.flatnonzero(found.gap > self.near)
+        if far.size and lengths is not None:
+            expected = self._beside(expected, lengths, found)
+            found.put(far, self._downhill(points[far], expected[far]))
+            far = far[found.gap[far] > self.near]
         if far.size:
             self._everywhere(points, expected, found, far)
         return found
+
+    def _beside(self, expected: Array, lengths: Array, found: Nearest) -> Array:
+        """The lengths (n,) at which points are expected by what is near enough to those before and behind them.
+
+        One path gets longer than the other with every step that takes up play.
+        """
+        ahead = self.curve.way(found.piece, found.share) - lengths
+        sure = np.flatnonzero((found.gap <= self.near) & (np.abs(ahead - self.ahead) <= SUDDEN))
+        if not sure.size:
+            return expected
+        better: Array = lengths + np.interp(np.arange(len(lengths)), sure, ahead[sure])
+        return better
+
+    def _downhill(self, points: Array, expected: Array) -> Nearest:
+        down = self._down_compiled if fast.engaged() else self._down
+        return down(np.ascontiguousarray(points.T), expected)
 
     def _down(self, points: Array, expected: Array) -> Nearest:
         """The nearest points that are reached without going away from `points` (3, n)."""

@@ -1,18 +1,25 @@
-"""Arcs and dwells among plain motions: planned by the long way, as a short program of their own.
+"""Arcs, dwells and turns of rotary axes among plain motions.
 
-Each has the motion before it there, so that it begins where it shall, and the one behind it, which may have to begin
-somewhere else than it would behind a plain motion.
+Mostly they are planned with these: an arc that stays one, a dwell between motions that end where they shall, a turn.
+What is more than that is planned by the long way, as a short program of its own: each with the motion before it, so
+that it begins where it shall, and the one behind it, which may have to begin somewhere else than it would behind a
+plain motion.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ncfix.compensate.arcs import fitted, full_circles
+from ncfix.compensate.budget import Closure
+from ncfix.compensate.excursion import arcs_within
 from ncfix.compensate.findings import Index, Mask
+from ncfix.compensate.intent import Intent
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.ragged import distinct
+from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import agree
 from ncfix.machine import Machine
 from ncfix.program.dialect import Dialect
@@ -36,6 +43,38 @@ class Others:
     rows: Index
     counts: Index
     pieces: Pieces
+
+
+def together(
+    intent: Intent, real: Segments, plain: Mask, dialect: Dialect, rounding: float
+) -> tuple[Segments, Others] | None:
+    """Motions as they are really done, with the circles of the arcs among them, and these arcs and dwells.
+
+    real      where they really start and end
+    plain     (n,) those that are straight; of the others a turn is as one of them
+    rounding  how far a point may move when it is rounded to the control's digits, mm
+
+    None if there are many arcs, or some that do not surely stay arcs within the travels.
+    """
+    moves, arc = intent.moves, intent.segments.arc
+    dwell, turn = moves.kind == Kind.DWELL, (moves.kind == Kind.FEED) & (moves.modal == 10)
+    arcs, dwells = np.flatnonzero(arc), np.flatnonzero(dwell)
+    if FEW * len(arcs) > len(plain) or not (plain | arc | dwell | turn).all():
+        return None
+    if (real.start[dwells] != real.end[dwells]).any() or full_circles(intent, arcs).any():
+        return None
+    if arcs.size:
+        fit = fitted(intent, real, arcs, Closure(dialect.closure_mm, dialect.closure_relative), rounding)
+        centre, sweep = real.centre.copy(), real.sweep.copy()
+        centre[arcs], sweep[arcs] = fit.centre, fit.sweep
+        real = replace(real, centre=centre, sweep=sweep)
+        within = (arcs_within(intent.machine, each.rows(arcs)).all() for each in (intent.segments, real))
+        if not (fit.sound.all() and all(within)):
+            return None
+    rows = np.flatnonzero(arc | dwell)
+    ones = np.ones(len(rows), dtype=np.intp)
+    centre = np.where(arc[rows, None], real.centre[rows], np.nan)
+    return real, Others(rows, ones, Pieces(rows, ones.astype(float), real.end[rows], arc[rows], centre, ~arc[rows]))
 
 
 def planned(machine: Machine, dialect: Dialect, options: FixOptions, moves: Moves, plain: Mask) -> Others | None:

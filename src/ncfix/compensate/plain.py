@@ -2,7 +2,7 @@
 
 The same plan that `path` and `settle` make, with all left out that such a part cannot need: there are no cycles in it,
 no axes without words, nothing that is refused, tool-centre-point control (TCP) is on in all of it or nowhere, and every
-motion begins where the one before ended. The few arcs and dwells in it are planned as the long way does (see `others`).
+motion begins where the one before ended. For the few arcs, dwells and turns in it see `others`.
 Whatever turns out to need more than that, or comes near to a limit, is for the long way. Both ways write the same
 bytes; a test holds them together.
 """
@@ -24,7 +24,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import CORNER, SURE, led_bounds, looked_at, straight_bounds
 from ncfix.compensate.limits import FUZZ, JUMP
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.others import Others, planned
+from ncfix.compensate.others import Others, planned, together
 from ncfix.compensate.partition import Part
 from ncfix.compensate.path import Demands, in_pieces, not_split
 from ncfix.compensate.plain_poses import Poses
@@ -42,6 +42,8 @@ from ncfix.program.emit import Emission
 from ncfix.program.moves import FeedMode, Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 
+Looked = tuple[Index, Split | None, tuple[Finding, ...]]
+"""Motions that must be split, their pieces, and what there is to say; see `Planner._split`."""
 NEARLY = 1 - 1e-6
 """Of a limit; what comes so close to one is for the long way to judge."""
 
@@ -130,19 +132,20 @@ class Planner:
         found = self.strategy.solve(self.machine, poses.meant, State(poses.tool_length))
         if found.before is None or not found.converged.all() or not self._within_limits(poses.meant, found.q):
             return None
-        intent, others, alone = Intent(self.machine, moves, State()), None, plain
-        if not plain.all():
-            others = planned(self.machine, part.program.dialect, self.options, moves, plain)
-            if others is None:
-                return None
-            alone = plain.copy()
-            alone[others.rows] = False
-        done = poses.corrected(found.q)
+        intent, done = Intent(self.machine, moves, State()), poses.corrected(found.q)
         real = replace(intent.segments, start=done[:-1], end=done[1:])
         bound = self._bounds_of(poses, intent, real, found.q)
         if bound is None:
             return None
-        over, parts, findings = self._split(intent, real, bound, alone)
+        others, alone, looked = None, plain, None
+        if not plain.all():
+            others, looked = self._in_one_look(unit, intent, real, bound, plain)
+            others = others or planned(self.machine, part.program.dialect, self.options, moves, plain)
+            if others is None:
+                return None
+            alone = np.ones_like(plain)
+            alone[others.rows] = False
+        over, parts, findings = looked or self._split(intent, real, bound, alone)
         if over.size and parts is None:
             return None
         pieces, first = pieces_of(real, over, parts, others)
@@ -173,22 +176,41 @@ class Planner:
             return None
         return led_bounds(intent, self.machine.bow, begin, end, acceleration, poses.tool_length)
 
-    def _split(
-        self, intent: Intent, real: Segments, bound: Array, among: Mask
-    ) -> tuple[Index, Split | None, tuple[Finding, ...]]:
+    def _in_one_look(
+        self, unit: Unit, intent: Intent, real: Segments, bound: Array, plain: Mask
+    ) -> tuple[Others, Looked] | tuple[None, None]:
+        """The arcs and dwells among `plain` motions (n,), and which motions must be split, all looked at together.
+
+        Nothing if these arcs need more than that; the others as `_split`.
+        """
+        moves = intent.moves
+        found = None
+        if not moves.tcp[0]:
+            found = together(intent, real, plain, unit.part.program.dialect, self.demands.budget.rounding)
+        if found is None or moves.kind[-1] == Kind.DWELL:
+            return None, None
+        turned, others = found
+        uneasy = np.append(False, moves.kind[:-1] == Kind.DWELL)
+        unknown = np.where(uneasy | turned.arc, np.inf, bound)
+        looked = self._split(intent, turned, unknown, moves.kind != Kind.DWELL, uneasy)
+        over, parts, _ = looked
+        return (None, None) if over.size and parts is None else (others, looked)
+
+    def _split(self, intent: Intent, real: Segments, bound: Array, among: Mask, uneasy: Mask | None = None) -> Looked:
         """The motions `among` (n,) that must be split, and their pieces; None of them where some need the long way.
 
-        bound  (n,) mm: what their deviation does not exceed
+        bound   (n,) mm: what their deviation does not exceed
+        uneasy  (n,) those that are looked at where they begin, too
 
-        Also what there is to say of those that must not be split.
+        Also what there is to say of those that must not be split. An arc that would have to be needs the long way.
         """
         moves, limit = intent.moves, self.demands.budget.path
         rows = np.flatnonzero(~(bound <= SURE * limit) & among)
         rows = rows[self._followed(moves, rows)]
         if not rows.size:
             return rows, None, ()
-        worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool), limit)
-        if np.isinf(worst).any():
+        worst = looked_at(intent, real, rows, np.zeros(len(moves), dtype=bool) if uneasy is None else uneasy, limit)
+        if np.isinf(worst).any() or (real.arc[rows] & (worst > limit)).any():
             return rows, None, ()
         whole = (worst > limit) & moves.compensated[rows]
         findings = (not_split(rows[whole], worst[whole]),) if whole.any() else ()
@@ -202,7 +224,7 @@ class Planner:
     def _followed(self, moves: Moves, rows: Index) -> Mask:
         """Which of motions `rows` (k,) are looked at along their way."""
         moving = some(np.abs(picked(moves.end, rows) - picked(moves.start, rows)) >= REST)
-        return moving if self.demands.split_rapids else moving & (moves.kind[rows] == Kind.FEED)
+        return moving if self.demands.split_rapids else moving & (moves.kind[rows] != Kind.RAPID)
 
     def _bounds(self, meant: Array, done: Array, tool_length: Array) -> Array:
         """What the deviation of the tip does not exceed along motions from pose to pose, (n,) mm.
@@ -295,7 +317,7 @@ def _may_be_planned(moves: Moves) -> bool:
     """Whether motions are to be corrected, in the axes that they name, from where they begin to where they say."""
     rule = (moves.rule != Rule.CORRECT) & (moves.kind != Kind.DWELL)
     special = moves.incremental | rule | (moves.kind == Kind.CYCLE)
-    columns = moves.approach, moves.counted
+    columns = moves.approach, moves.counted, moves.resting
     if special.any() or not all(each is None or not np.any(each) for each in columns):
         return False
     timed = (moves.feed_mode == FeedMode.INVERSE_TIME).any()

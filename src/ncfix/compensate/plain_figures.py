@@ -38,7 +38,7 @@ def figures(course: Course, text: Emission, rapids: bool) -> PathError:
         apart |= bool(course.intent.kinks)
     else:
         apart[passed(course.intent, written.start, written.end)[0]] = True
-    tally = FigureTally(len(moves))
+    tally = FigureTally()
     counts = (_compiled if fast.engaged() else _by_columns)(course, text, written, (shown, apart), tally)
     inside = np.flatnonzero(counts)
     for part in batches(counts[inside], BATCH):

@@ -44,7 +44,7 @@ class Track:
     dropped   parabolas before it
     complete  nothing comes behind it
     cut       the length of all that was cut, mm
-    flank     the same on the other side of the play, if there is any
+    flank     where the tip is besides, with the play of axes, if there is any
     """
 
     curve: Curve
@@ -145,7 +145,7 @@ class Match:
         else:
             gap = flank.taken(slice(start, stop)).there(search, samples, found)
         if other.flank is not None:
-            gap = other.flank.back(search.near, samples.points, found)
+            gap = other.flank.back(search, samples.points, found)
         self.along.add(part.rows[samples.piece], gap, samples.weight)
 
     @property

@@ -58,15 +58,12 @@ class PathError:
     """Before and after a correction.
 
     before, after             figures over all motions looked at
-    move_before, move_after   (n,) mm: largest error on each motion, 0 where not looked at
     samples                   how many places were looked at
     way                       mm that they stand for
     """
 
     before: Figures
     after: Figures
-    move_before: Array
-    move_after: Array
     samples: int
     way: float = 0.0
 
@@ -107,7 +104,7 @@ def path_error(
     """
     written = Written(Intent(machine, moves, state), pieces, moves.start if start is None else start)
     chosen = ~pieces.kept if rows is None else rows[pieces.move]
-    tally = FigureTally(len(moves))
+    tally = FigureTally()
     which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
     for part in samples(written, which, density, tilts, known):
         tally.add(part)
@@ -149,7 +146,9 @@ def _places(written: Written, which: Index, counts: Index, along: Mask, uneasy: 
     """Pieces and fractions of them to look at: evenly, at the end, at kinks, and at starts that may be off."""
     many = counts + 1
     fraction = (places(many) + 1) / np.repeat(many, many)
-    begun = np.flatnonzero(_begins_uneasily(written, which, uneasy) & along | _leaps(written, which))
+    begins = np.flatnonzero(written.opens[which])
+    looked_at = uneasy[written.pieces.move[which[begins]]] & along[begins]
+    begun = begins[looked_at | _leaps(written, which[begins])]
     extra = [(begun, np.full(len(begun), START))]
     if written.intent.kinks:
         extra.append(_passed(written, which, along))
@@ -170,17 +169,12 @@ def _uneasy(written: Written) -> Mask:
 
 
 def _leaps(written: Written, which: Index) -> Mask:
-    """Pieces with which motions begin that lead a cut to where it should begin, from where a motion has left axes."""
+    """Of pieces with which motions begin, those that lead a cut to where it should begin, from where axes were left."""
     moves, move = written.intent.moves, written.pieces.move[which]
-    behind = written.opens[which] & (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
+    behind = (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
     leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
     leaps: Mask = behind & leads & finite(picked(moves.start, move))
     return leaps
-
-
-def _begins_uneasily(written: Written, which: Index, uneasy: Mask) -> Mask:
-    begins: Mask = written.opens[which] & uneasy[written.pieces.move[which]]
-    return begins
 
 
 def _passed(written: Written, which: Index, along: Mask) -> tuple[Index, Array]:
@@ -260,8 +254,7 @@ def _kept_motions(written: Written) -> Mask:
 class FigureTally:
     """Figures gathered batch by batch."""
 
-    def __init__(self, n: int) -> None:
-        self.most = [np.zeros(n), np.zeros(n)]
+    def __init__(self) -> None:
         self.squares = [0.0, 0.0]
         self.tilts = [0.0, 0.0]
         self.at: list[tuple[float, int, float]] = [(0.0, -1, 0.0), (0.0, -1, 0.0)]
@@ -274,17 +267,13 @@ class FigureTally:
         self.samples += len(part.move)
         for side, error in enumerate((part.before, part.after)):
             known = np.nan_to_num(error)
-            np.maximum.at(self.most[side], part.move, known)
             self.squares[side] += float((part.weight * known**2).sum())
             self.tilts[side] = max(self.tilts[side], (part.tilt_before, part.tilt_after)[side])
             best = int(known.argmax())
             self.at[side] = max(self.at[side], (float(known[best]), int(part.move[best]), float(part.fraction[best])))
 
     def take(self, way: float, samples: int, squares: list[float], most: list[tuple[float, int, float]]) -> None:
-        """Take in what was added up elsewhere; of both sides squares times way, and the largest: mm, motion, fraction.
-
-        Not by motion: `move_before` and `move_after` do not know of it.
-        """
+        """Take in what was added up elsewhere; of both sides way times squares and the most: mm, motion, fraction."""
         self.way += way
         self.samples += samples
         self.squares = [own + more for own, more in zip(self.squares, squares, strict=True)]
@@ -296,4 +285,4 @@ class FigureTally:
             Figures(value, float(np.sqrt(squares / self.way)) if self.way else 0.0, move, fraction, tilt)
             for (value, move, fraction), squares, tilt in zip(self.at, self.squares, self.tilts, strict=True)
         )
-        return PathError(before, after, self.most[0], self.most[1], self.samples, self.way)
+        return PathError(before, after, self.samples, self.way)
