@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ncfix import fast
 from ncfix.diagnostics import SourceError
-from ncfix.program import bulk, bulk_arcs, number_text
+from ncfix.program import bulk, number_text
 from ncfix.program.bulk import Stretch
 from ncfix.program.bulk_arcs import CentreWords
 from ncfix.program.emit import Emission, emit
@@ -32,19 +32,22 @@ STEPS = np.array([1e-3, 1e-3, 1e-3, np.radians(1e-3), np.radians(1e-3)])
 EXAMPLES = settings(derandomize=True, deadline=None, max_examples=40)
 
 
-def followed(source: bytes) -> tuple[Program, Moves]:
+def followed(source: bytes, dialect: str = "linuxcnc") -> tuple[Program, Moves]:
     setup = Setup(assume_zero=True, initial=dict.fromkeys(AXES, 0.0))
-    program = read(source, "generated.nc", "linuxcnc")
+    program = read(source, "generated.nc", dialect)
     return program, trace(program, setup, AXES, ROTARY).moves
 
 
 def moved(moves: Moves, seed: int, size: float) -> Pieces:
-    """Corrections that wander along the path; some motions in two pieces, some left alone."""
+    """Corrections that wander along the path; some motions in two pieces, some left alone; dwells follow the axes."""
     rng = np.random.default_rng(seed)
     shift = size * np.cumsum(rng.normal(size=moves.end.shape), axis=0) / 10
     shift[:, moves.rotary] *= rng.integers(0, 2) / 100
     kept = (moves.rule != Rule.CORRECT) | (rng.random(len(moves)) < 0.01)
     shift[kept] = 0.0
+    dwells = np.flatnonzero(moves.kind[1:] == Kind.DWELL) + 1
+    for row in dwells.tolist():
+        shift[row] = shift[row - 1]
     counts = np.where((rng.random(len(moves)) < 0.02) & ~kept & (moves.kind != Kind.CYCLE), 2, 1)
     move = np.repeat(np.arange(len(moves)), counts)
     last = np.append(np.diff(move) != 0, True)
@@ -59,7 +62,7 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
     found = []
     for switch in (fast.disengage, fast.engage):
         switch()
-        with mock.patch.object(bulk, "SHORTEST", 1), mock.patch.object(bulk_arcs, "FEWEST", 1):
+        with mock.patch.object(bulk, "SHORTEST", 1):
             found.append(emit(program, moves, pieces, STEPS))
     fast.disengage()
     one_by_one = replace(language_of(program.dialect), bulk=None)
@@ -113,6 +116,8 @@ OTHERS = st.sampled_from(
         "G92 X1.",
         "#1=3",
         "G1 X[#1+2] F10.",
+        "G4 P1.5",
+        "/G4 P2",
     ]
 )
 
@@ -153,12 +158,25 @@ def test_long_stretches(modal: bool) -> None:
 @given(
     seed=st.integers(0, 10_000),
     size=st.sampled_from([0.0, 0.0003, 0.01, 0.7]),
-    frame=st.sampled_from(["", "G92 X1. Y-2.5", "G20", "G20 G92 X1. Z3."]),
+    start=st.sampled_from(
+        [
+            ("linuxcnc", "G21"),
+            ("linuxcnc", "G21; G92 X1. Y-2.5"),
+            ("linuxcnc", "G20"),
+            ("linuxcnc", "G20; G92 X1. Z3."),
+            ("fanuc", "G21"),
+            ("haas", "G20; G52 X1. Y-2.5"),
+            ("siemens", "G71"),
+            ("siemens", "G700; TRANS X1 Z-2.5"),
+        ]
+    ),
 )
-def test_arcs_many_at_a_time_as_one_by_one(seed: int, size: float, frame: str) -> None:
-    head = ["G0 G90 G21 G94 X0 Y0 Z0 B0 C0 F1000", frame, "X0 Y0 Z0"]
+def test_arcs_many_at_a_time_as_one_by_one(seed: int, size: float, start: tuple[str, str]) -> None:
+    dialect, frame = start
+    head = ["G90 G94 F1000", "G0 X0. Y0. Z0. B0. C0.", *frame.split("; "), "X0. Y0. Z0."]
     try:
-        program, moves = followed("\n".join([*head, *full_of_arcs(seed, 50), "M2\n"]).encode())
+        body = full_of_arcs(seed, 50, sinumerik=dialect == "siemens")
+        program, moves = followed("\n".join([*head, *body, "M2\n"]).encode(), dialect)
     except SourceError:  # half a turn by R that does not reach its end: digits say less in inch
         return
     pieces = moved(moves, seed, size)
@@ -166,8 +184,33 @@ def test_arcs_many_at_a_time_as_one_by_one(seed: int, size: float, frame: str) -
     assert_same(program, moves, replace(pieces, centre=pieces.centre + shift))
 
 
-def test_long_stretches_of_arcs() -> None:
-    program, moves = followed("\n".join(["G90 G21 G94 F1000", *full_of_arcs(4, 2000), "M2\n"]).encode())
+@pytest.mark.parametrize("size", [0.0003, 0.01])
+def test_arcs_whose_centres_count_from_the_origin(size: float) -> None:
+    turns = np.linspace(0.5, 60, 120)
+    body = [f"G3 X{9 * np.cos(turn):.4f} Y{9 * np.sin(turn):.4f} I0. J0.0" for turn in turns]
+    program, moves = followed("\n".join(["G21 G94 F900 G90.1", "G0 X9 Y0 Z0 B0 C0", *body, "M2\n"]).encode())
+    pieces = moved(moves, 7, size)
+    assert_same(program, moves, replace(pieces, centre=pieces.centre + size))
+
+
+def test_straight_motions_with_a_direction_of_the_tool_go_one_by_one() -> None:
+    """Fanuc: the I J K that an arc has where its centre is are a direction in straight motions (G43.5)."""
+    body = ["G2 X1. Y1. I1. J0.", "G1 X2. Y0.", "G2 X3. Y1. I1. J0."]
+    program, moves = followed(
+        "\n".join(["G21 G90 G94 F900", "G0 X0. Y0. Z0. B0. C0.", *body, "M2\n"]).encode(), "fanuc"
+    )
+    pieces, first, rule = moved(moves, 1, 0.01), np.arange(len(moves) + 1), language_of(program.dialect).one_by_one
+    assert rule is not None
+    assert not rule(program, moves, pieces, first).any()
+    straight = replace(moves, kind=np.full_like(moves.kind, Kind.FEED))
+    assert rule(program, straight, pieces, first).tolist() == [False, True, False, True]
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc", "siemens"])
+def test_long_stretches_of_arcs(dialect: str) -> None:
+    body = full_of_arcs(4, 2000, sinumerik=dialect == "siemens")
+    head = ["G90 G94 F1000", "G71" if dialect == "siemens" else "G21", "G0 X0. Y0. Z0. B0. C0."]
+    program, moves = followed("\n".join([*head, *body, "M2\n"]).encode(), dialect)
     pieces = moved(moves, 3, 0.01)
     with mock.patch.object(CentreWords, "splices", autospec=True, side_effect=CentreWords.splices) as written:
         emit(program, moves, pieces, STEPS)
@@ -175,6 +218,43 @@ def test_long_stretches_of_arcs() -> None:
     assert arcs > 1000
     assert sum(len(call.args[0].block) for call in written.call_args_list) > 0.4 * arcs
     assert_same(program, moves, pieces)
+
+
+def test_arcs_and_dwells_do_not_part_a_stretch() -> None:
+    line = [f"X{n / 7:.3f} Z{n / 9:.3f} B{n / 5:.3f}" for n in range(1, 41)]
+    lines = [*line, "G4 P1.", "X9. Y1. Z4.", "G2 X11. Y3. I2. J0.", "G3 X9. Y1. Z3. I-2. J0.", "G1 X9. Z4.", *line]
+    program, moves = followed("\n".join(["G90 G21 G94 G17", "G0 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
+    rows, kept = np.arange(len(moves)), moves.kind == Kind.DWELL
+    shifted = moves.end + 0.0123, moves.kind == Kind.ARC, moves.centre + 0.0123
+    pieces = Pieces(rows, np.ones(len(rows)), *shifted, kept)
+    with mock.patch.object(bulk.Bulk, "take", autospec=True, side_effect=bulk.Bulk.take) as taken:
+        emit(program, moves, pieces, STEPS)
+    assert taken.call_count == 1
+    assert_same(program, moves, pieces)
+
+
+@EXAMPLES
+@given(
+    centre=st.sampled_from(["I2.0000000001 J0", "I2.00000000000000000 J0.", "R2.8284"]),
+    off=st.sampled_from([0.0123, 0.0125]),
+    seed=st.integers(0, 100),
+)
+def test_an_arc_whose_centre_is_not_clear_is_written_by_itself(centre: str, off: float, seed: int) -> None:
+    lines = [f"X{n / 8:.3f} Z{n / 8:.3f}\nG1 X9. Y1. Z4.\nG2 X11. Y3. {centre}\nG1 X9. Y1. Z{n / 5}" for n in range(9)]
+    program, moves = followed("\n".join(["G90 G21 G94 G17", "G1 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
+    pieces = moved(moves, seed, 0.01)
+    assert_same(program, moves, replace(pieces, centre=pieces.centre + off * ~pieces.kept[:, None]))
+
+
+def test_arcs_written_by_themselves_in_another_order_than_they_stand_in() -> None:
+    """Half circles by R, whose centres are not clear, in a subprogram that stands before the lines that call it."""
+    arcs = [f"G1 X{n}. Y0.\nG2 X{n}. Y4. R2." for n in range(1, 4)]
+    lines = ["o1 sub", *arcs, "o1 endsub", "G90 G21 G94 G17", "G1 X0 Y0 Z0 B0 C0 F1000", *arcs, "o1 call", "M2\n"]
+    program, moves = followed("\n".join(lines).encode())
+    assert (np.diff(moves.block) < 0).any()
+    rows, arc = np.arange(len(moves)), moves.kind == Kind.ARC
+    shifted = moves.end + 0.0123, arc, moves.centre + 0.0123
+    assert_same(program, moves, Pieces(rows, np.ones(len(rows)), *shifted, np.zeros_like(arc)))
 
 
 @EXAMPLES

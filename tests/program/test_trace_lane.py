@@ -21,7 +21,7 @@ from ncfix.program.moves import Kind, Moves
 from ncfix.program.rs274 import arc_motion
 from ncfix.program.setup import Setup
 from program.arcs import full_of_arcs
-from program.tracing import KNOWN, follow
+from program.tracing import KNOWN, ZERO, follow
 
 ALWAYS, NEVER = 1, 10**9
 
@@ -126,8 +126,8 @@ def without_a_word(random: Random, block: str) -> str:
     return " ".join(words)
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso"]))
+@settings(max_examples=200, deadline=None)
+@given(st.integers(0, 2**32), st.sampled_from(["linuxcnc", "iso", "fanuc", "haas", "mitsubishi"]))
 def test_both_lanes_make_the_same_arcs(seed: int, dialect: str) -> None:
     random = Random(seed)
     body = full_of_arcs(seed, 60)
@@ -136,6 +136,22 @@ def test_both_lanes_make_the_same_arcs(seed: int, dialect: str) -> None:
     if random.random() < 0.5:
         body[-5] = without_a_word(random, body[-5])
     assert_same("\n".join(["G0 F100 X0 Y0 Z0 B0 C0" if random.random() < 0.9 else "X0 Y0", *body]), dialect)
+
+
+SIEMENS = ["G91", "G90", "G70", "G71", "G55", "G94 F50", "G41 D1", "G40", "M5", "X1 Y1 Z1", "G2 I1 CR=2", "TRANS X3"]
+TANGENT = ["CT X9.5 Y3.25 Z1", "MIRROR Y0", "DIAMON", "DIAMOF", "G3 X1 Y9 CR=-30", "G2 X1 Y1 AR=90", "TRAORI", "R1=2"]
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.integers(0, 2**32))
+def test_both_lanes_make_the_same_arcs_of_sinumerik(seed: int) -> None:
+    random = Random(seed)
+    body = full_of_arcs(seed, 60, sinumerik=True)
+    for place in random.sample(range(60), random.randint(0, 5)):
+        body.insert(place, random.choice([*SIEMENS, *TANGENT]))
+    setup = Setup(work_offsets={"G54": ZERO, "G55": dict.fromkeys("XYZABC", 1.5)}, assume_zero=True, initial=ZERO)
+    head = "G0 X0 Y0 Z0 B0 C0" if random.random() < 0.9 else "X0 Y0"
+    assert_same("\n".join([head, "F100", *body]), "siemens", setup)
 
 
 def test_arcs_with_centres_that_count_from_zero() -> None:
@@ -215,9 +231,10 @@ def test_the_lane_takes_what_it_should() -> None:
     assert np.array_equal(moves.start[1:], moves.end[:-1])
 
 
-def test_the_lane_takes_arcs() -> None:
-    body = [f"G{2 + i % 2} X{i} I.25\nX{i + 0.5} R.25" for i in range(1, 100)]
+@pytest.mark.parametrize("dialect", ["linuxcnc", "fanuc"])
+def test_the_lane_takes_arcs(dialect: str) -> None:
+    body = [f"G{2 + i % 2} X{i}. I.25\nX{i + 0.5} R.25" for i in range(1, 100)]
     with mock.patch.object(arc_motion, "circle", side_effect=arc_motion.circle) as one_by_one:
-        moves = follow("\n".join(["G0 X0 Y0 Z0 B0 C0 F100\nG3 X.5 R.25", *body]), "XYZBC").moves
+        moves = follow("\n".join(["G0 X0. Y0. Z0. B0. C0. F100\nG3 X.5 R.25", *body]), "XYZBC", dialect=dialect).moves
     assert np.count_nonzero(moves.kind == Kind.ARC) == 199
     assert not one_by_one.called

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.bulk_arcs import CentreWords, Manner, whole_arcs, without_lone_ones
-from ncfix.program.bulk_fit import qualified, sound
+from ncfix.program.bulk_arcs import CentreWords, Manner, whole_arcs
+from ncfix.program.bulk_fit import qualified, sound, with_dwells
 from ncfix.program.bulk_layouts import CLOSING, NONE, OPENING, Layouts
 from ncfix.program.bulk_lines import lines_of, with_lines
 from ncfix.program.bulk_missing import last_told, missing, with_those_before
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import Language
-from ncfix.program.moves import Frame, Moves
+from ncfix.program.moves import Frame, Kind, Moves
 from ncfix.program.number_text import Spelling, Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
@@ -38,27 +38,12 @@ LONGEST = 1 << 14
 """Motions that are taken at once; where one is not clear, those behind it were taken in vain."""
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """Motions that have been written.
-
-    ends    (k, n_axes) the commands at the ends of their pieces
-    arcs    (a,) which of these are arcs
-    centre  (a, 3) their centres, command coordinates, mm
-    """
-
-    ends: FloatArray
-    arcs: IntArray
-    centre: FloatArray
-
-
 @dataclass(slots=True)
 class Bulk:
     """The stretches of one emission.
 
     stop     (n + 1,) for each motion, the first one from there on that does not qualify
     layouts  the layout of each shape that qualifies
-    turning  there are arcs
     added    lines that were put in
     """
 
@@ -68,7 +53,6 @@ class Bulk:
     first_piece: IntArray
     layouts: Layouts
     stop: IntArray
-    turning: bool
     parts: list[Splices] = field(default_factory=list)
     added: int = 0
 
@@ -87,15 +71,14 @@ class Bulk:
         first_piece = np.append(np.flatnonzero(np.diff(pieces.move, prepend=-1)), len(pieces))
         layouts = Layouts.of(language, program, moves)
         fit = qualified(program, moves, pieces, first_piece, layouts)
-        if jumps.any():
-            fit &= ~jumps.any(axis=1)
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         if language.one_by_one is not None and fit.any():
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        stop = _stops(without_lone_ones(fit, moves))
+        fit = with_dwells(fit, moves, pieces, first_piece)
+        stop = _stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
-        return cls(program, moves, pieces, first_piece, layouts, stop, bool(pieces.arc.any()))
+        return cls(program, moves, pieces, first_piece, layouts, stop)
 
     @property
     def text(self) -> NDArray[np.uint8]:
@@ -129,32 +112,52 @@ class Bulk:
         fit = plain & layouts.known[shapes]
         several = np.flatnonzero(np.diff(first_piece) > 1)
         fit[several] &= layouts.further[shapes[several]]
-        turning = bool(pieces.arc.any())
-        if turning:
+        if pieces.arc.any():
             fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        return cls(program, moves, pieces, first_piece, layouts, _stops(without_lone_ones(fit, moves)), turning)
+        return cls(program, moves, pieces, first_piece, layouts, _stops(with_dwells(fit, moves, pieces, first_piece)))
 
-    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> Taken | None:
-        """Write the stretch that begins with motion `row`, as far as it is clear; None if there is none.
+    def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
+        """Write the stretch that begins with motion `row`, as far as it is clear, but for centres of arcs.
 
         position  (n_axes,) the command at which the control stands
         decimals  (n_axes,) digits that the least increment needs
+
+        Returns the commands at the ends of the pieces written, (k, n_axes); None if there are none.
         """
         if self.stop[row] == row:
             return None
-        manner = Manner(self.text, decimals, _halves(decimals), self.layouts.manner.signed)
-        found = (self._compiled if fast.engaged() else self._in_columns)(row, position, frame, manner)
+        write = self._compiled if fast.engaged() else self._in_columns
+        found = write(row, position, frame, self._manner(decimals))
         if found is None:
             return None
-        taken, splices = self._with_centres(row, position, frame, manner, *found)
-        if not len(taken.ends):
-            return None
+        ends, splices = found
         self.put(splices)
-        pieces = len(taken.ends)
-        self.added += pieces - int(np.searchsorted(self.first_piece, self.first_piece[row] + pieces)) + row
-        return taken
+        self.added += len(ends) - int(np.searchsorted(self.first_piece, self.first_piece[row] + len(ends))) + row
+        return ends
+
+    def turn(
+        self, rows: IntArray, ends: tuple[FloatArray, FloatArray], frame: FrameMap, decimals: IntArray
+    ) -> tuple[Mask, FloatArray]:
+        """Write the centre words of arcs `rows` (k,) that were taken; of one that is not clear nothing stays written.
+
+        ends  (k, n_axes) the commands at their starts and ends, as they were written
+
+        Returns which are clear, (k,), and the centres of these, (c, 3), command coordinates, mm.
+        """
+        manner, centre = self._manner(decimals), self.pieces.centre[self.first_piece[rows]]
+        words = CentreWords.of(self.program, self.layouts, self.moves, rows, ends, centre, frame, manner)
+        clear = words.clear
+        if not clear.all():
+            spans = self.program.blocks[words.block[~clear]]
+            self.parts[:] = [part.outside(spans) for part in self.parts]
+            words = words.rows(clear)
+        self.put(words.splices(self.program, self.layouts, manner))
+        return clear, words.centre
+
+    def _manner(self, decimals: IntArray) -> Manner:
+        return Manner(self.text, decimals, _halves(decimals), self.layouts.manner.signed)
 
     def _in_columns(
         self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
@@ -166,25 +169,6 @@ class Bulk:
         stretch = Stretch.of(self, row, stop, position, frame, manner).clear_head()
         return (stretch.commands(), stretch.splices()) if len(stretch.block) else None
 
-    def _with_centres(
-        self, row: int, position: FloatArray, frame: FrameMap, manner: Manner, ends: FloatArray, splices: Splices
-    ) -> tuple[Taken, Splices]:
-        """A stretch with the centres of its arcs, up to the first one that is not clear."""
-        first = self.first_piece[row]
-        arcs = np.flatnonzero(self.pieces.arc[first : first + len(ends)])
-        if not arcs.size:
-            return Taken(ends, arcs, self.pieces.centre[:0]), splices
-        starts = np.concatenate((position[None], ends)).take(arcs, axis=0)
-        rows, centre = self.pieces.move[first + arcs], self.pieces.centre[first + arcs]
-        about = self.program, self.layouts, self.moves
-        words = CentreWords.of(*about, rows, (starts, ends.take(arcs, axis=0)), centre, frame, manner)
-        if not words.clear.all():
-            count = int(np.argmin(words.clear))
-            ends, splices = ends[: arcs[count]], splices.before(int(self.program.blocks[words.block[count], 0]))
-            arcs, words = arcs[:count], words.head(count)
-        both = Splices.joined([splices, words.splices(self.program, self.layouts, manner)])
-        return Taken(ends, arcs, words.centre), both
-
     def _compiled(
         self, row: int, position: FloatArray, frame: FrameMap, manner: Manner
     ) -> tuple[FloatArray, Splices] | None:
@@ -192,8 +176,8 @@ class Bulk:
         from ncfix.program import writing_kernels
         from ncfix.program.number_kernels import ROOM
 
-        stop = min(int(self.stop[row]), row + LONGEST) if self.turning else int(self.stop[row])
-        program, layouts, pieces = self.program, self.layouts, self.first_piece[row : stop + 1]
+        stop, program, layouts = int(self.stop[row]), self.program, self.layouts
+        pieces = self.first_piece[row : stop + 1]
         ends, here, end_of_line = self.pieces.end[pieces[0] : pieces[-1]], position.copy(), program.line_end
         axes, edits = len(here), (stop - row) * (len(here) + 1)
         blocks = self.moves.block[row:stop]
@@ -311,6 +295,8 @@ class Stretch:
                 )
             alone = np.flatnonzero(further)
             clear[alone[~add[alone].any(axis=1)]] = False
+            still = np.flatnonzero(bulk.moves.kind[move] == Kind.DWELL)
+            add[still], clear[still] = False, True
         return cls(bulk, block, further, position, frame, decimals, words, wanted, values, rewrite, add, styles, clear)
 
     def clear_head(self) -> Stretch:

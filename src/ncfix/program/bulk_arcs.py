@@ -1,8 +1,7 @@
 """Arcs among motions written all at once: their centre words, as soon as those of their axes are known.
 
 What the renderer does arc by arc (`render.BlockRenderer._kept_arc`), done as columns, byte for byte; a test holds the
-two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R, or I J K that count from its start; a
-full circle does not.
+two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R or plain I J K; a full circle does not.
 """
 
 from __future__ import annotations
@@ -30,8 +29,6 @@ CIRCLE_MM = 1e-3
 """Ends that are nearer to each other may be those of a full circle: that is for the renderer to say."""
 SEMICIRCLE = 1e-6
 """Program units: a radius that is so near to half the chord says too little of where the centre is."""
-FEWEST = 4
-"""Arcs of a stretch: of fewer, each is written by itself, which takes a third of a millisecond, as two of these do."""
 TIE = 1e-4
 """Half output steps: so near to what is allowed between two centres, which side it is on is for the renderer to say."""
 
@@ -44,7 +41,7 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, 
     fit: Mask = (moves.kind == Kind.ARC) & pieces.arc[first]
     if not fit.any() or not {"X", "Y", "Z"} <= set(moves.axes):
         return np.zeros(len(moves), dtype=np.bool_)
-    fit &= (pieces.fraction[first] == 1) & ((moves.modal == 20) | (moves.modal == 30)) & ~moves.about_fixed_point
+    fit &= (pieces.fraction[first] == 1) & ((moves.modal == 20) | (moves.modal == 30))
     fit &= layouts.round[program.template[moves.block]]
     rows = np.flatnonzero(fit)
     plane = _spatial(moves)[_planes(moves, rows)]
@@ -52,16 +49,6 @@ def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, 
     known = np.isfinite(pieces.centre[first[rows]]).all(axis=1)
     fit[rows] = known & (np.abs(chord) >= CIRCLE_MM).any(axis=1)
     return fit
-
-
-def without_lone_ones(fit: Mask, moves: Moves) -> Mask:
-    """Motions `fit` (n,) for stretches without the arcs that would be among few others in theirs."""
-    arcs, stretch = fit & (moves.kind == Kind.ARC), np.cumsum(~fit)
-    if not arcs.any():
-        return fit
-    many: Mask = np.bincount(stretch[arcs], minlength=int(stretch[-1]) + 1) >= FEWEST
-    kept: Mask = fit & (many[stretch] | ~arcs)
-    return kept
 
 
 def _planes(moves: Moves, rows: IntArray) -> IntArray:
@@ -144,7 +131,9 @@ class CentreWords:
         by_radius = np.where(radius >= 0, np.abs(program.numbers.take(first[:, 0] + radius, mode="clip")), np.nan)
         meant, off = _nearest_centre(by_radius, start, end, point[each, plane])
         says = off <= 2 * half[:, 0]
-        wanted = point[each, plane] - start
+        fixed = layouts.fixed[shape[:, None], plane] | moves.arc_absolute[rows, None]
+        base = np.where(fixed, 0.0, start)
+        wanted = point[each, plane] - base
         original = np.where(words >= 0, program.numbers.take(words, mode="clip"), 0.0)
         changes = (np.abs(wanted - original) >= half) & ~says[:, None]
         rewrite, digits = changes & (words >= 0), decimals.copy()
@@ -154,9 +143,7 @@ class CentreWords:
         digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
         clear = is_plain(wanted, digits) | ~changes
         clear.ravel()[anew] &= styles.clear
-        point[each, plane] = np.where(
-            says[:, None], meant, start + np.where(changes, rounded(wanted, digits), original)
-        )
+        point[each, plane] = np.where(says[:, None], meant, base + np.where(changes, rounded(wanted, digits), original))
         sure = ~(np.abs(by_radius - np.hypot(*(end - start).T) / 2) < SEMICIRCLE)
         sure &= ~(np.abs(off - 2 * half[:, 0]) < TIE * half[:, 0])
         return cls(
@@ -173,10 +160,10 @@ class CentreWords:
             sure & clear.all(axis=1),
         )
 
-    def head(self, count: int) -> CentreWords:
-        """The first so many arcs."""
-        styles = self.styles.rows(np.arange(np.count_nonzero(self.rewrite[:count])))
-        columns = {each.name: getattr(self, each.name)[:count] for each in fields(self) if each.name != "styles"}
+    def rows(self, chosen: Mask) -> CentreWords:
+        """Some of the arcs."""
+        styles = self.styles.rows(np.flatnonzero(chosen[np.flatnonzero(self.rewrite) // 2]))
+        columns = {each.name: getattr(self, each.name)[chosen] for each in fields(self) if each.name != "styles"}
         return CentreWords(styles=styles, **columns)
 
     def splices(self, program: Program, layouts: Layouts, manner: Manner) -> Splices:

@@ -40,6 +40,19 @@ def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     return fit
 
 
+def with_dwells(fit: Mask, moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
+    """Motions `fit` (n,), and dwells just behind them at which the axes shall stand where these leave them.
+
+    Nothing is written of such a dwell.
+    """
+    rows = np.flatnonzero(moves.kind[1:] == Kind.DWELL) + 1
+    at = first_piece[rows]
+    rows = rows[fit[rows - 1] & pieces.kept[at] & (pieces.end[at] == pieces.end[at - 1]).all(axis=1)]
+    found = fit.copy()
+    found[rows] = True
+    return found
+
+
 def _undisplaced(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     """(n,) motions in which axes that must get no word stand where the program believes them to be."""
     wordless = moves.wordless

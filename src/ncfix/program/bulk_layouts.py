@@ -61,6 +61,7 @@ class Layouts:
     closings   (s, k) what stands on them behind these
     round      (s,) arcs of the shape may be written in bulk, too, as long as they stay one arc
     centre     (s, 3) which of the block's numbers is I, J and K, or `NONE`
+    fixed      (s, 3) which of these count from the origin
     centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
     radius     (s,) which of them is R, or `NONE`
     taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
@@ -79,6 +80,7 @@ class Layouts:
     closings: NDArray[np.uint8]
     round: NDArray[np.bool_]
     centre: IntArray
+    fixed: NDArray[np.bool_]
     centre_heads: NDArray[np.uint8]
     radius: IntArray
     taken: IntArray
@@ -102,6 +104,7 @@ class Layouts:
             np.zeros((n, CLOSING), np.uint8),
             np.zeros(n, np.bool_),
             np.full((n, 3), NONE),
+            np.zeros((n, 3), np.bool_),
             np.zeros((n, 3, 2), np.uint8),
             np.full(n, NONE),
             np.zeros((n, 2, 2), np.int64),
@@ -140,6 +143,7 @@ class Layouts:
         """Fill in what the row of a shape says about arcs."""
         self.round[shape] = True
         self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
+        self.fixed[shape] = [letter in arc.fixed for letter in CENTRE_LETTERS]
         letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]
         self.centre_heads[shape] = [(ord(layout.blank or "\0"), ord(letter)) for letter in letters]
         if arc.radius is not None:

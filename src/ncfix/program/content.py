@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 
 from ncfix.diagnostics import Place, SourceError
-from ncfix.program.dialect import Dialect
+from ncfix.program.dialect import HINTS, Dialect
 
 UTF8_MARK = b"\xef\xbb\xbf"
 UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+ANOTHER = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
 
 PROBE_BYTES = 1 << 16
 """How much of a text is looked at to find out what it is."""
@@ -24,8 +26,8 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     for family, pattern in dialect.foreign:
         if found := re.search(pattern, source[:PROBE_BYTES]):
             text = f"this is {family}, not {dialect.title}"
-            hint = "--dialect NAME, if it is for another control than the machine's; `ncfix dialects` lists them"
-            raise SourceError.of("NCF103", text, place_of(source, found.start(), path, "utf-8"), hint)
+            place = place_of(source, found.start(found.re.groups and 1), path, "utf-8")
+            raise SourceError.of("NCF103", text, place, HINTS.get(family, ANOTHER))
 
 
 def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:

@@ -103,7 +103,7 @@ class Texts:
 
 
 def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
-    """Which values can be written in bulk with so many decimals: not too large, and clearly nearer to one output."""
+    """Which of values (n,) can be written in bulk with `decimals` (n,): not too large, clearly nearer to one output."""
     with np.errstate(invalid="ignore"):
         steps = np.abs(values) * POWERS.take(decimals)
         off = np.abs(steps - np.floor(steps) - 0.5)
@@ -112,7 +112,7 @@ def is_plain(values: FloatArray, decimals: IntArray) -> Mask:
 
 
 def rounded(values: FloatArray, decimals: IntArray | int) -> FloatArray:
-    """What a reader makes of values written with so many decimals (for those that are `is_plain`)."""
+    """What a reader makes of values (n,) written with so many decimals (for those that are `is_plain`)."""
     scale = POWERS.take(decimals)
     result: FloatArray = np.rint(values * scale) / scale + 0.0
     return result

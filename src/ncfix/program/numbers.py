@@ -154,15 +154,56 @@ def digits_of(
     text: NDArray[np.uint8], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
 ) -> Digits:
     """What stands in runs of digits and points; of long ones in their last sixteen bytes. See `Digits.of`."""
-    lengths = stops - starts
+    return digits_in(in_lanes(text), starts, stops, valued=valued)
+
+
+def in_lanes(text: NDArray[np.uint8]) -> NDArray[np.uint64]:
+    """A text, sixteen zero bytes before it and some behind it, as numbers of eight bytes each."""
     padded = np.zeros((len(text) // EIGHT + 4) * EIGHT, dtype=np.uint8)
     padded[2 * EIGHT : 2 * EIGHT + len(text)] = text
-    lanes = padded.view("<u8")
+    return padded.view("<u8")
+
+
+def digits_in(
+    lanes: NDArray[np.uint64], starts: NDArray[np.int64], stops: NDArray[np.int64], *, valued: bool = True
+) -> Digits:
+    """As `digits_of`, in a text that is `in_lanes`."""
+    lengths = stops - starts
     found = Digits.of(eight_at(lanes, stops + EIGHT), lengths, valued)
     long = np.flatnonzero(lengths > EIGHT)
     if len(long):
         found.put_before(long, Digits.of(eight_at(lanes, stops[long]), lengths[long] - EIGHT, valued))
     return found
+
+
+def values_of_one_tail(
+    lanes: NDArray[np.uint64], starts: NDArray[np.int64], stops: NDArray[np.int64], tail: int
+) -> NDArray[np.float64] | None:
+    """The values of runs of up to eight characters, all with a point `tail` characters before their end (0: none).
+
+    None if any is not so, or has no digit.
+    """
+    lengths = stops - starts
+    if int(lengths.max()) > EIGHT or tail > EIGHT or (tail == 1 and int(lengths.min()) == 1):
+        return None
+    words, own = eight_at(lanes, stops + EIGHT), OWN.take(lengths)
+    words &= own
+    own ^= words
+    own &= POINTS_ONLY
+    point = 1 << 8 * (EIGHT - tail)
+    if (own != np.uint64(POINTS_BIT * point if tail else 0)).any():
+        return None
+    if tail:
+        before = words & np.uint64((point - 1) & int(FOURS))
+        before <<= np.uint64(8)
+        words &= np.uint64(-(point << 8) & int(FOURS))
+        words |= before
+    else:
+        words &= FOURS
+    values = summed(words).view(np.int64).astype(np.float64)
+    if tail > 1:
+        values /= POWERS[tail - 1]
+    return values
 
 
 def eight_at(lanes: NDArray[np.uint64], places: NDArray[np.int64]) -> NDArray[np.uint64]:
@@ -184,6 +225,9 @@ def repeated(byte: int) -> np.uint64:
 
 
 ONES, TOPS, FOURS, POINTS, ZEROS, ABOVE = (repeated(byte) for byte in (0x01, 0x80, 0x0F, POINT, ord("0"), 0x76))
+POINTS_BIT = 0x10
+"""The bit that digits have and a point has not."""
+POINTS_ONLY = repeated(POINTS_BIT)
 OWN = np.array([0, *((1 << 64) - (1 << 64 - 8 * count) for count in range(1, EIGHT + 1))], dtype=np.uint64)
 """The highest so many bytes of eight."""
 MASKS = {8: 0x00FF00FF00FF00FF, 16: 0x0000FFFF0000FFFF, 32: 0x00000000FFFFFFFF}
@@ -255,8 +299,6 @@ def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[
     """The digits of words as whole numbers, those behind the point moved down onto it, and a zero behind them.
 
     points  the top bit of the byte that is a point, 0 without one; one less is `below`. Both are lost.
-
-    Eight digits are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits", 2018).
     """
     points += below
     behind = np.invert(points, out=points)
@@ -268,6 +310,14 @@ def whole(words: NDArray[np.uint64], points: NDArray[np.uint64], below: NDArray[
     value &= words
     value |= behind
     value &= FOURS
+    return summed(value)
+
+
+def summed(value: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Eight digits, one a byte, as a whole number. They are lost.
+
+    They are added in pairs, these in pairs, and these in pairs (Lemire, "Quickly parsing eight digits", 2018).
+    """
     for bits, weight in ((8, 10), (16, 100), (32, 10_000)):
         value *= np.uint64((weight << bits) + 1)
         value >>= np.uint64(bits)

@@ -7,15 +7,17 @@ language: it only says where numbers would be. Whether they are is checked once 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
+from ncfix.program.alike import Alike, alike
 from ncfix.program.numbers import (
     BLANK,
     BLANKS,
@@ -86,6 +88,25 @@ class Scan:
             shapes[block] = None
         return cls(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values, group)
 
+    @classmethod
+    def joined(cls, parts: Sequence[tuple[int, Scan]]) -> Scan:
+        """The scan of a text, from those of what it consists of; each begins at a byte of the text."""
+        shapes, comment, counts, spans, group = list[bytes | None](), [], [], [], []
+        for at, part in parts:
+            comment.append(np.where(part.comment < 0, -1, part.comment + at))
+            counts.append(np.diff(part.first_number))
+            spans.append(part.spans + at)
+            group.append(len(shapes) + part.groups)
+            shapes += part.shapes
+        values = np.concatenate([part.values for _, part in parts])
+        first = firsts(np.concatenate(counts))
+        return cls(shapes, np.concatenate(comment), first, np.concatenate(spans), values, np.concatenate(group))
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """(n,) which of the shapes each block has."""
+        return np.arange(len(self.comment)) if self.group is None else self.group
+
     def expanded(self) -> Scan:
         """The same, with a shape for each block."""
         if self.group is None:
@@ -119,6 +140,67 @@ def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -
         found = scan_compiled(text, blocks, pointless)
         if found is not None:
             return found
+    same = alike(source, blocks, pointless=pointless)
+    if same is None:
+        return in_slices(source, blocks, partial(scan_any, pointless=pointless))
+    return with_others(source, blocks, pointless, same)
+
+
+def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same: Alike) -> Scan:
+    """The scan of a text of which some lines are alike; the others are put together and scanned as any text is."""
+    n, m, mark = len(blocks), len(same.columns), bytes([NUMBER_MARK])
+    shapes: list[bytes | None] = [same.example.key(mark, bytes([POINTLESS_MARK]) if pointless else mark)]
+    comment, counts, group = np.full(n, -1), np.full(n, m), np.zeros(n, dtype=np.int64)
+    spans, values = same.line_by_line()
+    if len(same.rows) == n:
+        return Scan(shapes, comment, np.arange(0, n * m + 1, m), spans, values, group)
+    alone = np.ones(n, dtype=np.bool_)
+    alone[same.rows] = False
+    rows = np.flatnonzero(alone)
+    starts, stops = blocks[rows, 0], np.append(blocks[1:, 0], len(source))[rows]
+    text = b"".join(source[start:stop] for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
+    moved = starts - firsts(stops - starts)[:-1]
+    rest = in_slices(text, blocks.take(rows, axis=0) - moved[:, None], partial(scan_any, pointless=pointless))
+    comment[rows] = np.where(rest.comment < 0, -1, rest.comment + moved)
+    counts[rows] = np.diff(rest.first_number)
+    group[rows] = len(shapes) + rest.groups
+    first = firsts(counts)
+    own, spans_moved = np.repeat(~alone, counts), rest.spans + np.repeat(moved, counts[rows])[:, None]
+    return Scan(
+        shapes + rest.shapes, comment, first, mixed(own, spans, spans_moved), mixed(own, values, rest.values), group
+    )
+
+
+def mixed(own: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+    """The rows of two tables, each in order: those of the first where they are its own (n,)."""
+    result = np.empty((len(own), *some.shape[1:]), dtype=some.dtype)
+    kind = f"V{result.nbytes // len(own)}"
+    rows = result.view(kind).ravel()
+    rows[own], rows[~own] = some.view(kind).ravel(), others.view(kind).ravel()
+    return result
+
+
+SLICE_BYTES = 1 << 19
+"""How much of a text of any kind is scanned at once: the columns take about a hundred times as much."""
+
+PlainScan = Callable[[bytes, NDArray[np.int64]], Scan]
+
+
+def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan:
+    """What `scan` makes of a text, a slice of it at a time."""
+    begins = np.unique(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)))
+    if len(source) <= SLICE_BYTES or len(begins) == 1:
+        return scan(source, blocks)
+    parts = list[tuple[int, Scan]]()
+    for begin, end in pairwise([*begins[begins < len(blocks)].tolist(), len(blocks)]):
+        start, stop = int(blocks[begin, 0]), int(blocks[end, 0]) if end < len(blocks) else len(source)
+        parts.append((start, scan(source[start:stop], blocks[begin:end] - start)))
+    return Scan.joined(parts)
+
+
+def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
+    """As `scan`, of any text, with numpy alone."""
+    text = np.frombuffer(source, dtype=np.uint8)
     starts, stops, last = comments_of(source)
     numeric = is_numeric(text)
     fill(numeric, np.stack((starts, stops), axis=1), False)
@@ -188,6 +270,11 @@ def first_numbers(blocks: NDArray[np.int64], numbers: NDArray[np.int64]) -> NDAr
     """(n + 1,) the first number of each block."""
     starts = np.ascontiguousarray(numbers[:, 0])
     return np.append(np.searchsorted(starts, blocks[:, 0]), len(starts))
+
+
+def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
+    return np.concatenate(([0], np.cumsum(counts)))
 
 
 def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:

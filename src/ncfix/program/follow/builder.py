@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.program.follow.rollover import Winding, doubtful, extremes, overturned
+from ncfix.program.follow.stretch import Buffer, Stretch
 from ncfix.program.moves import Frame, Kind, Moves, Rule
 
 FloatArray = NDArray[np.float64]
@@ -67,56 +67,7 @@ class Circles(NamedTuple):
     centre: FloatArray
     normal: tuple[float, float, float]
     sweep: FloatArray
-
-
-@dataclass(slots=True)
-class Stretch:
-    """Consecutive motions as columns; `programmed` and `adrift` are bit masks by letter, `start` and `end` (n, 9).
-
-    path  (n + 1, 9) what both are views of, where each motion begins where the one before it ends
-    """
-
-    block: IntArray
-    programmed: IntArray
-    style: IntArray
-    feed: FloatArray
-    start: FloatArray
-    end: FloatArray
-    adrift: IntArray
-    path: FloatArray | None = None
-
-    def ends(self, columns: list[int]) -> tuple[FloatArray, FloatArray]:
-        """Where the motions start and end, by some of the letters; views of one path where they go on."""
-        if self.path is None:
-            start, end = (each.take(columns, axis=1, mode="clip") for each in (self.start, self.end))
-            return start, end
-        path = self.path.take(columns, axis=1, mode="clip")
-        return path[:-1], path[1:]
-
-
-@dataclass(slots=True)
-class Buffer:
-    """Motions that came one by one."""
-
-    block: list[int] = field(default_factory=list)
-    programmed: list[int] = field(default_factory=list)
-    style: list[int] = field(default_factory=list)
-    feed: list[float] = field(default_factory=list)
-    start: list[float] = field(default_factory=list)
-    end: list[float] = field(default_factory=list)
-    adrift: list[int] = field(default_factory=list)
-
-    def stretch(self) -> Stretch:
-        """The motions as columns."""
-        return Stretch(
-            np.array(self.block, dtype=np.int64),
-            np.array(self.programmed, dtype=np.int64),
-            np.array(self.style, dtype=np.int64),
-            np.array(self.feed, dtype=np.float64),
-            np.array(self.start, dtype=np.float64).reshape(-1, N_LETTERS),
-            np.array(self.end, dtype=np.float64).reshape(-1, N_LETTERS),
-            np.array(self.adrift, dtype=np.int64),
-        )
+    fixed: NDArray[np.bool_]
 
 
 BUFFERED = 65536
@@ -209,7 +160,8 @@ class Builder:
 
     def circles(self, circles: Circles) -> None:
         """The circles among the motions that are added next."""
-        self._circles.append(circles._replace(row=circles.row + self.count))
+        if len(circles.row):
+            self._circles.append(circles._replace(row=circles.row + self.count))
 
     def approach(self, command: Vector) -> None:
         """The command at the level R of the canned cycle that is added next."""
@@ -244,6 +196,15 @@ class Builder:
         """The motions that came together last; None if single ones came behind them, or none at all."""
         return self._stretches[-1] if self._stretches and not self._buffer.block else None
 
+    def latest_arc(self) -> tuple[int, Arc] | None:
+        """The last arc among the motions that came together last, and which of these it is."""
+        begin = self.count - (0 if self.latest is None else len(self.latest.block))
+        if not self._circles or self._circles[-1].row[-1] < begin:
+            return None
+        row, centre, normal, sweep, fixed = self._circles[-1]
+        x, y, z = centre[-1].tolist()
+        return int(row[-1]) - begin, Arc((x, y, z), normal, float(sweep[-1]), bool(fixed[-1]))
+
     def _flush(self) -> None:
         if self._buffer.block:
             self._stretches.append(self._buffer.stretch())
@@ -259,7 +220,7 @@ class Builder:
             _joined([getattr(part, name) for part in parts])
             for name in ("block", "programmed", "adrift", "style", "feed")
         )
-        start, end = map(_joined, zip(*(part.ends(self.columns) for part in parts), strict=True))
+        start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
         styles = self._style_columns(style)
         programmed, counted = (
@@ -355,6 +316,7 @@ class Builder:
 
     def _fixed_column(self, count: int) -> NDArray[np.bool_] | None:
         rows = [row for row, arc in self._arcs.items() if arc.fixed]
+        rows += [row for each in self._circles for row in each.row[each.fixed].tolist()]
         if not rows:
             return None
         column = np.zeros(count, dtype=np.bool_)
@@ -386,6 +348,20 @@ def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int |
     """The block of the first of these motions, if none is known from before."""
     found = np.flatnonzero(rows)
     return int(block[found[0]]) if known is None and found.size else known
+
+
+def _joined_ends(parts: Sequence[Stretch], columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Where the motions of stretches start and end; views of one path where all go on from each other, to the bit."""
+    starts, ends = zip(*(part.ends(columns) for part in parts), strict=True)
+    if len(parts) == 1:
+        return starts[0], ends[0]
+    path, at = np.concatenate([starts[0][:1], *ends]), 0
+    for part, start in zip(parts, starts, strict=True):
+        seen = start if part.path is None else start[:1]
+        if path[at : at + len(seen)].tobytes() != seen.tobytes():
+            return np.concatenate(starts), path[1:]
+        at += len(start)
+    return path[:-1], path[1:]
 
 
 def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from functools import cached_property
 from ncfix.diagnostics import Message
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import contour, tcp
-from ncfix.program.follow.builder import Arc, Builder, Style
+from ncfix.program.follow.builder import Builder, Style
 from ncfix.program.follow.coordinates import LETTERS, Vector
 from ncfix.program.follow.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
 from ncfix.program.follow.places import mask_of
@@ -47,6 +47,7 @@ class Control(Standing):
     points     a block gave the direction of the tool as a vector
     whole      the motions of the block must not be split, as under cutter compensation
     at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
+    handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
     """
 
@@ -66,6 +67,12 @@ class Control(Standing):
         self.points = False
         self.whole = self.at_corner = False
         self.beside = 0
+        self.handedness = 1.0
+
+    @property
+    def closure_mm(self) -> float:
+        """By how much the radii at both ends of an arc may differ, mm."""
+        return self.dialect.closure_mm
 
     @cached_property
     def pointing(self) -> Pointing | None:
@@ -97,22 +104,6 @@ class Control(Standing):
                 self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
             )
         return self._frame
-
-    def move(
-        self,
-        kind: Kind,
-        axes: int,
-        target: Vector,
-        unknown: Unknown,
-        code: int,
-        *,
-        refusal: str = "",
-        passing: str = "",
-        arc: Arc | None = None,
-        settles: int | None = None,
-    ) -> None:
-        """Make a motion; the arguments are those of `Motion`."""
-        self.make(Motion(kind, axes, target, unknown, code, refusal, passing, arc, settles))
 
     def make(self, motion: Motion) -> None:
         """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
@@ -248,11 +239,11 @@ class Control(Standing):
         rule, reason = self._verdict(kind, {}, "", "")
         return self._style(kind, rule, reason, code)
 
-    def note_foreign(self, letter: str) -> None:
-        """The program moves an axis that the machine lacks."""
+    def note_foreign(self, letter: str, also: str = "") -> None:
+        """The program moves an axis that the machine lacks; `also`: what else it may mean."""
         names = " ".join(self.builder.axes)
         text = f"the program moves the axis {letter}, and the machine has only {names}"
-        self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), "is it the right machine file?")
+        self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), f"is it the right machine file?{also}")
 
     def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
         modal = self.modal

@@ -13,11 +13,12 @@ import numpy as np
 
 from ncfix.program.follow.ahead import Ahead, rows_before
 from ncfix.program.follow.arcs import CLOCKWISE, COUNTER
-from ncfix.program.follow.builder import Circles, Stretch
+from ncfix.program.follow.builder import Circles
 from ncfix.program.follow.contour import resting_of_many
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.follow.stage import LONGEST, IntArray, Mask, Stage, Text
+from ncfix.program.follow.stretch import Stretch
 from ncfix.program.moves import FeedMode, Kind
 
 SHORTEST = 16
@@ -147,10 +148,11 @@ def take(control: Control, stage: Stage, block: int, main: bool, circles: Circle
 
 def note_codes(control: Control, stage: Stage) -> None:
     """Leave feed and motion codes in force as a stretch leaves them."""
-    modal, straight = control.modal, stage.motion <= 10
+    modal = control.modal
     modal.motion = int(stage.motion[-1])
-    if straight.any():
-        modal.straight = int(stage.motion[np.flatnonzero(straight)[-1]])
+    straight = stage.motion[-1:] if modal.motion <= 10 else stage.motion[stage.motion <= 10]
+    if straight.size:
+        modal.straight = int(straight[-1])
     if stage.fed.any():
         modal.feed = float(stage.feed[-1])
         modal.feed_given = modal.feed != 0.0
@@ -162,7 +164,7 @@ def styles(control: Control, stage: Stage) -> IntArray:
     rapid = stage.motion == 0
     if rapid.any():
         found[rapid] = control.style_of(Kind.RAPID, 0)
-    for code in () if stage.turns is None else ARCS:
+    for code in () if stage.turns is None or not stage.turns.any() else ARCS:
         if (round_ := stage.motion == code).any():
             found[round_] = control.style_of(Kind.ARC, code)
     return found

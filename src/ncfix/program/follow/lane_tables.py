@@ -20,6 +20,7 @@ class Lane:
     motion  0, 10, 20, 30, or -1 if the code in force stays
     centre  slots of I, J and K, -1 without
     radius  slot of R, -1 without
+    fixed   which of I, J and K count from the origin, whatever else is in force
     """
 
     axes: tuple[tuple[int, int], ...]
@@ -27,6 +28,7 @@ class Lane:
     motion: int
     centre: tuple[int, int, int] = (-1, -1, -1)
     radius: int = -1
+    fixed: tuple[bool, bool, bool] = (False, False, False)
 
     @property
     def turns(self) -> bool:
@@ -44,6 +46,7 @@ class LaneTables:
     mask    (s,) axis words, as bits
     centre  (s, 3) which ones are I, J and K
     radius  (s,) which one is R
+    fixed   (s, 3) which of I, J and K count from the origin
     turns   (s,) arcs
     """
 
@@ -53,6 +56,7 @@ class LaneTables:
     mask: NDArray[np.int64]
     centre: NDArray[np.int64]
     radius: NDArray[np.int64]
+    fixed: NDArray[np.bool_]
     turns: NDArray[np.bool_]
 
     @classmethod
@@ -61,8 +65,9 @@ class LaneTables:
         n = len(lanes)
         nowhere, none = np.full((n, N_LETTERS), -1), np.full(n, -1)
         turns = np.array([lane is not None and lane.turns for lane in lanes], dtype=np.bool_)
+        fixed = np.array([(False,) * 3 if lane is None else lane.fixed for lane in lanes], dtype=np.bool_).reshape(n, 3)
         mask, centre = np.zeros(n, dtype=np.int64), np.full((n, 3), -1)
-        tables = cls(nowhere, none, none.copy(), mask, centre, none.copy(), turns)
+        tables = cls(nowhere, none, none.copy(), mask, centre, none.copy(), fixed, turns)
         for shape, lane in enumerate(lanes):
             if lane is not None:
                 for letter, slot in lane.axes:

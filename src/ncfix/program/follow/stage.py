@@ -109,8 +109,8 @@ def words(numbers: FloatArray, first: IntArray, slots: IntArray) -> FloatArray:
     given = slots >= 0
     if given.all():
         return numbers.take(first + slots)
-    values, rows = np.full(len(slots), np.nan), np.flatnonzero(given)
-    values[rows] = numbers[first[rows] + slots[rows]]
+    values = numbers.take(first + slots, mode="clip") if len(numbers) else np.empty(len(slots))
+    values[np.flatnonzero(~given)] = np.nan
     return values
 
 

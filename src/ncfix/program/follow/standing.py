@@ -34,7 +34,7 @@ class Standing(ABC):
     """Where the axes stand, in commands and in the coordinates of the program.
 
     machine    letter indices of the machine's axes, in the order of its columns
-    rotary     for each letter whether it turns
+    rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
     modal      what is in force of modal codes; `offsets` and `tools` likewise
     position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
     unknown    letter index -> why the position is not known
@@ -60,6 +60,7 @@ class Standing(ABC):
         self.rotary = tuple(
             (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
         )
+        self.turning = tuple(index for index in self.machine if self.rotary[index])
         self.modal = Modal()
         self.offsets = Offsets()
         self.tools = Tools()

@@ -28,8 +28,7 @@ TURNED = "where the axis {} stands in tool-centre-point coordinates depends on t
 
 def rotary_at_zero(control: Control, position: Vector, unknown: Unknown) -> bool:
     """Whether all rotary axes of the machine stand at zero."""
-    turning = [index for index in control.machine if control.rotary[index]]
-    return all(index not in unknown and abs(position[index]) < 1e-12 for index in turning)
+    return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
 
 
 def from_machine(control: Control, target: Vector, unknown: Unknown) -> None:
@@ -100,7 +99,7 @@ def pointing_of(control: Control) -> Pointing | None:
     None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
     """
     machine, kinematics = control.machine, control.kinematics
-    turning = [column for column, index in enumerate(machine) if control.rotary[index]]
+    turning = [machine.index(index) for index in control.turning]
     if kinematics is None or len(turning) != 2 or not {X, Y, Z} <= set(machine):
         return None
     places = [machine.index(index) for index in (X, Y, Z)]

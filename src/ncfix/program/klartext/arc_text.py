@@ -58,7 +58,7 @@ class PieceOfArc:
 
     @property
     def middle(self) -> FloatArray:
-        """The centre in its plane."""
+        """The centre in its plane, (2,)."""
         found: FloatArray = self.centre[list(self.plane[:2])]
         return found
 
@@ -99,14 +99,14 @@ def arc_text(arc: PieceOfArc, style: Style) -> ArcText:
 
 
 def swept(arc: PieceOfArc, middle: FloatArray, begin: FloatArray, end: FloatArray) -> float:
-    """The signed angle from begin to end about a centre, at most a turn."""
+    """The signed angle, rad, from begin to end about a centre, at most a turn; points (2,) of the plane."""
     to_centre, to_end = middle - begin, end - begin
     pair = (float(to_centre[0]), float(to_centre[1])), (float(to_end[0]), float(to_end[1]))
     return sweep_angle(*pair, 1, clockwise=arc.clockwise)
 
 
 def by_radius(arc: PieceOfArc, style: Style) -> tuple[str, FloatArray] | None:
-    """R as written, and the centre that it means; None if that is not within an output step of where it belongs."""
+    """R as written, and the centre (2,) that it means; None if that is over an output step from where it belongs."""
     begin, end, wanted = arc.begin[arc.columns], arc.end[arc.columns], arc.middle
     size = float(np.hypot(*(wanted - begin)) + np.hypot(*(wanted - end))) / 2
     sign = 1.0 if abs(swept(arc, wanted, begin, end)) <= math.pi else -1.0
@@ -122,7 +122,7 @@ def by_radius(arc: PieceOfArc, style: Style) -> tuple[str, FloatArray] | None:
 
 
 def written_pole(arc: PieceOfArc, middle: FloatArray, style: Style, digits: int) -> tuple[FloatArray, tuple[str, ...]]:
-    """A pole as it is written, and its words, X before Y before Z."""
+    """A pole (2,) as it is written, and its words, X before Y before Z."""
     texts = [style.number(float(value), digits) for value in middle]
     words = sorted("XYZ"[index] + text for index, text in zip(arc.plane[:2], texts, strict=True))
     return np.array([value_of(text) for text in texts]), tuple(words)
@@ -150,7 +150,7 @@ def helix(arc: PieceOfArc, style: Style, sense: str) -> ArcText:
 
 
 def turned_by(arc: PieceOfArc, middle: FloatArray, begin: FloatArray, end: FloatArray) -> float:
-    """The signed angle from begin to end about a centre, with the whole turns that the arc was meant to have."""
+    """As `swept`, with the whole turns that the arc was meant to have."""
     angle = swept(arc, middle, begin, end)
     return angle if arc.turn is None else angle + 2 * math.pi * round((arc.turn - angle) / (2 * math.pi))
 
@@ -161,7 +161,7 @@ def on_digits(angle: float, style: Style) -> str:
 
 
 def swung(begin: FloatArray, pole: FloatArray, angle: float) -> FloatArray:
-    """A point turned about another one."""
+    """A point (2,) turned about another one by an angle, rad."""
     x, y = begin - pole
     c, s = math.cos(angle), math.sin(angle)
     found: FloatArray = pole + np.array([c * x - s * y, s * x + c * y])
@@ -183,7 +183,7 @@ def between(begin: FloatArray, end: FloatArray, middle: FloatArray, angle: float
 
 
 def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> FloatArray:
-    """The point next to `middle` that is equally far from begin and end; of full turns any is."""
+    """The point (2,) next to `middle` that is equally far from begin and end; of full turns any is."""
     chord = end - begin
     length = float(np.hypot(*chord))
     if length < 1e-6:
@@ -194,7 +194,7 @@ def equally_far(begin: FloatArray, end: FloatArray, middle: FloatArray) -> Float
 
 
 def seen_under(begin: FloatArray, end: FloatArray, angle: float) -> FloatArray:
-    """The point from which the way from begin to end is seen under a signed angle; far away where there is none."""
+    """The point (2,) from which the way from begin to end is seen under an angle, rad; infinitely far for none."""
     chord = end - begin
     half = math.tan(angle / 2)
     if abs(half) < 1e-12:
@@ -204,7 +204,7 @@ def seen_under(begin: FloatArray, end: FloatArray, angle: float) -> FloatArray:
 
 
 def spatial(arc: PieceOfArc, middle: FloatArray) -> FloatArray:
-    """A centre in the plane as one of X Y Z; across the plane it lies where the arc begins."""
+    """A centre (2,) in the plane as one of X Y Z, (3,); across the plane it lies where the arc begins."""
     found = arc.centre.copy()
     found[list(arc.plane[:2])] = middle
     across = arc.spatial[arc.plane[2]]

@@ -11,6 +11,7 @@ from ncfix.program.follow.arcs import CLOCKWISE, COUNTER, centre_from_radius, ch
 from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.coordinates import IDENTITY, Plane, Vector, dot, rotated
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Motion
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.step import Step, somewhere, with_increments
 from ncfix.program.klartext.targets import (
@@ -149,7 +150,7 @@ def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
     with_increments(control, relative)
     arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
     code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
-    control.move(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc)
+    control.make(Motion(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
     with_increments(control, False)
     control.path.tangent = direction_at_end(control.position, arc)
 
@@ -217,5 +218,5 @@ def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
     if step.words.runtime and not step.words.incremental:
         somewhere(control, axes, target, unknown, reason)
         return
-    control.move(Kind.FEED, axes, target, unknown, 10, refusal=reason)
+    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=reason))
     control.path.tangent = None

@@ -59,9 +59,9 @@ def end_of_short_ways(control: Control, on: bool) -> None:
     """
     pointing = control.pointing if on and control.shortest else None
     tilts = None if pointing is None else control.machine[pointing.columns[1]]
-    for index in control.machine if on and control.shortest else ():
+    for index in control.turning if on and control.shortest else ():
         below = control.position[index] < 0 and index != tilts
-        if control.rotary[index] and index not in control.unknown and (below or control.position[index] >= FULL):
+        if index not in control.unknown and (below or control.position[index] >= FULL):
             control.lose([index], COUNTED)
     control.shortest = not on
 
@@ -69,7 +69,7 @@ def end_of_short_ways(control: Control, on: bool) -> None:
 def choose_axes(control: Control, flags: frozenset[str]) -> None:
     """M138: the rotary axes that tilted planes and control of the tip take into account, those of the machine again."""
     control.suspended.pop("M138", None)
-    turning = {"XYZABCUVW"[index].lower() for index in control.machine if control.rotary[index]}
+    turning = {"XYZABCUVW"[index].lower() for index in control.turning}
     if flags & set("abc") not in (set(), turning):
         control.suspended["M138"] = CHOSEN
 
@@ -77,8 +77,8 @@ def choose_axes(control: Control, flags: frozenset[str]) -> None:
 def reduce_turns(control: Control, flags: frozenset[str]) -> None:
     """M94: rotary axes, those that are named if any is, are said by an angle below a turn from here on."""
     named = flags & set("abc")
-    for index in control.machine:
-        if control.rotary[index] and (not named or "XYZABCUVW"[index].lower() in named):
+    for index in control.turning:
+        if not named or "XYZABCUVW"[index].lower() in named:
             control.position[index] %= 2 * math.pi
 
 

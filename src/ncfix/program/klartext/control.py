@@ -155,7 +155,7 @@ class Control(base.Control):
         """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
         self.suspended.pop(TURNED_DATUM, None)
         datum = [a + b for a, b in zip(self.transformations.preset, self.transformations.shift, strict=True)]
-        turned = next((i for i in self.machine if self.rotary[i] and datum[i]), None)
+        turned = next((i for i in self.turning if datum[i]), None)
         if turned is not None and (self.m128 or self.transformations.tilted):
             self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
 
@@ -206,7 +206,7 @@ class Control(base.Control):
             motion = motion._replace(passing=motion.passing or first_reason(motion.unknown))
         whole = self.whole
         self.tilted = self.transformations.tilted and not self.m128
-        turns = any(self.rotary[index] and motion.axes >> index & 1 for index in self.machine)
+        turns = any(motion.axes >> index & 1 for index in self.turning)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
             self.whole = True
         super().make(motion)

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ncfix.program.follow.coordinates import DEGREE, INDEX, X, Y, Z
+from ncfix.program.follow.coordinates import X, Y, Z
 from ncfix.program.follow.faults import Fault
-from ncfix.program.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, PRESET, Control
+from ncfix.program.follow.motion import Motion
+from ncfix.program.klartext import trans_cycles
+from ncfix.program.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
 from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Where, Words, command_of, led, polar, polar_axes
-from ncfix.program.klartext.tilting import cycle_19
-from ncfix.program.klartext.trans import FROM_TABLE, note_source
 from ncfix.program.moves import Kind
 
 NO_CYCLE = "NCF272"
@@ -47,13 +47,6 @@ CALLED = "a program is called by cycle 12, and what it does is not followed"
 HARMLESS = frozenset({9, 13, 32, 239, 392})
 """Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
 
-AT_ONCE = frozenset({7, 8, 10, 11, 19, 26, 247})
-"""Cycles that take effect where they are defined."""
-
-BY_FUNCTION = {8: "MIRROR", 10: "ROTATION", 11: "SCALE"}
-"""What a TRANS function can do, too."""
-
-NO_PRESET = "the number of the preset is known only at run time"
 OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
 AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
 DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
@@ -69,8 +62,8 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
     """A CYCL DEF block: `name` is `200`, or `7.1`."""
     number, _, part = name.partition(".")
     cycle = int(number)
-    if cycle in AT_ONCE:
-        define_at_once(control, cycle, part, words, text)
+    if cycle in trans_cycles.ACTS:
+        trans_cycles.transform(control, cycle, part, words, text)
         return
     if cycle in HARMLESS:
         return
@@ -89,74 +82,6 @@ def define(control: Control, name: str, words: Words, text: str) -> None:
     if words.runtime:
         words_of_step["?"] = 1.0
     control.cycle.steps |= {f"{part}:{key}": value for key, value in words_of_step.items()}
-
-
-def define_at_once(control: Control, cycle: int, part: str, words: Words, text: str) -> None:
-    """Coordinate transformations."""
-    trans = control.transformations
-    if cycle in BY_FUNCTION and part == "1":
-        note_source(control, BY_FUNCTION[cycle], by_function=False)
-    if cycle == 7:
-        shift(control, words, text)
-    elif cycle == 8 and part == "1":
-        trans.mirror_axes(frozenset(text.upper()) & frozenset("XYZABC"))
-    elif cycle == 10 and part == "1":
-        rotation = words.values.get("ROT", words.values.get("IROT"))
-        suspend(control, words, "rotation")
-        trans.rotate(rotation or 0.0, incremental="IROT" in words.values)
-    elif cycle == 11 and part == "1":
-        suspend(control, words, "scale")
-        factor = words.values.get("SCL", 1.0)
-        if factor <= 0.0:
-            control.suspended["scale"] = "a scale that is not above zero (cycle 11)"
-        trans.scale_by(factor if factor > 0.0 else 1.0)
-    elif cycle == 26 and part not in ("", "0"):
-        factors = {key: value for key, value in words.values.items() if key in "XYZ"}
-        control.suspended.pop("scales", None)
-        if any(factor != 1.0 for factor in factors.values()):
-            control.suspended["scales"] = "a scale of single axes (cycle 26)"
-    elif cycle == 19 and part == "1":
-        cycle_19(control, words)
-    elif cycle == 247:
-        preset(control)
-    control.recompose()
-
-
-def suspend(control: Control, words: Words, what: str) -> None:
-    """Nothing is corrected while a transformation depends on what is known only at run time."""
-    control.suspended.pop(what, None)
-    if words.runtime:
-        control.suspended[what] = f"the {what} of the coordinates is known only at run time"
-
-
-def shift(control: Control, words: Words, text: str) -> None:
-    """Cycle 7: `7.1 X+10`, `7.2 IY5`, `7.1 #5` for a row of the datum table."""
-    if "#" in text:
-        for letter in "XYZABCUVW":
-            control.shaky[INDEX[letter]] = FROM_TABLE
-        return
-    for address, value in words.values.items():
-        letter = address.removeprefix("I")
-        if letter not in INDEX:
-            continue
-        index = INDEX[letter]
-        scale = DEGREE if control.rotary[index] else control.unit
-        control.transformations.shift_axis(letter, scale * value, incremental=address[0] == "I")
-        control.shaky.pop(index, None)
-        if address in words.runtime:
-            control.shaky[index] = "the datum of the axis {} is known only at run time"
-
-
-def preset(control: Control) -> None:
-    """Cycle 247: the preset of the row Q339."""
-    parameters = control.scope.parameters
-    parameters.touched = False
-    number = parameters.get("Q339")
-    control.suspended.pop(PRESET, None)
-    if parameters.touched:
-        control.suspended[PRESET] = NO_PRESET
-        return
-    control.load_preset(f"PRESET{number:g}")
 
 
 # -- execution --------------------------------------------------------------------------------------------------------
@@ -227,7 +152,7 @@ def drill(control: Control, where: Where, axes: int, heights: tuple[float, float
     target, unknown = command_of(control, where, axes | 1 << Z)
     programmed = axes & ~(1 << Z)
     code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
-    control.move(Kind.CYCLE, programmed, target, unknown, code, refusal=refusal)
+    control.make(Motion(Kind.CYCLE, programmed, target, unknown, code, refusal=refusal))
     over.inner[Z] = clear
     over.unknown.pop(Z, None)
     if refusal == DEPTH_AT_RUN_TIME:

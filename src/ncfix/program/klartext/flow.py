@@ -76,7 +76,11 @@ class FlowControl:
         """CALL PGM."""
         found = self.find(name)
         if found is None:
-            raise Fault(NO_PROGRAM, f"the program {name} is not found", "put its file beside the program")
+            raise Fault(
+                NO_PROGRAM,
+                f"the program {name} is not found",
+                "put its file beside the program, or say where it is: --subprograms DIR",
+            )
         if found.mm != self.unit.mm:
             raise Fault(NO_PROGRAM, f"the program {name} is written in another unit of length")
         self.push(outside=True)

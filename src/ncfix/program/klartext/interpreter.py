@@ -12,7 +12,7 @@ from ncfix.diagnostics import Place, SourceError
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.places import mask_of
-from ncfix.program.klartext import cycles, lines, tilting
+from ncfix.program.klartext import cycles, lines, tilting, trans_cycles
 from ncfix.program.klartext.calculate import Evaluate
 from ncfix.program.klartext.codes import after_motion, before_motion
 from ncfix.program.klartext.control import Control
@@ -256,7 +256,7 @@ class Interpreter:
         if name.endswith("reset"):
             self.control.transformations.reset_shift()
             self.control.shaky.clear()
-        cycles.shift(self.control, words, "")
+        trans_cycles.shift(self.control, words, "")
         self.control.recompose()
 
     # -- motions ------------------------------------------------------------------------------------------------------

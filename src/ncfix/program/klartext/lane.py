@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
-from ncfix.program.follow.builder import Stretch
 from ncfix.program.follow.contour import plane_of, resting_of_many
 from ncfix.program.follow.lane import SHORTEST, before_placing
 from ncfix.program.follow.stage import LONGEST, filled, followed, followed_compiled
+from ncfix.program.follow.stretch import Stretch
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.lane_tables import FEED, RAPID
 from ncfix.program.klartext.layout import CORNERS

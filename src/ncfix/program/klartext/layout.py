@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -30,6 +30,8 @@ CORNERS = frozenset({"rnd", "chf"})
 """Corners that the control makes of the end of one motion and the beginning of the next."""
 
 POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
+VECTOR = frozenset({"TX", "TY", "TZ"})
+AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
 LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
 """M codes that act at the end of their block: they belong on its last piece."""
 
@@ -121,26 +123,24 @@ class Shape:
 def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
     """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
     items = shape.template.items
-    commands = [item for item in items if isinstance(item, Command)]
-    words = own_words(items)
+    words, commands = own_words(items), [item for item in items if isinstance(item, Command)]
     function = next((command for command in commands if opens_block(command.name)), None)
-    axes = {w.address.removeprefix("I"): w for w in words if w.address.removeprefix("I") in AXIS_LETTERS}
-    polar = tuple(word for word in words if word.address in POLAR)
-    vector = {word.address: word for word in words if word.address in ("TX", "TY", "TZ")}
+    axes = {word.address.removeprefix("I"): word for word in among(words, AXIS_WORDS)}
+    polar, vector = among(words, POLAR), {word.address: word for word in among(words, VECTOR)}
     if 0 < len(vector) < 3 or has_computed_angle(polar):
         return None
-    leading = [*axes.values(), *polar]
-    last = max(leading, key=lambda word: word.span.stop, default=None)
+    last = max([*axes.values(), *polar], key=lambda word: word.span.stop, default=None)
+    end = last or function
     layout = Layout(
         name=function.name if function else "",
         function=function.span if function else None,
         axes=axes,
         polar=polar,
-        radius=next((word for word in words if word.address == "R"), None),
+        radius=next(iter(among(words, {"R"})), None),
         sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
         vector=vector,
         late=tuple(filter(acts_late, words)),
-        words_at=last.span.stop if last else function.span.stop if function else Anchor(-1, 0),
+        words_at=Anchor(-1, 0) if end is None else end.span.stop,
         starts_at=start_of(items),
         blank=" ",
         comma=False,
@@ -148,6 +148,11 @@ def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
         corner=False,
     )
     return layout, last
+
+
+def among(words: Sequence[Word], addresses: Collection[str]) -> tuple[Word, ...]:
+    """The words with one of these addresses."""
+    return tuple(word for word in words if word.address in addresses)
 
 
 def has_computed_angle(polar: Sequence[Word]) -> bool:

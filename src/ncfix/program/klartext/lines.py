@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import LETTERS, Vector, dot
-from ncfix.program.follow.motion import Unknown
+from ncfix.program.follow.motion import Motion, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import DEPARTED, Control
 from ncfix.program.klartext.posture import angles_for
@@ -89,7 +89,7 @@ def name_polar(control: Control, step: Step) -> None:
 
 def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
     """A straight motion to a command."""
-    turned = [index for index in control.machine if control.rotary[index] and axes >> index & 1]
+    turned = [index for index in control.turning if axes >> index & 1]
     positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
     if positioning and control.transformations.tilted and not control.m128:
         turn_under_tilt(control, step, target, unknown, axes)
@@ -100,7 +100,7 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     with_increments(control, follows or step.words.incremental)
     code = 0 if step.kind == Kind.RAPID else 10
     refusal = way or check_normal(control) or derived(control, step.words, axes)
-    control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else "")
+    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else ""))
     with_increments(control, False)
     keep_tangent(control, *before)
 
@@ -149,7 +149,7 @@ def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unkno
             unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
     code = 0 if step.kind == Kind.RAPID else 10
     refusal, passing = (MIXED_UNDER_TILT, "") if linear else ("", TURNS_UNDER_TILT)
-    control.move(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing)
+    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing))
     if linear:
         control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
     control.switch_tip()
@@ -174,7 +174,7 @@ def at_machine(control: Control, step: Step) -> None:
         target, unknown = in_machine(control, step.words)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
-    control.move(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code))
+    control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code)))
     if was:
         control.switch_tip()
     control.path.tangent = None
@@ -191,7 +191,7 @@ def approach(control: Control, step: Step) -> None:
     target, unknown = command_of(control, where, axes)
     control.path.corner = True
     with_increments(control, step.words.incremental or " p" in step.name)
-    control.move(Kind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes))
+    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
     with_increments(control, False)
     if " p" in step.name:
         name_polar(control, step)
@@ -217,4 +217,6 @@ def departure(control: Control, step: Step) -> None:
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
     axes = 1 << plane.first | 1 << plane.second
-    control.move(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing="departure from the contour (DEP)")
+    control.make(
+        Motion(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing="departure from the contour (DEP)")
+    )

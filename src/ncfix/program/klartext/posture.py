@@ -100,7 +100,7 @@ def angles_for(control: Control, direction: Triple) -> list[dict[int, float]]:
 
 def stands_normal(control: Control, tilt: Rotation) -> bool | None:
     """Whether the tool stands normal to a plane; None if that is not known."""
-    if any(control.rotary[index] and index in control.unknown for index in control.machine):
+    if any(index in control.unknown for index in control.turning):
         return None
     found = posture(control, control.position)
     return None if found is None else apart(found.tool, normal_of(tilt)) < SQUARE

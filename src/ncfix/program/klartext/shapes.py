@@ -14,6 +14,7 @@ from ncfix.program.shapes import (
     ODD,
     Scan,
     block_of,
+    in_slices,
     odd_blocks,
     scan_compiled,
     shape_keys,
@@ -52,33 +53,26 @@ def split(source: bytes) -> NDArray[np.int64]:
 
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block. A block of several lines has none: it is taken as it is."""
-    text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     if fast.engaged():
+        text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
         found = scan_compiled(text, blocks, False, b";", FIXED, WITHIN_NONE)
         if found is not None:
             return found
         if len(source) > SMALL and len(blocks) > 1:
             return in_halves(source, blocks)
-    return scan_plain(source, text, blocks)
+    return in_slices(source, blocks, scan_plain)
 
 
 def in_halves(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """As `scan`, where some block has to be taken as it is: the others need not be."""
     middle = len(blocks) // 2
     at = int(blocks[middle, 0])
-    first, second = scan(source[:at], blocks[:middle]).expanded(), scan(source[at:], blocks[middle:] - at).expanded()
-    comment = np.where(second.comment < 0, second.comment, second.comment + at)
-    return Scan(
-        first.shapes + second.shapes,
-        np.concatenate((first.comment, comment)),
-        np.concatenate((first.first_number[:-1], second.first_number + first.first_number[-1])),
-        np.concatenate((first.spans, second.spans + at)),
-        np.concatenate((first.values, second.values)),
-    )
+    return Scan.joined([(0, scan(source[:at], blocks[:middle])), (at, scan(source[at:], blocks[middle:] - at))])
 
 
-def scan_plain(source: bytes, text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> Scan:
-    """As `scan`, with numpy alone; `text` has points for commas."""
+def scan_plain(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """As `scan`, with numpy alone."""
+    text = np.frombuffer(source.translate(COMMAS), dtype=np.uint8)
     comments = np.array([match.span() for match in COMMENT.finditer(source)], dtype=np.int64).reshape(-1, 2)
     comments = comments[inside(blocks, comments[:, 0])]
     numeric = is_numeric(text)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.coordinates import Vector, X, Y
-from ncfix.program.follow.motion import Unknown
+from ncfix.program.follow.motion import Motion, Unknown
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.targets import Words
 from ncfix.program.moves import Kind
@@ -44,7 +44,9 @@ def somewhere(control: Control, axes: int, target: Vector, unknown: Unknown, rea
     """A refused curve that ends nobody knows where: the motion before it must still end where it did."""
     normal = control.rotation[0][2], control.rotation[1][2], control.rotation[2][2]
     control.modal.arc_absolute = True
-    control.move(Kind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0))
+    control.make(
+        Motion(Kind.ARC, axes | IN_PLANE, target, unknown, 10, refusal=reason, arc=Arc((0.0, 0.0, 0.0), normal, 0.0))
+    )
     control.modal.arc_absolute = False
     control.path.tangent = None
 

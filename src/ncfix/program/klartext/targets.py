@@ -16,6 +16,7 @@ from ncfix.program.follow.control import ADRIFT
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import AT_START, Unknown
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import SPATIAL, Control
 
 BAD_POLE = "NCF271"
@@ -144,7 +145,7 @@ def derived(control: Control, words: Words, axes: int) -> str:
     if {"PR", "PA"} <= words.values.keys():
         own |= polar_axes(control, words)
     if words.values.keys() & {"TX", "TY", "TZ"}:
-        own |= sum(1 << i for i in control.machine if control.rotary[i])
+        own |= mask_of(control.turning)
     index = next((i for i in control.machine if (axes & ~own & control.places.adrift) >> i & 1), None)
     return "" if index is None else ADRIFT.format(LETTERS[index])
 
@@ -152,7 +153,7 @@ def derived(control: Control, words: Words, axes: int) -> str:
 def by_spatial_angles(control: Control, words: Words, where: Where) -> None:
     """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
     if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
-        where.unknown |= {index: SPATIAL for index in control.machine if control.rotary[index]}
+        where.unknown |= dict.fromkeys(control.turning, SPATIAL)
 
 
 def settle(control: Control, words: Words) -> None:
@@ -232,28 +233,42 @@ def polar(control: Control, words: Words) -> tuple[Where, float | None]:
     start = here(control)
     where = led(control, words)
     away = start.inner[plane.first] - first, start.inner[plane.second] - second
-    radius, angle = math.hypot(*away), math.atan2(away[1], away[0])
-    relative = {"PR", "PA"} - words.values.keys()
-    if "PR" in words.values or "IPR" in words.values:
-        length = control.modal.unit * words.values.get("PR", words.values.get("IPR", 0.0))
-        radius = length if "PR" in words.values else radius + length
-    step = words.values.get("IPA")
-    if step is not None:
-        angle += step * DEGREE
-    elif "PA" in words.values:
-        angle = words.values["PA"] * DEGREE
+    radius, angle = arm(words.values, away, control.modal.unit)
     where.inner[plane.first] = first + radius * math.cos(angle)
     where.inner[plane.second] = second + radius * math.sin(angle)
-    reasons = [start.unknown[i] for i in (plane.first, plane.second) if relative and i in start.unknown]
-    if words.runtime & {"PR", "PA", "IPR", "IPA"}:
-        reasons.append(RUNTIME)
-    if path.pole_in != pole_frame(control):
-        reasons.append(POLE_MOVED)
+    why = doubt(control, words, start)
     for index in (plane.first, plane.second):
         where.unknown.pop(index, None)
-        if reasons:
-            where.unknown[index] = reasons[0]
+        if why:
+            where.unknown[index] = why
+    step = words.values.get("IPA")
     return where, None if step is None else step * DEGREE
+
+
+def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> tuple[float, float]:
+    """Distance from the pole, mm, and angle, rad, to which polar words lead axes that stand `away` from it."""
+    radius, angle = math.hypot(*away), math.atan2(away[1], away[0])
+    if "PR" in values:
+        radius = unit * values["PR"]
+    elif "IPR" in values:
+        radius += unit * values["IPR"]
+    if "IPA" in values:
+        angle += values["IPA"] * DEGREE
+    elif "PA" in values:
+        angle = values["PA"] * DEGREE
+    return radius, angle
+
+
+def doubt(control: Control, words: Words, start: Where) -> str:
+    """Why it is not known where polar words lead from a start; empty if it is."""
+    plane = control.path.plane
+    if not {"PR", "PA"} <= words.values.keys():
+        for index in (plane.first, plane.second):
+            if index in start.unknown:
+                return start.unknown[index]
+    if words.runtime & {"PR", "PA", "IPR", "IPA"}:
+        return RUNTIME
+    return "" if control.path.pole_in == pole_frame(control) else POLE_MOVED
 
 
 def polar_axes(control: Control, words: Words) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
 from ncfix.program.follow.faults import Fault
-from ncfix.program.follow.motion import AT_START
+from ncfix.program.follow.motion import AT_START, Motion
 from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
 from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal_of, posture, stands_normal
 from ncfix.program.klartext.targets import Words
@@ -167,12 +167,11 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
 
 def way_home(control: Control) -> dict[int, float] | None:
     """PLANE RESET with TURN or MOVE: the rotary axes go to their basic position, zero; None where zero is shifted."""
-    turning = [index for index in control.machine if control.rotary[index]]
-    if any(control.offset[index] for index in turning):
+    if any(control.offset[index] for index in control.turning):
         return None
-    if any(index in control.unknown or abs(control.position[index]) > NONE for index in turning):
+    if any(index in control.unknown or abs(control.position[index]) > NONE for index in control.turning):
         control.warn(WAY, HOME, "state the rotary axes in the next block")
-    return dict.fromkeys(turning, 0.0)
+    return dict.fromkeys(control.turning, 0.0)
 
 
 def way_at_pole(control: Control, way: dict[int, float]) -> dict[int, float] | None:
@@ -197,12 +196,12 @@ def turn_axes(control: Control, way: dict[int, float] | None) -> None:
     target, unknown = control.position[:], {k: why for k, why in control.unknown.items() if k not in way}
     for index, angle in way.items():
         target[index] = angle
-    control.move(Kind.RAPID, 0, target, unknown, 0, passing=TURNED)
+    control.make(Motion(Kind.RAPID, 0, target, unknown, 0, passing=TURNED))
 
 
 def rotary_letters(control: Control) -> str:
     """The machine's rotary axes."""
-    return "".join("XYZABCUVW"[index] for index in control.machine if control.rotary[index])
+    return "".join("XYZABCUVW"[index] for index in control.turning)
 
 
 def cycle_19(control: Control, words: Words) -> None:

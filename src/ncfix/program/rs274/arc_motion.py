@@ -6,13 +6,17 @@ import math
 
 from ncfix.program.follow.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
 from ncfix.program.follow.builder import Arc
-from ncfix.program.follow.coordinates import CENTRE_LETTERS, IDENTITY, INCH, Plane, dot
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.motion import Motion
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.feeds import check_feed
 from ncfix.program.rs274.targets import destination
+
+LATHE_PLANE = 180
+"""G18, the plane in which lathes cut: Z, then X."""
 
 SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
 
@@ -31,15 +35,15 @@ def arc(control: Control, block: Block, code: int) -> None:
     clockwise = code == CLOCKWISE
     try:
         centre = centre_of(control, block, plane, end, clockwise=clockwise)
-    except Fault:
+    except Fault as fault:
         if not doubtful:
-            raise
+            raise Fault(fault.code, fault.text, supposed(control, block, plane, end) or fault.hint) from None
         centre = (1.0, 0.0)
     turns = turns_of(block) if control.rules.strict else 1
     sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
     refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
-    control.move(
-        Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep)
+    control.make(
+        Motion(Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep))
     )
 
 
@@ -96,13 +100,23 @@ def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clock
     if control.modal.arc_absolute:
         here = control.program_position()
         first, second = first - here[plane.first], second - here[plane.second]
-    check_closure((first, second), end, closure_mm(control), control.dialect.closure_relative)
+    check_closure((first, second), end, control.closure_mm, control.dialect.closure_relative)
     return first, second
 
 
-def closure_mm(control: Control) -> float:
-    """By how much the radii at both ends of an arc may differ, mm."""
-    return control.dialect.closure_mm * (1.0 if control.modal.unit == 1.0 else INCH / 10)
+def supposed(control: Control, block: Block, plane: Plane, end: Point) -> str:
+    """What may have been meant by an arc that is none: another plane, or X as a diameter, as on lathes."""
+    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    across = CENTRE_LETTERS[plane.across]
+    if "R" not in block.values and across in block.values and not all(letter in block.values for letter in letters):
+        return f"{across} is a centre in another plane, and G{plane.code // 10} is in force (lathes cut in G18)"
+    if control.modal.diameter or plane.code != LATHE_PLANE or control.modal.arc_absolute:
+        return ""
+    try:
+        centre_of(control, block, plane, (end[0], end[1] / 2), clockwise=True)
+    except Fault:
+        return ""
+    return "with X as a diameter the arc would be one: is the program for a lathe? X is read as a radius"
 
 
 def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:

@@ -1,4 +1,4 @@
-"""Arcs in the fast lane: the circles of all arcs of a stretch, as `arc_motion.arc` finds that of one block.
+"""Arcs in the fast lane: the circles of all arcs of a stretch, as the interpreters find that of one block.
 
 What blocks say is read as columns; where a centre lies, whether the control accepts the arc, and how far it turns, is
 asked of `follow.arcs`, arc by arc.
@@ -12,23 +12,22 @@ import numpy as np
 
 from ncfix.program.follow.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
 from ncfix.program.follow.builder import Circles
-from ncfix.program.follow.coordinates import IDENTITY
+from ncfix.program.follow.control import Control
+from ncfix.program.follow.coordinates import IDENTITY, X
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane_tables import LaneTables
-from ncfix.program.follow.stage import FloatArray, IntArray, Mask, Stage, words
-from ncfix.program.rs274.arc_motion import closure_mm
-from ncfix.program.rs274.control import Control
-from ncfix.program.rs274.unit import Unit
+from ncfix.program.follow.stage import FloatArray, IntArray, Mask, Stage, Text, words
 
 
-def turned(control: Control, unit: Unit, block: int, stage: Stage) -> tuple[Circles | None, int]:
+def turned(control: Control, unit: Text, block: int, stage: Stage) -> tuple[Circles | None, int]:
     """The circles of the arcs of a stage that begins with a block, and how many blocks run before one for `arc`.
 
     That is what the lane cannot take: an arc that the control refuses, or one without the words that it needs.
     """
-    count = fitting(control, unit, block, stage)
     assert stage.turns is not None
-    rows = np.flatnonzero(stage.turns[:count])
+    rows = np.flatnonzero(stage.turns | (stage.motion > 10))
+    count = fitting(control, unit, block, stage, rows) if rows.size else len(stage.mask)
+    rows = rows[stage.turns[rows] & (rows < count)]
     if not rows.size:
         return None, count
     plane = control.modal.plane
@@ -48,7 +47,8 @@ def turned(control: Control, unit: Unit, block: int, stage: Stage) -> tuple[Circ
     table = np.array(found, dtype=np.float64).reshape(-1, 3)
     local = np.zeros((len(rows), 3))
     local[:, columns] = table[:, :2]
-    return Circles(rows, begin[:, :3] + local, IDENTITY[plane.across], table[:, 2]), count
+    fixed = np.logical_or(*unit.lanes.fixed[unit.program.template[block + rows]][:, columns].T)
+    return Circles(rows, begin[:, :3] + local, IDENTITY[plane.across], table[:, 2], fixed), count
 
 
 def on_circle(
@@ -59,21 +59,24 @@ def on_circle(
     if not math.isnan(radius):
         return centre_from_radius(way, radius, clockwise=clockwise)
     point = centre[0], centre[1]
-    check_closure(point, way, closure_mm(control), control.dialect.closure_relative)
+    check_closure(point, way, control.closure_mm, control.dialect.closure_relative)
     return point
 
 
-def fitting(control: Control, unit: Unit, block: int, stage: Stage) -> int:
-    """How many blocks run before an arc without the words that it needs, or a straight motion with those of one."""
+def fitting(control: Control, unit: Text, block: int, stage: Stage, rows: IntArray) -> int:
+    """How many blocks run before an arc without the words that it needs, or a straight motion with those of one.
+
+    rows  (k,) the blocks that have such words, or that G2 or G3 is in force at
+    """
     assert stage.turns is not None
-    able, shapes = named(control, unit.lanes), unit.program.template[block : block + len(stage.mask)]
-    arcs = (stage.motion == CLOCKWISE) | (stage.motion == COUNTER)
-    odd = (stage.turns | (stage.mask != 0)) & (stage.turns != arcs) | stage.turns & ~able[shapes]
-    return int(np.argmax(odd)) if odd.any() else len(odd)
+    turns, motion = stage.turns[rows], stage.motion[rows]
+    arcs, able = (motion == CLOCKWISE) | (motion == COUNTER), named(control, unit.lanes)
+    odd = (turns | (stage.mask[rows] != 0)) & (turns != arcs) | turns & ~able[unit.program.template[block + rows]]
+    return int(rows[np.argmax(odd)]) if odd.any() else len(stage.mask)
 
 
 def named(control: Control, lanes: LaneTables) -> Mask:
-    """(s,) shapes with the words that an arc needs in the plane in force, as `arc_motion.check_words`; no spirals."""
+    """(s,) shapes with the words that an arc needs in the plane in force; no spirals."""
     plane = control.modal.plane
     if plane.across > 2:
         return np.zeros(len(lanes.turns), dtype=np.bool_)
@@ -81,16 +84,17 @@ def named(control: Control, lanes: LaneTables) -> Mask:
     centre = first & second if control.modal.arc_absolute else first | second
     ends_there = lanes.mask & (1 << plane.first | 1 << plane.second) != 0
     able: Mask = np.where(lanes.radius >= 0, ends_there, centre & ~across)
-    return able
+    return able & ~lanes.fixed[:, X] if control.modal.diameter else able
 
 
-def said(control: Control, unit: Unit, blocks: IntArray, begin: FloatArray) -> tuple[FloatArray, FloatArray]:
+def said(control: Control, unit: Text, blocks: IntArray, begin: FloatArray) -> tuple[FloatArray, FloatArray]:
     """What the centre words of blocks say, (k, 2) relative to their starts `begin`, and R, (k,) NaN without; in mm."""
     program, lanes, plane = unit.program, unit.lanes, control.modal.plane
-    shapes, first, unit_mm = program.template[blocks], program.first_number[blocks], control.modal.unit
+    shapes, first, mm = program.template[blocks], program.first_number[blocks], control.unit_of(X)
     columns = [plane.first, plane.second]
     centre = np.stack([words(program.numbers, first, lanes.centre[shapes, letter]) for letter in columns], axis=1)
-    centre = unit_mm * np.where(np.isnan(centre), 0.0, centre)
-    if control.modal.arc_absolute:
-        centre -= (begin - np.array(control.offset))[:, columns]
-    return centre, unit_mm * words(program.numbers, first, lanes.radius[shapes])
+    centre = mm * np.where(np.isnan(centre), 0.0, centre)
+    fixed = lanes.fixed[shapes][:, columns] | control.modal.arc_absolute
+    if fixed.any():
+        centre = np.where(fixed, centre - (begin - np.array(control.offset))[:, columns], centre)
+    return centre, mm * words(program.numbers, first, lanes.radius[shapes])
