@@ -55,6 +55,15 @@ def test_what_a_family_has_is_read_as_the_control_of_the_machine_has_it(
     assert dialects.detect(source, "part.nc", control).name == expected
 
 
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "haas", "mitsubishi"])
+@pytest.mark.parametrize(
+    "text",
+    ["G96 S200\nG1 X5. Y#1", "G50\nS2000", "(G50 S2000)", "G73 X1. Z-5. R2. P500 Q2000", "M3 G50 S800", "G97 S1"],
+)
+def test_what_milling_machines_do_is_no_sign_of_a_lathe(text: str, dialect: str) -> None:
+    assert read(f"{text}\n".encode(), dialect=dialect).dialect.name == dialect
+
+
 def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:
     grammar = tmp_path / "upper.lark"
     grammar.write_text("%import common (word, ADDRESS)\nblock: word*\n%override ADDRESS: /[XY]/\n", encoding="utf-8")

@@ -68,6 +68,8 @@ def test_blocks_of_the_family_can_be_read(text: str) -> None:
         ('CGTECH_MACRO "A" "B"', "NCF103"),
         ("G15 H1", "NCF103"),
         ("CALL OO88", "NCF103"),
+        ("N5 G50S1600 (LIMIT)", "NCF103"),
+        ("G73 P10 Q20 U0.4 W0.1", "NCF103"),
     ],
 )
 def test_what_is_not_of_the_family_is_refused_by_line(text: str, code: str) -> None:

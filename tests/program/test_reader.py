@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ncfix.diagnostics import SourceError
 from ncfix.program.reader import read
 from ncfix.program.tree import (
     Assignment,
@@ -227,6 +228,19 @@ def test_what_follows_the_tape_is_not_looked_at() -> None:
     assert [type(item) for item in program.items_of(0)] == [Tape]
     assert [type(item) for item in program.items_of(3)] == [Opaque]
     assert program.values_of(3).tolist() == []
+
+
+@pytest.mark.parametrize("comment", ['($Show("[a -> b] X5") )', "(a (1, 2))", "((a)\t)"])
+def test_iso_takes_a_comment_in_a_comment_where_both_end_together(comment: str) -> None:
+    """Whether the comment ends at the first parenthesis or at the second: no word stands between them."""
+    program = read(f"G0 X1 {comment}\n{comment} G1 X2 {comment}\n{comment}\nX3 {comment} Y4\n".encode(), dialect="iso")
+    assert_read_right(program)
+    words = [[i.address for i in program.items_of(b) if isinstance(i, Word)] for b in range(len(program))]
+    assert words == [["G", "X"], ["G", "X"], [], ["X", "Y"]]
+    for dialect, text in (("linuxcnc", comment), ("iso", f"{comment[:-1]} X5)")):
+        with pytest.raises(SourceError) as caught:
+            read(f"G0 X1 {text}\n".encode(), dialect=dialect)
+        assert caught.value.code == "NCF112"
 
 
 def test_comments_may_precede_the_tape() -> None:

@@ -108,25 +108,25 @@ PATTERN = "4 CYCL CALL PAT\n5 CALL LBL 1 REP {n}\n6 END PGM T MM"
 DRILL = "1 CYCL DEF 200 DRILLING Q200=2 Q201=-5 Q206=100 Q202=5 Q210=0 Q203=0 Q204=2 Q211=0\n"
 HOLES = DRILL + "2 PATTERN DEF ROW1 (X+0 Y+0 D+1 NUM500 ROT+0 Z+0)\n3 LBL 1\n"
 REPEATED = {
-    "linuxcnc, a cycle": ("linuxcnc", HOLE + "G81 X1 Z1 R2 L{n}\nM2"),
-    "linuxcnc, a subprogram": ("linuxcnc", "M98 P2 L{n}\nM2\nO2\nM99"),
-    "linuxcnc, a loop": ("linuxcnc", "o1 repeat [{n}]\no1 endrepeat\nM2"),
-    "fanuc, a cycle": ("fanuc", f"%\nO1\n{HOLE}G81 X1. Z1. R2. K{{n}}\nM30\n%"),
-    "fanuc, a subprogram": ("fanuc", "%\nO1\nM98 P2 L{n}\nM30\nO2\nM99\n%"),
-    "fanuc, a macro": ("fanuc", "%\nO1\nG65 P2 L{n}\nM30\nO2\nM99\n%"),
-    "siemens, a subprogram": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nM17"),
-    "siemens, of nothing": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nWORK P{n}\n%_N_WORK_SPF\n"),
-    "siemens, a section": ("siemens", "AA: G0 X1\nBB: G0 X2\nREPEAT AA BB P={n}\nM30"),
-    "klartext, a section": ("heidenhain", TWICE),
-    "klartext, a pattern": ("heidenhain", "0 BEGIN PGM T MM\n" + HOLES + PATTERN),
+    "linuxcnc, a cycle": ("linuxcnc", HOLE + "G81 X1 Z1 R2 L{n}\nM2", 4),
+    "linuxcnc, a subprogram": ("linuxcnc", "M98 P2 L{n}\nM2\nO2\nM99", 0),
+    "linuxcnc, a loop": ("linuxcnc", "o1 repeat [{n}]\no1 endrepeat\nM2", 0),
+    "fanuc, a cycle": ("fanuc", f"%\nO1\n{HOLE}G81 X1. Z1. R2. K{{n}}\nM30\n%", 4),
+    "fanuc, a subprogram": ("fanuc", "%\nO1\nM98 P2 L{n}\nM30\nO2\nM99\n%", 0),
+    "fanuc, a macro": ("fanuc", "%\nO1\nG65 P2 L{n}\nM30\nO2\nM99\n%", 0),
+    "siemens, a subprogram": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nM17", 0),
+    "siemens, of nothing": ("siemens", "SUB P{n}\nSUB\nM30\n%_N_SUB_SPF\nWORK P{n}\n%_N_WORK_SPF\n", 0),
+    "siemens, a section": ("siemens", "AA: G0 X1\nBB: G0 X2\nREPEAT AA BB P={n}\nM30", 8),
+    "klartext, a section": ("heidenhain", TWICE, 16),
+    "klartext, a pattern": ("heidenhain", "0 BEGIN PGM T MM\n" + HOLES + PATTERN, 2000),
 }
-"""Dialect and program that repeats something `n` times."""
+"""Dialect, program that repeats something `n` times, and the motions of three times."""
 
 
 @pytest.mark.parametrize("name", REPEATED)
 @pytest.mark.parametrize("times", [25_000, 99_999_999])
 def test_repeats_count_as_blocks(name: str, times: int) -> None:
-    dialect, text = REPEATED[name]
+    dialect, text, _ = REPEATED[name]
     with pytest.raises(SourceError) as caught:
         moves_of(dialect, text.format(n=times))
     assert caught.value.code == CODE
@@ -135,8 +135,8 @@ def test_repeats_count_as_blocks(name: str, times: int) -> None:
 
 @pytest.mark.parametrize("name", REPEATED)
 def test_few_repeats_are_followed(name: str) -> None:
-    dialect, text = REPEATED[name]
-    moves_of(dialect, text.format(n=3))
+    dialect, text, count = REPEATED[name]
+    assert len(moves_of(dialect, text.format(n=3))) == count
 
 
 def test_a_pattern_of_no_columns_is_none() -> None:

@@ -177,3 +177,23 @@ def test_impossible_words(text: str) -> None:
     with pytest.raises(SourceError) as caught:
         arc(text)
     assert caught.value.code in ("NCF220", "NCF210")
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        (
+            "G18 G0 X14 Z100\nG3 X28 Z93 I0 K-7",
+            "with X as a diameter the arc would be one: is the program for a lathe?",
+        ),
+        ("G18 G0 X14 Z100\nG3 X28 Z93 R5.1", "with X as a diameter the arc would be one: is the program for a lathe?"),
+        ("G18 G0 X14 Z100\nG3 X29 Z93 I0 K-7", "check the centre words"),
+        ("G17 G0 X14 Z100\nG3 X28 Z93 I0 K-7", "K is a centre in another plane, and G17 is in force"),
+        ("G17 G0 X14 Y100\nG3 X28 Y93 I0 J-7", "check the centre words"),
+    ],
+)
+def test_an_arc_that_is_none_says_what_may_be_meant(text: str, hint: str) -> None:
+    """Diameters of 14 and 28 are 7 apart, as are the ends along Z: a quarter of radius 7, or a chord of 9.9."""
+    with pytest.raises(SourceError) as caught:
+        follow(f"G21 F100 G0 Y0\n{text}", dialect="iso")
+    assert hint in caught.value.messages[0].hint

@@ -43,7 +43,7 @@ GOLDEN = {
     ),
     "o<hole> call [1]": (
         "part.ngc:1:1: NCF231: there is no subprogram o<hole>\n    o<hole> call [1]\n    ^\n"
-        "  hint: subprograms are looked for further down in the program and in files beside it"
+        "  hint: it is looked for further down, in files beside the program, and where --subprograms DIR says"
     ),
 }
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from ncfix.diagnostics import SourceError
 from ncfix.program.rs274 import arithmetic
-from program.tracing import follow, last
+from program.tracing import follow, last, reasons
+
+AXIS = "where the axis {} stands is known only at run time"
 
 
 def value_of(expression: str, before: str = "") -> float:
@@ -22,7 +25,8 @@ PRINTED = {
     "[2+3*4**2]": 50.0,
     "[10 mod 3]": 1.0,
     "[-7 mod 3]": 2.0,
-    "[1 eq 1.00005]": 1.0,
+    "[1 eq 1.0000005]": 1.0,
+    "[1 eq 1.0002]": 0.0,
     "[1 lt 1.00000001]": 1.0,
     "round[2.5]": 3.0,
     "round[-2.5]": -3.0,
@@ -35,8 +39,10 @@ PRINTED = {
     "[5-3 gt 1 and 2]": 1.0,
     "[-[2]**2]": 4.0,
     "[1 xor 1]": 0.0,
-    "[1 ne 1.00005]": 0.0,
-    "[2 le 1.99995]": 1.0,
+    "[1 ne 1.0000005]": 0.0,
+    "[2 le 1.99995]": 0.0,
+    "[1.99995 ge 2]": 0.0,
+    "[2 ge 2]": 1.0,
     "[10 / 4 * 2]": 5.0,
     "[7 - 2 - 1]": 4.0,
     "abs[-3]": 3.0,
@@ -93,6 +99,17 @@ def test_angles_are_degrees(angle: float) -> None:
     assert sine**2 + cosine**2 == pytest.approx(1.0, abs=1e-12)
     back = arithmetic.arc_tangent(sine, cosine)
     assert math.remainder(back - angle, 360.0) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("comparison", ["1 eq 1.00005", "1 ne 1.00005", "2 le 1.9999999", "1.9999999 ge 2"])
+def test_comparisons_that_versions_of_linuxcnc_decide_otherwise_are_known_at_run_time_only(comparison: str) -> None:
+    assert reasons(follow(f"G0 X[{comparison}]")) == [AXIS.format("X")]
+
+
+def test_a_loop_that_sums_up_to_its_end_runs_once_more_since_2_9_1() -> None:
+    """Seventy-five times 0.0005 are 0.037500000000000026."""
+    found = follow("#1=0\no1 while [#1 le 0.0375]\nG0 X#1\n#1=[#1+0.0005]\no1 endwhile\nG0 Y1")
+    assert reasons(found) == [""] * 75 + ["which blocks are executed here is decided at run time"] * 2
 
 
 @given(st.sampled_from(["eq", "ne", "gt", "ge", "lt", "le"]), numbers, numbers)
@@ -185,3 +202,18 @@ def test_what_cannot_be_computed_is_an_error(text: str, code: str) -> None:
 def test_a_number_next_to_a_whole_one_is_one() -> None:
     assert value_of("#[1.00005]", "#1=3") == 3.0
     assert value_of("#[0.99995]", "#1=3") == 3.0
+
+
+def test_pins_and_entries_of_the_machine_are_known_at_run_time_only() -> None:
+    found = follow("F#<_hal[plasma.feed]>\nG1 X1\nG1 Y#<_ini[TABLE]PARK> X2\nG0 X3 Y3\nG0 X#<_hal[motion.x]>")
+    assert reasons(found) == ["", AXIS.format("Y"), "", AXIS.format("X")]
+    assert np.isnan(found.moves.feed[0])
+
+
+def test_the_setup_may_give_the_value_of_a_pin() -> None:
+    assert last(follow("G0 X#<_HAL[a.b-c]>", variables={"#<_hal[a.b-c]>": 2.5}))[0] == 2.5
+
+
+def test_a_branch_that_a_pin_decides_is_decided_at_run_time() -> None:
+    found = follow("G0 X1\no1 if [#<_hal[a.b]> GT 1]\nG0 X2\no1 endif\nG0 X3")
+    assert reasons(found) == ["", "which blocks are executed here is decided at run time"]

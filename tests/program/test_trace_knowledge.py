@@ -235,6 +235,13 @@ def test_smoothing_names_axes_and_moves_none(dialect: str) -> None:
     assert ends(followed) == [[1, 2, 3], [4, 2, 3]]
 
 
+def test_probing_leaves_alone_what_it_does_not_move() -> None:
+    text = "G38.2 Z-5 F1\nG0 Z1\nG0 X5 Y5"
+    assert reasons(follow(text, axes="XYZB", setup=Setup(assume_zero=True))) == ["probing", "", ""]
+    turned = follow("G10 L2 P1 R30\nG38.2 X-5 F1\nG0 Z1\nG0 X5", setup=Setup(assume_zero=True))
+    assert "after probing" in reasons(turned)[-1]
+
+
 def test_skip_signals_are_probing() -> None:
     assert reasons(follow("G31 Z-5 F1\nG0 Z1", dialect="iso")) == ["probing", ""]
 

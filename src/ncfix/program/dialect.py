@@ -20,6 +20,21 @@ FOREIGN: tuple[tuple[str, bytes], ...] = (
 With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets.
 """
 
+LATHE = "lathe code (X a diameter, U and W increments)"
+TURNING: tuple[tuple[str, bytes], ...] = (
+    (LATHE, rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?(G[ \t]*50[ \t]*S[ \t]*\d)"),
+    (LATHE, rb"(?im)^[^(;\n]*(?<![A-Z])(G[ \t]*7(?:[0-2]|3(?=[^(;\n]*[UW]))[ \t]*P[ \t]*\d+[ \t]*Q[ \t]*\d)"),
+    (
+        LATHE,
+        rb"(?im)\A(?!(?s:.*)^[^(;\n]*(?<![A-Z])Y[ \t]*[-+.\d#\[])(?s:.*?)^[^(;\n]*(?<![A-Z])(G[ \t]*96(?![\d.]))",
+    ),
+)
+"""What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
+blocks of a contour (P and Q), or constant surface speed (G96) in a text that names no Y."""
+
+HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
+"""What helps with a language that is refused by name, where it is another thing than to name the dialect."""
+
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
@@ -33,6 +48,7 @@ class Dialect:
     variant_of          the dialect of which this is a variant: a text that shows that one is read as this where the
                         machine has this control
     foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
+                        whose first group, if there is one, is what shows it
     line_limit          characters a line may have, its end not counted; 0 = no limit
     comment             how to write a one-line comment, with `{}` for the text
     upper_case          comments are written in upper case: older controls know no other letters

@@ -21,8 +21,8 @@ from ncfix.program.levels import LevelBook
 from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
-from ncfix.program.standstill import passed_through, renamed
-from ncfix.program.target import TANGENTIAL, Rendered, Target
+from ncfix.program.standstill import jumps, passed_through, renamed
+from ncfix.program.target import TANGENTIAL, Rendered, Target, plane_across
 from ncfix.program.tree import Program, view
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone, turns_alone
 from ncfix.program.writer import Edit, Splices
@@ -124,7 +124,7 @@ class _Emitter:
         self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
         self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
         self.decimals = [frame.decimals(least_increment) for frame in self.frames]
-        self.jumps = _jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
+        self.jumps = jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
         self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
         self.first_piece = self.bulk.first_piece
         self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
@@ -138,6 +138,7 @@ class _Emitter:
         self.levels = LevelBook(moves, pieces)
         self.written: dict[int, Rendered] = {}
         self.latest, self.added = list[int](), 0
+        self.in_stretch = np.zeros(len(moves), dtype=bool)
         self.conflicts, self.replaced_by = dict[int, str](), -1
         self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
 
@@ -162,6 +163,7 @@ class _Emitter:
                 self.cycle_end = None
                 self.levels.forget()
             row += 1
+        self._turn()
         splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
 
@@ -180,20 +182,35 @@ class _Emitter:
         if self.replaced is not None:
             return 0
         frame, before = self.reading.frame[row], len(self.bulk.parts)
-        taken = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
-        if taken is None:
+        ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
+        if ends is None:
             return 0
         if self.latest:
             self.bulk.parts.insert(before, Splices.of(self._edits()))
-        first, ends = self.first_piece[row], taken.ends
+        first = self.first_piece[row]
         stop = int(np.searchsorted(self.first_piece, first + len(ends)))
         self.end[first : first + len(ends)] = ends
         self.start[row] = self.position
         self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
-        self.centre[first + taken.arcs] = taken.centre
+        self.in_stretch[row:stop] = True
         self.position = ends[-1].copy()
         self.cycle_end = None
         return stop - row
+
+    def _turn(self) -> None:
+        """Write the centres of the arcs in stretches; where these are not clear, the arc by itself."""
+        rows = self.pieces.move[np.flatnonzero(self.pieces.arc)]
+        rows = rows[self.in_stretch[rows]]
+        frames = self.reading.frame[rows]
+        for frame in np.unique(frames).tolist():
+            own = rows[frames == frame]
+            at = self.first_piece[own]
+            ends = self.start[own], self.end[at]
+            clear, centre = self.bulk.turn(own, ends, self.frames[frame], self.decimals[frame])
+            self.centre[at[clear]] = centre
+            for row in own[~clear].tolist():
+                self.position, self.replaced = self.start[row], None
+                self._write(row)
 
     # -- the control's book -------------------------------------------------------------------------------------------
 
@@ -314,7 +331,7 @@ class _Emitter:
             centre=frame.program_point(pieces.centre[rows.start]) if arc else NOWHERE,
             original_centre=as_programmed.program_point(moves.centre[row]) if kind == Kind.ARC else NOWHERE,
             origin=_spatial(nominal_start, moves.axes, as_programmed),
-            plane=_plane(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
+            plane=plane_across(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
             spatial=self.spatial,
             diameter=frame.frame.diameter,
             incremental=bool(moves.incremental[row]),
@@ -379,22 +396,3 @@ def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> Flo
     if frame.frame.diameter:
         values[0] /= 2
     return values
-
-
-def _plane(normal: FloatArray) -> tuple[int, int, int]:
-    """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
-    across = int(np.argmax(np.abs(normal)))
-    return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
-
-
-def _jumps(moves: Moves) -> NDArray[np.bool_]:
-    """(n, n_axes) where a motion does not start where the one before ended.
-
-    Where tool-centre-point control goes on or off, or has another length, linear axes stand elsewhere as soon as the
-    rotary axes are not quite at zero any more, though the program may have left them there.
-    """
-    jumps = np.zeros(moves.start.shape, dtype=bool)
-    jumps[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
-    longer = moves.tcp[1:] & (moves.tool_length[1:] != moves.tool_length[:-1])
-    jumps[1:] |= (longer | (moves.tcp[1:] != moves.tcp[:-1]))[:, None] & ~moves.rotary
-    return jumps

@@ -27,7 +27,7 @@ class FrameMap:
         self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
 
     def program(self, command: FloatArray) -> FloatArray:
-        """Program numbers of a command."""
+        """Program numbers of a command (..., n_axes), mm and rad: in units of the program, in its frame."""
         values = command - self.frame.offset
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation)
@@ -49,7 +49,7 @@ class FrameMap:
         return result
 
     def command(self, program: FloatArray) -> FloatArray:
-        """Command of program numbers."""
+        """The inverse of `program`."""
         values = program * self.scale
         if self.rotated:
             values[..., self.spatial] = _turned(values[..., self.spatial], self.rotation.T)
@@ -60,7 +60,7 @@ class FrameMap:
         return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
 
     def command_point(self, point: FloatArray) -> FloatArray:
-        """The inverse of `program_point`."""
+        """The inverse of `program_point`, (..., 3)."""
         return np.asarray((point * self.unit) @ self.frame.rotation.T + self.origin)
 
 

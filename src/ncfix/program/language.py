@@ -46,11 +46,13 @@ class ArcLayout:
     """Where the words that say where the centre of an arc is stand in the blocks of one shape.
 
     centre  I J K -> which of the block's numbers each has
+    fixed   which of them count from the origin, whatever else is in force
     radius  which of them R has, and where that word stands, with the blank before it; None without
     """
 
     centre: Mapping[str, int]
     radius: tuple[int, Span] | None = None
+    fixed: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

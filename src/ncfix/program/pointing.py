@@ -91,7 +91,7 @@ class Pointing:
         return beyond <= 0, list(zip(first, second, strict=True))
 
     def at_pole(self, direction: FloatArray) -> bool:
-        """Whether the tool would stand along the line of the outer axis."""
+        """Whether a tool along the unit vector `direction` (3,) would stand along the line of the outer axis."""
         return math.hypot(*cross(self.lines[0], _triple(direction))) < POLE
 
     def stray(self, start: tuple[float, float], stop: tuple[float, float]) -> float:

@@ -24,13 +24,13 @@ from ncfix.program.dialect import Dialect
 from ncfix.program.faults import BlockError
 from ncfix.program.language import Language, language_of
 from ncfix.program.reach import UNREAD, Reach
-from ncfix.program.shapes import Scan
+from ncfix.program.shapes import Scan, firsts
 from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.program.writer import line_end
 
-PART_BYTES = 1 << 19
-"""How much text is scanned at once: the columns of a scan take about a hundred times as much."""
+PART_BYTES = 1 << 21
+"""How much text is scanned at once."""
 
 COMPILED_PART_BYTES = 1 << 22
 """The same, compiled: the columns take no more than the result."""
@@ -313,8 +313,3 @@ def joined(parts: list[Columns]) -> Columns:
     """The columns of parts that follow each other."""
     counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
     return Columns(firsts(counts), spans, values)
-
-
-def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
-    return np.concatenate(([0], np.cumsum(counts)))

@@ -55,6 +55,7 @@ class Setup:
                       an increment system: "IS-B" (X50 is 0.050 mm); empty: not given, and asked for where it matters
     most_blocks       blocks that may be executed beyond those of the text; with more the program counts as endless
     passed_codes      G codes of the machine's builder that move nothing and change no coordinates, in tenths (G5.3: 53)
+    subprograms       folders in which subprograms are looked for that are not beside the program
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 
@@ -72,3 +73,4 @@ class Setup:
     no_point: str = ""
     passed_codes: frozenset[int] = frozenset()
     named_tools: Mapping[str, Tool] = field(default_factory=dict)
+    subprograms: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -95,6 +96,7 @@ class Reading:
             "no_point": self.no_point,
             "most_blocks": self.count,
             "passed_codes": self.codes,
+            "subprograms": self.folders,
         }
         if key not in readers:
             close = get_close_matches(key, readers, 1)
@@ -117,6 +119,17 @@ class Reading:
         if not isinstance(value, list) or len(found) < len(value) or None in found:
             self.fault(WRONG_VALUE, key, f'expected a list of G codes such as ["G332"], found {value!r}')
         return codes
+
+    def folders(self, key: str, value: Any) -> tuple[str, ...]:
+        """A list of folders that there are; a relative path counts from that of the setup file."""
+        if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
+            self.fault(WRONG_VALUE, key, f"expected a list of folders, found {value!r}")
+            return ()
+        found = tuple(os.path.join(os.path.dirname(self.path), each) for each in value)
+        for folder in found:
+            if not os.path.isdir(folder):
+                self.fault(WRONG_VALUE, key, f"there is no folder {folder}")
+        return found
 
     # -- single values ------------------------------------------------------------------------------------------------
 

@@ -61,3 +61,16 @@ def _state(moves: Moves, row: int) -> TcpState:
     """Whether tool-centre-point control is on in a motion, and with which length."""
     on = bool(moves.tcp[row])
     return TcpState(on, float(moves.tool_length[row]) if on else 0.0)
+
+
+def jumps(moves: Moves) -> NDArray[np.bool_]:
+    """(n, n_axes) where a motion does not start where the one before ended.
+
+    Where tool-centre-point control goes on or off, or has another length, linear axes stand elsewhere as soon as the
+    rotary axes are not quite at zero any more, though the program may have left them there.
+    """
+    found = np.zeros(moves.start.shape, dtype=bool)
+    found[1:] = ~(moves.start[1:] == moves.end[:-1]) & ~(np.isnan(moves.start[1:]) & np.isnan(moves.end[:-1]))
+    longer = moves.tcp[1:] & (moves.tool_length[1:] != moves.tool_length[:-1])
+    found[1:] |= (longer | (moves.tcp[1:] != moves.tcp[:-1]))[:, None] & ~moves.rotary
+    return found

@@ -128,3 +128,9 @@ class Rendered:
     def text(self) -> tuple[object, ...]:
         """What the control reads; two executions of a block agree when this is equal."""
         return (tuple(self.edits), tuple(self.lines))
+
+
+def plane_across(normal: FloatArray) -> tuple[int, int, int]:
+    """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
+    across = int(np.argmax(np.abs(normal)))
+    return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]

@@ -170,7 +170,7 @@ TRACE_CODES: dict[str, Code] = {
     "NCF231": Code(
         "Subprogram not found",
         "A subprogram is called that is neither in the program nor in a file of its name beside it.",
-        "Put its file beside the program.",
+        "Put its file beside the program, or name its folder with --subprograms, or in the setup file.",
     ),
     "NCF232": Code(
         "Subprograms nested too deep",

@@ -282,6 +282,7 @@ class Program:
     numbers: NDArray[np.float64]
     first_line: int = 1
     line_end: bytes = b"\n"
+    _lines_ended: int = field(default=-1, init=False, repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.template)
@@ -296,11 +297,11 @@ class Program:
         return self.templates[int(self.template[block])].items
 
     def values_of(self, block: int) -> NDArray[np.float64]:
-        """The values of the block's numbers, by slot."""
+        """The values of the block's numbers, by slot, (k,), as written."""
         return self.numbers[self.first_number[block] : self.first_number[block + 1]]
 
     def column(self, address: str) -> NDArray[np.float64]:
-        """The plain numbers after an address, one row per block; NaN where there is none, or not a plain one."""
+        """The plain numbers after an address, (n,), one for each block; NaN where there is none, or not a plain one."""
         slot = np.array([template.slots.get(address, -1) for template in self.templates], dtype=np.int64)[self.template]
         values = np.full(len(self), np.nan)
         rows = np.flatnonzero(slot >= 0)
@@ -324,8 +325,10 @@ class Program:
 
     @property
     def lines_ended(self) -> int:
-        """How many lines of the text have an end; blocks may go over several."""
-        return self.lines_ended_before(len(self.source))
+        """How many lines of the text have an end; blocks may go over several. Counted once."""
+        if self._lines_ended < 0:
+            object.__setattr__(self, "_lines_ended", _counted(self.source, "\n"))
+        return self._lines_ended
 
     def line(self, block: int) -> int:
         """The line number (from 1) on which the block starts."""
@@ -333,8 +336,10 @@ class Program:
         return self.first_line + self.lines_ended_before(int(self.blocks[block, 0]), character)
 
     def lines_ended_before(self, stop: int, character: str = "\n") -> int:
-        """How many lines end before a byte; `bytes.count` takes several times as long where there are many."""
-        return int(np.count_nonzero(np.frombuffer(self.source, dtype=np.uint8, count=stop) == ord(character)))
+        """How many lines end before a byte."""
+        if character == "\n" and 2 * stop > len(self.source):
+            return self.lines_ended - _counted(self.source, character, stop)
+        return _counted(self.source, character, 0, stop)
 
     def lines(self, blocks: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """The line numbers on which blocks (n,) start, all at once."""
@@ -352,6 +357,11 @@ class Program:
 
     def __iter__(self) -> Iterator[int]:
         return iter(range(len(self)))
+
+
+def _counted(text: bytes, character: str, start: int = 0, stop: int | None = None) -> int:
+    """How often a character is there; `bytes.count` takes several times as long where there are many."""
+    return int(np.count_nonzero(np.frombuffer(text, dtype=np.uint8)[start:stop] == ord(character)))
 
 
 def view(array: NDArray[Any]) -> Sequence[Any]:

@@ -87,7 +87,10 @@ def is_dragged(target: Target) -> bool:
 
 
 def way(letters: tuple[str, ...], begin: FloatArray, end: FloatArray, diameter: bool) -> float:
-    """The way that F is the speed of, in program units: of linear axes, of rotary axes where none of those moves."""
+    """The way that F is the speed of, in program units: of linear axes, of rotary axes where none of those moves.
+
+    begin, end  (n_axes,) program numbers; `diameter`: those of X are twice the way
+    """
     step = end - begin
     if diameter and "X" in letters:
         step[letters.index("X")] /= 2

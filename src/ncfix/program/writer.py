@@ -91,11 +91,13 @@ class Splices:
         """The same so many bytes further on."""
         return replace(self, start=self.start + way, stop=self.stop + way)
 
-    def before(self, place: int) -> Splices:
-        """Those before a byte of the source, where they are in order."""
-        count = int(np.searchsorted(self.start, place))
-        length = self.length[:count]
-        return Splices(self.start[:count], self.stop[:count], length, self.data[: int(length.sum())])
+    def outside(self, spans: NDArray[np.int64]) -> Splices:
+        """Those that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
+        starts, stops = np.sort(spans, axis=0).T
+        at = np.searchsorted(starts, self.start, side="right") - 1
+        kept = (at < 0) | (self.start > stops[at])
+        data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(kept, self.length)]
+        return Splices(self.start[kept], self.stop[kept], self.length[kept], data.tobytes())
 
     def edits(self) -> Iterator[Edit]:
         """One by one."""
@@ -123,7 +125,7 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     other = np.flatnonzero(splices.length != stop - start)
     if FEW * len(other) > len(splices):
         return _laid_out(source, splices)
-    return _put_in(*_in_place(source, splices, other), splices, other)
+    return _put_in(_in_place(source, splices, other), splices, other)
 
 
 def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
@@ -140,29 +142,29 @@ FEW = 16
 """Where no more than one in so many edits changes the length of the text, the others are made where they stand."""
 
 
-def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> tuple[memoryview, list[bytes]]:
-    """The source with all edits made but the `other` ones, which change its length; and the replacements of these."""
-    ends = np.cumsum(splices.length)
-    text, kept, left, done = bytearray(source), [], [], 0
-    for begin, end in zip((ends - splices.length)[other].tolist(), ends[other].tolist(), strict=True):
-        kept.append(splices.data[done:begin])
-        left.append(splices.data[begin:end])
-        done = end
-    kept.append(splices.data[done:])
-    stops = splices.stop.copy()
-    stops[other] = 0
-    cells = np.frombuffer(text, dtype=np.uint8)
-    cells[_cover(len(text), splices.start, stops)] = np.frombuffer(b"".join(kept), np.uint8)
-    return memoryview(text), left
+def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> memoryview:
+    """The source with all edits made but the `other` ones, which change its length."""
+    text, begins, length = bytearray(source), np.cumsum(splices.length) - splices.length, splices.length.copy()
+    length[other] = 0
+    for size in (np.flatnonzero(np.bincount(length)[1:]) + 1).tolist():
+        rows = np.flatnonzero(length == size)
+        _stretches(text, size)[splices.start.take(rows)] = _stretches(splices.data, size)[begins.take(rows)]
+    return memoryview(text)
 
 
-def _put_in(text: memoryview, texts: list[bytes], splices: Splices, other: NDArray[np.int64]) -> bytes:
+def _stretches(text: bytes | bytearray, size: int) -> NDArray[np.void]:
+    """The `size` bytes from each byte of a text on."""
+    return np.ndarray((len(text) - size + 1,), f"V{size}", text, strides=(1,))
+
+
+def _put_in(text: memoryview, splices: Splices, other: NDArray[np.int64]) -> bytes:
     """The text with the `other` edits made, too."""
     pieces: list[bytes | memoryview] = []
     done = 0
-    starts, stops = splices.start[other].tolist(), splices.stop[other].tolist()
-    for start, stop, new in zip(starts, stops, texts, strict=True):
-        pieces += (text[done:start], new)
+    ends = np.cumsum(splices.length)[other]
+    edges = (splices.start[other], splices.stop[other], ends - splices.length[other], ends)
+    for start, stop, begin, end in zip(*(edge.tolist() for edge in edges), strict=True):
+        pieces += (text[done:start], splices.data[begin:end])
         done = stop
     return b"".join([*pieces, text[done:]])
 

@@ -44,6 +44,14 @@ def test_words(text: str, end: list[float]) -> None:
     assert last(follow(text)) == pytest.approx(end)
 
 
+@pytest.mark.parametrize(("value", "end"), [(1, 10), (2, 5), (3, 5)])
+def test_machine_data_say_whether_x_is_a_diameter_at_the_start(value: float, end: float) -> None:
+    given = {"$MC_GCODE_RESET_VALUES[28]": value}
+    found = follow("G96 S100 M4\nG0 X10\nDIAMOF\nX10", variables=given)
+    assert [row[0] for row in ends(found)] == [end, 10]
+    assert reasons(found) == ["", ""]
+
+
 @pytest.mark.parametrize(
     ("word", "angle"), [("DC(350)", -10), ("DC(10)", 10), ("ACP(350)", 350), ("ACN(10)", -350), ("IC(30)", 30)]
 )

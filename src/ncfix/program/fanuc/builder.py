@@ -26,7 +26,11 @@ def is_builders(label: str) -> bool:
 
 def ran(control: Control, label: str) -> None:
     """Such a program has run."""
-    control.warn(NOT_AT_HAND, TAKEN.format(label=label), "put its file beside the program, or check what it sets")
+    control.warn(
+        NOT_AT_HAND,
+        TAKEN.format(label=label),
+        "check what it sets, or say where its file is: --subprograms DIR",
+    )
     control.lose(control.machine, AFTER.format(label=label))
     control.places.lose(mask_of(control.machine))
     control.modal.motion, control.modal.feed, control.modal.cycle.initial = NO_MOTION, math.nan, None

@@ -6,6 +6,7 @@ Source: Fanuc 30i operator's manual (machining centre), "Programmable data input
 from __future__ import annotations
 
 from ncfix.program.follow.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.program.follow.motion import Motion
 from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
@@ -68,7 +69,7 @@ def made(control: Control, block: Block, code: int) -> None:
     """A text or a pocket that the control mills by itself, and the way back from a reference point."""
     gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
     unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
-    control.move(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code])
+    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code]))
 
 
 def set_data(control: Control, block: Block, code: int) -> None:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.program.fanuc import tilt
-from ncfix.program.fanuc.vectors import turning
 from ncfix.program.follow.coordinates import Rotation, X, Y, Z, as_rotation
 from ncfix.program.moves import TcpState
 from ncfix.program.rs274.control import Block
@@ -47,8 +46,8 @@ def dynamic_offset(control: MacroControl, block: Block, code: int) -> None:
 def axes_in_workpiece(control: MacroControl) -> Rotation | None:
     """The directions of the machine's X, Y and Z in the workpiece, as columns; None if they are not known."""
     machine, kinematics = control.machine, control.kinematics
-    control.settle(turning(control))
-    if kinematics is None or not {X, Y, Z} <= {*machine} or control.unknown.keys() & {*turning(control)}:
+    control.settle(control.turning)
+    if kinematics is None or not {X, Y, Z} <= {*machine} or control.unknown.keys() & {*control.turning}:
         return None
     at_tip = TcpState(False, 0.0), TcpState(True, 0.0)
     still = [control.position[index] if control.rotary[index] else 0.0 for index in machine]
@@ -64,4 +63,4 @@ def axes_in_workpiece(control: MacroControl) -> Rotation | None:
 
 def turned(control: MacroControl, block: Block) -> bool:
     """Whether a block has a word of a rotary axis that would turn the tables under the offset."""
-    return control.dynamic and any(block.axes >> index & 1 for index in turning(control))
+    return control.dynamic and any(block.axes >> index & 1 for index in control.turning)

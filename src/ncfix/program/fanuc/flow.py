@@ -193,7 +193,7 @@ class MacroFlow:
                 return unit, at + 1
         file = self.find(label)
         if file is None:
-            hint = "it is looked for in the file and in files beside it"
+            hint = "it is looked for in the file, in files beside it, and where --subprograms DIR says"
             raise Fault(NO_SUBPROGRAM, f"there is no program O{label}", hint)
         outline = self.outline_of(file)
         first = outline.starts[0] if outline.starts else -1

@@ -99,11 +99,10 @@ class MacroInterpreter(Interpreter):
         return (unit.program.templates[unit.program.template[block]] for block in range(self.flow.block, len(unit)))
 
     def takes_stretches(self) -> bool:
-        """Not while a macro is called after every motion, words are polar, or a corner is put in."""
-        special = (
-            self.modal_calls or self.cornered or self.control.polar is not None or self.control.scaling is not None
-        )
-        return super().takes_stretches() and not special
+        """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
+        control = self.control
+        special = control.polar is not None or control.scaling is not None or control.vectors
+        return super().takes_stretches() and not (special or self.modal_calls or self.cornered)
 
     def position_read(self, number: int) -> None:
         """The program reads where the machine stands, which compensation changes."""
@@ -185,12 +184,7 @@ class MacroInterpreter(Interpreter):
             block.runtime |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
         codes = set() if plan.codes is None else set(plan.codes.g.values())
         self.at_once(codes)
-        for letter in plan.pointless:
-            if self.is_scaled(letter, plan.codes) and not (letter == "R" and self.is_level(plan)):
-                self.span = next(word.span for word in plan.template.words if word.address == letter)
-                angle = self.is_angle(letter, plan.codes)
-                block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
-        self.span = None
+        self.take_points(plan, block)
         if G16 in codes:
             polar.switch(self.control, block, G16)
         if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
@@ -198,6 +192,15 @@ class MacroInterpreter(Interpreter):
         if scaling.ON in codes and "P" in plan.pointless:
             block.runtime |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
         return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
+
+    def take_points(self, plan: Plan, block: Block) -> None:
+        """Numbers without a decimal point count increments, or as the setup says."""
+        for letter in plan.pointless:
+            if self.is_scaled(letter, plan.codes) and not (letter == "R" and self.is_level(plan)):
+                self.span = next(word.span for word in plan.template.words if word.address == letter)
+                angle = self.is_angle(letter, plan.codes)
+                block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
+        self.span = None
 
     def at_once(self, codes: set[int]) -> None:
         """Unit, plane, G90 and G91 of a block already say what its own numbers mean."""
@@ -217,7 +220,7 @@ class MacroInterpreter(Interpreter):
         super().settings(codes, block)
         lone_number(self.control, block, codes)
         if self.control.vectors and codes.takes and block.values.keys() & {*vectors.COMPONENTS}:
-            self.control.lose(vectors.turning(self.control), vectors.AFTER_VECTOR)
+            self.control.lose(self.control.turning, vectors.AFTER_VECTOR)
         changed = self.control.offsets.tool[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)
@@ -285,7 +288,7 @@ class MacroInterpreter(Interpreter):
 
     def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
         """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
-        control, axes = self.control, vectors.turning(self.control)
+        control, axes = self.control, self.control.turning
         before, why = control.refusal, "" if MACHINE in codes.g.values() else vectors.directed(control, block, motion)
         control.refusal = before or why
         super().move(block, codes, motion)

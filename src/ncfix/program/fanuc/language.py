@@ -15,17 +15,17 @@ from ncfix.program.fanuc.corners import axes_of_corner, has_corners
 from ncfix.program.fanuc.following import MacroFollower, runs_straight_on
 from ncfix.program.fanuc.interpreter import MacroInterpreter
 from ncfix.program.fanuc.render import render
-from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Run
 from ncfix.program.layout import CENTRE_LETTERS, Layout
-from ncfix.program.moves import Trace
+from ncfix.program.moves import Kind, Moves, Trace
+from ncfix.program.pieces import Pieces
 from ncfix.program.rs274.language import RS274, writable
-from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.shapes import Scan, scan
 from ncfix.program.tree import Literal, Program
 
 if TYPE_CHECKING:
+    from ncfix.program.flatten import FlatLine
     from ncfix.program.language import Language
 
 
@@ -49,18 +49,26 @@ def follow(program: Program, run: Run) -> Trace:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
+    from ncfix.program.rs274.unroll import unrolled
+
     return unrolled(following(program, run), steps, limit)
 
 
 def in_bulk(program: Program, block: int) -> BulkLayout | None:
     """What blocks need to be written many at a time; those with a number without a point are not."""
     words = program.templates[int(program.template[block])].words
-    if any(word.address in CENTRE_LETTERS for word in words):
-        return None
     if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
         return None
     assert RS274.bulk is not None
     return None if has_corners(program) else RS274.bulk(program, block)
+
+
+def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) straight motions with I J K: there these give the direction of the tool (G43.5)."""
+    shapes = [any(word.address in CENTRE_LETTERS for word in template.words) for template in program.templates]
+    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    pointed &= moves.kind != Kind.ARC
+    return pointed
 
 
 def layout(program: Program, block: int) -> Layout | None:
@@ -78,6 +86,7 @@ FANUC: Language = replace(
     alike=False,
     render=render,
     bulk=in_bulk,
+    one_by_one=one_by_one,
     unroll=unroll,
     follower=MacroFollower,
     straight=runs_straight_on,

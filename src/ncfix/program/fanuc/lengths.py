@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.program.fanuc.data import CHANGED
-from ncfix.program.fanuc.vectors import INCLINED, turning
+from ncfix.program.fanuc.vectors import INCLINED
 from ncfix.program.follow.coordinates import Z
 from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274 import lengths
@@ -70,7 +70,7 @@ def direct(control: MacroControl, block: Block, code: int) -> None:
     control.suspended.pop(INCLINED, None)
     control.vectors = code == BY_VECTOR
     if control.vectors:
-        control.places.lose(mask_of(turning(control)))
+        control.places.lose(mask_of(control.turning))
         if block.get("Q") != 0.0:
             control.suspended[INCLINED] = INCLINED
 
@@ -93,7 +93,7 @@ def settled(control: MacroControl) -> bool:
 
 def note_turned(control: MacroControl) -> None:
     """What X Y Z count from if rotary axes stand turned where G43.4 is switched on depends on the control."""
-    if not control.tcp and any(control.rotary[i] and abs(control.position[i]) > NOTHING for i in control.machine):
+    if not control.tcp and any(abs(control.position[i]) > NOTHING for i in control.turning):
         control.warn(TURNED, TURNED_TEXT, "switch G43.4 on with the rotary axes at zero, or check the parameters")
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ncfix.program.follow.motion import Motion
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
@@ -28,7 +29,7 @@ def check(control: Control, block: Block, code: int) -> None:
     """G27: to the words, which should be a reference point."""
     if block.axes:
         target, unknown = destination(control, block)
-        control.move(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED)
+        control.make(Motion(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED))
 
 
 def named(control: Control, block: Block, code: int) -> None:
@@ -38,7 +39,7 @@ def named(control: Control, block: Block, code: int) -> None:
         return
     unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
     passing = REFERENCE_POINT.format("G28")
-    control.move(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing)
+    control.make(Motion(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
 
 
 def cancelling(control: MacroControl, block: Block, code: int) -> None:
@@ -58,7 +59,7 @@ def further(control: Control, block: Block, code: int) -> None:
     way, unknown = destination(control, block)
     passing = REFERENCE_POINT.format(f"G30 P{number}")
     if way != control.position or (block.axes and not control.modal.incremental):
-        control.move(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing)
+        control.make(Motion(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
     unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
-    control.move(Kind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing)
+    control.make(Motion(Kind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ncfix.program.fanuc.planes import are_square, by_axes, by_points, euler, in_order
-from ncfix.program.fanuc.squaring import SQUARED, turned_square
+from ncfix.program.fanuc.squaring import SQUARED, Squared, turned_square
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import (
     IDENTITY,
@@ -23,6 +23,7 @@ from ncfix.program.follow.coordinates import (
     Z,
     zeros,
 )
+from ncfix.program.follow.motion import Motion
 from ncfix.program.moves import Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.settings import unfollowed
@@ -151,23 +152,32 @@ def align(control: MacroControl, block: Block, code: int) -> None:
 
     In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
     """
-    turning = [index for index in control.machine if control.rotary[index]]
+    turning = control.turning
     control.settle(turning)
-    target, unknown = control.position[:], dict(control.unknown)
+    target, lost = control.position[:], set[int]()
     found = turned_square(control) if turning else None
-    if turning and found is None:
-        unknown |= {index: NOT_SOLVED for index in (*turning, X, Y, Z) if index in control.machine}
-    elif found is not None:
+    if found is not None:
         target = found.about_tip if code == ABOUT_TIP else found.position
-        if not unknown.keys().isdisjoint((X, Y, Z)):
-            unknown |= {index: NOT_SOLVED for index in (X, Y, Z) if index in control.machine}
         if found.several:
-            angles = " ".join(f"{LETTERS[index]}{found.degrees[index]:.3f}" for index in turning)
-            name = f"G{code / 10:g}"
-            control.warn(TURNED_TO, f"{name} is taken to turn to {angles}, the nearest of several ways", SQUARED)
-    if code == ABOUT_TIP and (block.get("R") or not control.length_code or is_other_length(control, block)):
-        unknown |= {index: NOT_SOLVED for index in (X, Y, Z) if index in control.machine}
-    control.move(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code])
+            note_choice(control, found, code)
+    elif turning:
+        lost |= {*turning, X, Y, Z}
+    hidden = found is not None and not control.unknown.keys().isdisjoint((X, Y, Z))
+    if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
+        lost |= {X, Y, Z}
+    unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
+    control.make(Motion(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
+
+
+def note_choice(control: MacroControl, found: Squared, code: int) -> None:
+    """Say to which angles the rotary axes are taken to turn."""
+    angles = " ".join(f"{LETTERS[index]}{found.degrees[index]:.3f}" for index in control.turning)
+    control.warn(TURNED_TO, f"G{code / 10:g} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+
+
+def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
+    """Whether G53.6 leads the tip elsewhere: along the tool (R), or with no length in force, or with another one."""
+    return bool(block.get("R")) or not control.length_code or is_other_length(control, block)
 
 
 def is_other_length(control: MacroControl, block: Block) -> bool:

@@ -40,14 +40,9 @@ FAR = math.radians(0.1)
 The tip is not concerned; where the two differ by more, pieces of the motion would point the tool elsewhere."""
 
 
-def turning(control: MacroControl) -> list[int]:
-    """The letters of the machine's rotary axes."""
-    return [index for index in control.machine if control.rotary[index]]
-
-
 def directed(control: MacroControl, block: Block, motion: int) -> str:
     """Give a block the rotary words that its vector amounts to; why its motion is refused, if it is."""
-    axes = turning(control)
+    axes = control.turning
     if any(block.axes >> index & 1 for index in axes):
         return BY_AXES
     given = block.values.keys() & {*COMPONENTS}

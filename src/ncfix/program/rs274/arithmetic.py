@@ -1,7 +1,8 @@
 """The operators and functions of RS274NGC expressions on doubles, as LinuxCNC computes them.
 
-Source: LinuxCNC documentation, "G-code overview", "Binary operators" and "Functions"; angles are degrees. Comparisons
-take numbers as equal when they differ by less than 0.0001, except `lt` and `gt`, which are exact.
+Source: LinuxCNC documentation, "G-code overview", "Binary operators" and "Functions"; angles are degrees. Since
+version 2.9.1 numbers are equal that differ by less than 1e-6, and `le` and `ge` hold for equal ones. Before, `eq` and
+`ne` had 0.0001, and `le` and `ge` were exact. `lt` and `gt` are exact in all (LinuxCNC, pull request 2525).
 """
 
 from __future__ import annotations
@@ -12,8 +13,11 @@ from collections.abc import Callable
 from ncfix.program.follow.arithmetic import ARITHMETIC, FUNCTIONS, divide, power
 from ncfix.program.follow.faults import Fault
 
-EQUAL = 0.0001
-"""Two numbers compare equal when they differ by less."""
+EQUAL = 1e-6
+"""Two numbers are equal that differ by less."""
+
+FORMERLY_EQUAL = 1e-4
+"""The same for `eq` and `ne` before 2.9.1."""
 
 
 def modulo(left: float, right: float) -> float:
@@ -47,6 +51,19 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "ge": lambda a, b: float(a >= b or abs(a - b) < EQUAL),
     "atan": arc_tangent,
 }
+
+
+def in_doubt(operator: str, left: float, right: float) -> bool:
+    """Whether a comparison comes out otherwise in older versions of the control."""
+    match operator:
+        case "eq" | "ne":
+            return EQUAL <= abs(left - right) < FORMERLY_EQUAL
+        case "le":
+            return 0.0 < left - right < EQUAL
+        case "ge":
+            return 0.0 < right - left < EQUAL
+        case _:
+            return False
 
 
 UNARY: dict[str, Callable[[float], float]] = {

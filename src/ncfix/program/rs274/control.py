@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import control as shared
 from ncfix.program.follow import rollover
-from ncfix.program.follow.coordinates import LETTERS, zeros
+from ncfix.program.follow.coordinates import INCH, LETTERS, zeros
 from ncfix.program.follow.modal import Saved
 from ncfix.program.language import Run
 from ncfix.program.rs274.expressions import Evaluate
@@ -48,7 +48,6 @@ class Control(shared.Control):
     extended   additional work offsets (G54.1) that the program has set, and the name of that in force
     tip_control  tool-centre-point control (G43.4) is on, whether the plane is tilted or not
     unnamed    axes of the plane of which a rotation has gone on or off since the program named them
-    handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
     left_out   the block just followed has no place in a flat program
     unwritten  why a flat program cannot say what the program means; empty if it can
     saved      the modal states that M70 saved, one place for each call level
@@ -66,10 +65,14 @@ class Control(shared.Control):
         self.unnamed: frozenset[int] = frozenset()
         self.left_out = False
         self.unwritten = ""
-        self.handedness = 1.0
         if not self.rules.strict:
             rollover.watch(self)
         self.refresh()
+
+    @property
+    def closure_mm(self) -> float:
+        """As of every control; with inches in force it is given in these."""
+        return self.dialect.closure_mm * (1.0 if self.modal.unit == 1.0 else INCH / 10)
 
     def anchors(self) -> list[Hashable]:
         """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""

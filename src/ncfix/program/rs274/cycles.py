@@ -11,7 +11,7 @@ import math
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.program.follow.faults import Fault
-from ncfix.program.follow.motion import Unknown
+from ncfix.program.follow.motion import Motion, Unknown
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
@@ -130,7 +130,7 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     program[across] = depth
     bottom, adrift = command(control, block, program), control.places.adrift
     settles = 0 if control.modal.incremental else block.axes | 1 << across
-    control.move(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles)
+    control.make(Motion(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
     if not control.modal.retract_to_r:
         control.places.lose(adrift & 1 << across)
     program[across] = clear

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from ncfix.program.follow.faults import Fault
-from ncfix.program.rs274.arithmetic import BINARY, UNARY, whole
+from ncfix.program.rs274.arithmetic import BINARY, UNARY, in_doubt, whole
 from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
 
 
@@ -77,11 +77,14 @@ def unary(operator: str, operand: Evaluate) -> Evaluate:
 
 
 def binary(operator: str, left: Evaluate, right: Evaluate) -> Evaluate:
-    """An operator between two operands."""
+    """An operator between two operands; what depends on the version of the control is known at run time only."""
     function = BINARY[operator]
 
     def evaluate(scope: Scope) -> float:
-        value = function(left(scope), right(scope))
+        a, b = left(scope), right(scope)
+        if in_doubt(operator, a, b):
+            scope.parameters.touched = True
+        value = function(a, b)
         if not math.isfinite(value):
             raise Fault("NCF210", f"the result of {operator} is not a finite number")
         return value

@@ -202,7 +202,7 @@ class FlowControl:
         """The fault of a text that ends while something is still looked for."""
         label = oword(self.skipping or "")
         if self.skipping_to_sub:
-            hint = "subprograms are looked for further down in the program and in files beside it"
+            hint = "it is looked for further down, in files beside the program, and where --subprograms DIR says"
             return Fault(NO_SUBPROGRAM, f"there is no subprogram {label}", hint)
         what = "endsub" if self.defining is not None else "the end"
         return Fault(BAD_FLOW, f"the program ends and {what} of {label} is missing")

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from typing import TYPE_CHECKING
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.dialect import Dialect
+from ncfix.program.follow.arc_lane import turned
 from ncfix.program.follow.coordinates import LETTERS, N_LETTERS
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane import run_lane
 from ncfix.program.reader import read
 from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
 from ncfix.program.rs274 import predefined, systems
-from ncfix.program.rs274.arc_lane import turned
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
@@ -24,9 +25,11 @@ from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
 from ncfix.program.rs274.settings import unknown_code
 from ncfix.program.rs274.unit import Unit
-from ncfix.program.rs274.unroll import Recorder
 from ncfix.program.rs274.wordcheck import check_words
 from ncfix.program.tree import Constant, Program, Span, Word
+
+if TYPE_CHECKING:
+    from ncfix.program.rs274.unroll import Recorder
 
 NO_END = "NCF234"
 CALL, RETURN = 980, 990
@@ -38,6 +41,12 @@ POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
+INCREMENTS = ". If U V W are increments of X Y Z, as on lathes: these are not followed"
+
+
+def may_increment(control: Control, letter: str) -> bool:
+    """Whether a letter is an axis to some controls of a family, and an increment of another axis to others."""
+    return not control.rules.strict and letter in "UVW"
 
 
 class Interpreter:
@@ -297,7 +306,7 @@ class Interpreter:
         for index in range(N_LETTERS):
             if plan.axes >> index & 1 and index not in control.machine and LETTERS[index] not in control.foreign:
                 self.span = next(word.span for word in plan.template.words if word.address == LETTERS[index])
-                control.note_foreign(LETTERS[index])
+                control.note_foreign(LETTERS[index], INCREMENTS if may_increment(control, LETTERS[index]) else "")
         self.span = None
 
     def command(self, span: Span) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.finish import finished
 from ncfix.program.language import BulkLayout, Language, Run
 from ncfix.program.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
@@ -16,10 +16,12 @@ from ncfix.program.rs274.blocks import parse_block
 from ncfix.program.rs274.control import Control
 from ncfix.program.rs274.following import RS274Follower
 from ncfix.program.rs274.interpreter import Interpreter
-from ncfix.program.rs274.unroll import unrolled
 from ncfix.program.shapes import scan, split_blocks
 from ncfix.program.target import Rendered, Target
 from ncfix.program.tree import Program, Word
+
+if TYPE_CHECKING:
+    from ncfix.program.flatten import FlatLine
 
 
 def following(program: Program, run: Run) -> Interpreter:
@@ -61,6 +63,8 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
 
 def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
     """The blocks of a program of this family as they are executed."""
+    from ncfix.program.rs274.unroll import unrolled
+
     return unrolled(following(program, run), steps, limit)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
-from ncfix.program.follow.motion import Unknown
+from ncfix.program.follow.motion import Motion, Unknown
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.feeds import check_feed
@@ -46,7 +46,7 @@ def straight(control: Control, block: Block, code: int) -> None:
     if not block.axes:
         return
     target, unknown = destination(control, block)
-    control.move(Kind.FEED if code else Kind.RAPID, block.axes, target, unknown, code)
+    control.make(Motion(Kind.FEED if code else Kind.RAPID, block.axes, target, unknown, code))
 
 
 def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
@@ -65,7 +65,7 @@ def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
     if block.axes:
         target, unknown = machine_destination(control, block)
         kind = Kind.FEED if code else Kind.RAPID
-        control.move(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES)
+        control.make(Motion(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES))
         if control.modal.incremental:
             control.lose([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
 
@@ -73,7 +73,7 @@ def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
 def one_way(control: Control, block: Block, code: int) -> None:
     """G60: a rapid to the words from one side (ISO controls)."""
     target, unknown = destination(control, block)
-    control.move(Kind.RAPID, block.axes, target, unknown, 0)
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
 
 
 # -- reference points -------------------------------------------------------------------------------------------------
@@ -88,10 +88,10 @@ def go_to_reference(control: Control, block: Block, code: int) -> None:
     way, unknown = destination(control, block)
     control.offset_checked = checked
     if way != control.position or (block.axes and not control.modal.incremental):
-        control.move(Kind.RAPID, block.axes, way, unknown, modal, passing=passing)
+        control.make(Motion(Kind.RAPID, block.axes, way, unknown, modal, passing=passing))
     axes = block.axes or sum(1 << index for index in control.machine)
     target, unknown = reference_target(control, name, axes)
-    control.move(Kind.RAPID, block.axes, target, unknown, modal, passing=passing)
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, modal, passing=passing))
 
 
 def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Unknown]:
@@ -151,8 +151,10 @@ def probe(control: Control, block: Block, code: int) -> None:
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:
         raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
-    ends = unknown | {index: AFTER_PROBING for index in moved if index in control.machine}
-    control.move(Kind.FEED, block.axes, target, ends, code, passing=PROBING)
+    led = 7 if control.is_rotated and block.axes & 7 else 0
+    named = [index for index in moved if (block.axes | led) >> index & 1]
+    ends = unknown | {index: AFTER_PROBING for index in named if index in control.machine}
+    control.make(Motion(Kind.FEED, block.axes, target, ends, code, passing=PROBING))
     program = control.program_position()
     for index in range(N_LETTERS):
         control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
@@ -174,7 +176,7 @@ def refused(control: Control, block: Block, code: int) -> None:
         control.modal.motion = code
     target, unknown = destination(control, block)
     before, known = control.position, control.unknown
-    control.move(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code])
+    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
     if code == 331:
         control.position, control.unknown, control.said = before, known, None
 
@@ -193,21 +195,21 @@ def turning_cycle(control: Control, block: Block, code: int) -> None:
         if INDEX[letter] in control.machine:
             unknown[INDEX[letter]] = AFTER_CYCLE
     refusal = f"turning cycle (G{code / 10:g})"
-    control.move(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal)
+    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
 
 
 def undecided(control: Control, block: Block, code: int) -> None:
     """Axis words while no motion code is in force: what ISO controls do with them differs."""
     target, unknown = destination(control, block)
     moved = {index: AFTER_NO_CODE for index in control.machine if block.axes >> index & 1}
-    control.move(Kind.RAPID, block.axes, target, unknown | moved, code, refusal="no motion code is in force")
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown | moved, code, refusal="no motion code is in force"))
 
 
 def dwell(control: Control, block: Block, code: int) -> None:
     """G4."""
     if control.rules.strict and block.get("P", -1.0) == -1.0:
         raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
-    control.move(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing="dwell")
+    control.make(Motion(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing="dwell"))
 
 
 def cancel(control: Control, block: Block, code: int) -> None:

@@ -26,6 +26,9 @@ OUT_OF_RANGE = "NCF213"
 Key = int | str
 """What names a parameter: its number or its name."""
 
+OF_THE_MACHINE = ("_hal[", "_ini[")
+"""How the names of the machine's pins begin, and of the entries of its configuration: known at run time only."""
+
 
 @dataclass(slots=True)
 class Store:
@@ -92,6 +95,9 @@ class Parameters:
             self.changes += 1
             return self.predefined[name]()
         scope = self.scope_of(name)
+        if name not in scope.values and name.startswith(OF_THE_MACHINE):
+            self.touched = True
+            return 0.0
         if name not in scope.values:
             hint = f'if the control has it: variables."#<{name}>" in the setup file'
             raise Fault(UNDEFINED, f"parameter #<{name}> is used and not defined", hint)

@@ -44,6 +44,7 @@ SMOOTHING = 51
 
 LANE_LETTERS = frozenset("FN") | INDEX.keys()
 ARC_LETTERS = frozenset("IJKR")
+PLACES = ARC_LETTERS | INDEX.keys()
 CONFLICT = "NCF208"
 UNKNOWN_M = "NCF229"
 MAX_M_CODES = 4
@@ -139,7 +140,7 @@ def plan_of(template: Template, rules: Rules) -> Plan:
     take_values(plan, rules)
     take_statements(plan, rules)
     take_codes(plan, rules)
-    plan.lane = lane_of(plan, rules)
+    plan.lane = lane_of(plan)
     return plan
 
 
@@ -259,16 +260,10 @@ def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
         raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
 
 
-def lane_of(plan: Plan, rules: Rules) -> Lane | None:
-    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers.
-
-    Arcs of dialects with steps of their own go one by one.
-    """
+def lane_of(plan: Plan) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
     codes, slots = plan.codes, dict(plan.literals)
-    plain = all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
-    if not plain or plan.unread or plan.command or codes is None or plan.computed:
-        return None
-    if any(letter in INDEX for letter in plan.pointless) or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
+    if codes is None or not only_moves(codes) or not is_plain(plan):
         return None
     lane = Lane(
         tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX),
@@ -277,9 +272,20 @@ def lane_of(plan: Plan, rules: Rules) -> Lane | None:
         (slots.get("I", -1), slots.get("J", -1), slots.get("K", -1)),
         slots.get("R", -1),
     )
-    if codes.m or codes.unknown or not codes.g.keys() <= {groups.MOTION}:
-        return None
     if not lane.turns:
         return lane if lane.motion in (-1, 0, 10) else None
     ambiguous = lane.radius >= 0 and max(lane.centre) >= 0
-    return None if rules.steps or ambiguous or lane.motion not in (-1, 20, 30) else lane
+    return None if ambiguous or lane.motion not in (-1, 20, 30) else lane
+
+
+def is_plain(plan: Plan) -> bool:
+    """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
+    if plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
+        return False
+    points = PLACES.isdisjoint(plan.pointless)
+    return points and all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
+
+
+def only_moves(codes: Codes) -> bool:
+    """Whether the codes of a block are known and say nothing but how it moves."""
+    return not codes.m and not codes.unknown and codes.g.keys() <= {groups.MOTION}

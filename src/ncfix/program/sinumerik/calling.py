@@ -48,7 +48,11 @@ def subprogram(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> Non
 def ran_elsewhere(control: Sinumerik, name: str, *, changes_tool: bool) -> None:
     """A name or number that is no subprogram at hand is taken as a cycle of the builder; it may change the tool."""
     text = f"{name} is not known: it is taken as a cycle that leaves coordinates as they are"
-    control.warn(UNKNOWN_CYCLE, text, "put its file beside the program if it is a subprogram")
+    control.warn(
+        UNKNOWN_CYCLE,
+        text,
+        "if it is a subprogram, say where its file is: --subprograms DIR",
+    )
     control.lose_all(AFTER_CYCLE)
     control.changed_by_cycle |= changes_tool
     if "tool" in control.suspended:

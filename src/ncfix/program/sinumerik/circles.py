@@ -10,7 +10,7 @@ from ncfix.program.follow.coordinates import CENTRE_LETTERS, IDENTITY, Plane, do
 from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.affine import handed
-from ncfix.program.sinumerik.destination import NO_POLE, End, Words, destination, doubtful_polar
+from ncfix.program.sinumerik.destination import NO_POLE, End, Leg, Words, destination, doubtful_polar
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE
 
@@ -43,7 +43,7 @@ def arc(control: Sinumerik, words: Words, code: int) -> None:
     finish = step[plane.first], step[plane.second]
     sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
     circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
-    control.go(Kind.ARC, words, end, code, refusal=refusal, arc=circle)
+    control.go(Leg(Kind.ARC, words, end, code, refusal=refusal, arc=circle))
 
 
 def is_fixed(words: Words, plane: Plane) -> bool:
@@ -158,15 +158,15 @@ def through_point(control: Sinumerik, words: Words, code: int) -> None:
     end = destination(control, words)
     why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
     if why:
-        control.go(Kind.FEED, words, end, code, refusal=why)
+        control.go(Leg(Kind.FEED, words, end, code, refusal=why))
         return
     if end.unknown or control.unknown:
-        control.go(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known")
+        control.go(Leg(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"))
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
     circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
     circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
-    control.go(Kind.ARC, words, end, code, arc=circle)
+    control.go(Leg(Kind.ARC, words, end, code, arc=circle))
 
 
 def via_point(control: Sinumerik, words: Words) -> Triple:

@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 
 from ncfix.program.moves import Kind
-from ncfix.program.sinumerik.destination import End, Words, command
+from ncfix.program.sinumerik.destination import End, Leg, Words, command
 from ncfix.program.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
 from ncfix.program.sinumerik.plans import Calling
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
@@ -101,7 +101,7 @@ def drill(control: Sinumerik, drilling: Drilling) -> None:
         lost.pop(plane.across, None)
         end = End(command(control, program, {plane.across}), control.unknown_for(lost), lost)
         words = Words(drilling.block, {}, {}, 1 << plane.across)
-        control.go(kind, words, end, control.modal.motion, passing=DEPTH.format(name), settles=words.axes)
+        control.go(Leg(kind, words, end, control.modal.motion, passing=DEPTH.format(name), settles=words.axes))
     control.row_block = before
 
 
@@ -111,4 +111,4 @@ def refuse(control: Sinumerik, block: int, why: str) -> None:
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
     words = Words(block, {}, {}, sum(1 << index for index in gone))
     end = End(control.position[:], control.unknown_for(lost), lost)
-    control.go(Kind.RAPID, words, end, control.modal.motion, refusal=why)
+    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, refusal=why))

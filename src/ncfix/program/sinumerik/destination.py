@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
+from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.coordinates import INDEX, LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Unknown
 from ncfix.program.follow.places import mask_of
+from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.increments import unsteady
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
@@ -76,6 +79,26 @@ class End:
     lost: Unknown
 
 
+class Leg(NamedTuple):
+    """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
+
+    code        the motion code, in tenths
+    refusal, passing, arc  as in `Motion`
+    settles     as there; None: the axes of its words, but for increments, and none where the motion is passed
+    by_machine  the words are machine coordinates
+    """
+
+    kind: Kind
+    words: Words
+    end: End
+    code: int
+    refusal: str = ""
+    passing: str = ""
+    arc: Arc | None = None
+    settles: int | None = None
+    by_machine: bool = False
+
+
 def destination(control: Sinumerik, words: Words) -> End:
     """The command at which a motion of this block ends."""
     program = control.program_position()
@@ -85,7 +108,7 @@ def destination(control: Sinumerik, words: Words) -> End:
         if letter in words.values:
             place(control, words, letter, program, lost)
             moved.add(INDEX[letter])
-    if "AP" in words.values or "RP" in words.values:
+    if POLAR_WORDS & words.values.keys():
         moved |= polar(control, words, program, lost)
     return End(command(control, program, moved), control.unknown_for(lost), lost)
 
@@ -219,18 +242,13 @@ def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
 def set_pole(control: Sinumerik, words: Words, code: int) -> None:
     """G110 to G112: the pole is given from where the axes stand, in the frame, or from the last pole."""
     plane = control.modal.plane
-    here = control.program_position()
     base: tuple[float, float] | None = (0.0, 0.0)
     if code == 1100:
-        control.settle_all()
-        known = not {plane.first, plane.second} & control.lost.keys()
-        known = known and not control.places.adrift & mask_of((plane.first, plane.second))
-        known = known and not (unsteady(control, plane.first) or unsteady(control, plane.second))
-        base = (here[plane.first], here[plane.second]) if known else None
+        base = where_it_stands(control)
     elif code == 1120:
         base = control.modes.pole or ((0.0, 0.0) if control.modes.in_plane else None)
     steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
-    if "AP" in words.values or "RP" in words.values:
+    if POLAR_WORDS & words.values.keys():
         angle, radius = math.radians(words.get("AP")), words.get("RP")
         steps = [radius * math.cos(angle), radius * math.sin(angle)]
         if words.runtime("AP", "RP"):
@@ -245,32 +263,49 @@ def set_pole(control: Sinumerik, words: Words, code: int) -> None:
 # -- machine coordinates ----------------------------------------------------------------------------------------------
 
 
+def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
+    """Where the axes of the plane stand in the frame; None where that is not known."""
+    here, plane = control.program_position(), control.modal.plane
+    control.settle_all()
+    axes = plane.first, plane.second
+    if control.lost.keys() & {*axes} or control.places.adrift & mask_of(axes):
+        return None
+    return None if any(unsteady(control, index) for index in axes) else (here[plane.first], here[plane.second])
+
+
 def machine_destination(control: Sinumerik, words: Words) -> End:
     """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on."""
     target, unknown = control.position[:], dict(control.unknown)
-    tool = [0.0] * len(LETTERS) if control.tcp else control.offsets.tool
     for letter in LETTERS:
-        if letter not in words.values:
-            continue
-        index, value, form = INDEX[letter], words.values[letter], words.forms.get(letter, "")
-        if counts_on(control, form):
-            target[index] += control.of_setup(letter) * (value or 0.0)
-            if why := unsteady(control, index, by_machine=True):
-                unknown[index] = why
-        else:
-            target[index] = tool[index] + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
-            unknown.pop(index, None)
-        if value is None:
-            unknown[index] = RUNTIME
-    if "AP" in words.values or "RP" in words.values:
+        if letter in words.values:
+            place_at_machine(control, words, letter, target, unknown)
+    if POLAR_WORDS & words.values.keys():
         raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
+    return End(target, unknown, lost_in_frame(control, unknown))
+
+
+def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vector, unknown: Unknown) -> None:
+    """Take one axis word in machine coordinates."""
+    index, value = INDEX[letter], words.values[letter]
+    if counts_on(control, words.forms.get(letter, "")):
+        target[index] += control.of_setup(letter) * (value or 0.0)
+        if why := unsteady(control, index, by_machine=True):
+            unknown[index] = why
+    else:
+        tool = 0.0 if control.tcp else control.offsets.tool[index]
+        target[index] = tool + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+        unknown.pop(index, None)
+    if value is None:
+        unknown[index] = RUNTIME
+
+
+def lost_in_frame(control: Sinumerik, unknown: Unknown) -> Unknown:
+    """Which coordinates of the program are not known where these axes are not: in a turned frame one hides three."""
     if not control.is_rotated:
-        return End(target, unknown, dict(unknown))
-    hidden = {index: why for index, why in unknown.items() if index in GEOMETRY}
+        return dict(unknown)
     lost = {index: why for index, why in unknown.items() if index not in GEOMETRY}
-    if hidden:
-        lost |= {index: why for why in list(hidden.values())[:1] for index in GEOMETRY if index in control.machine}
-    return End(target, unknown, lost)
+    why = next((why for index, why in unknown.items() if index in GEOMETRY), None)
+    return lost if why is None else lost | {index: why for index in GEOMETRY if index in control.machine}
 
 
 def control_unit(control: Sinumerik, index: int) -> float:

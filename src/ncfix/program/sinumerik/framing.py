@@ -12,13 +12,17 @@ from ncfix.program.follow.places import mask_of
 from ncfix.program.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import had_from_the_start
-from ncfix.program.sinumerik.state import Sinumerik
+from ncfix.program.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
 
 FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
 UNEQUAL = "a scale that differs from axis to axis ({})"
 ROTARY_FRAME = "a {} of a rotary axis"
 WHO_CHANGES = (
     "whether T by itself changes the tool is not certain: a name that ncfix does not know has followed a T before"
+)
+UNSAID = (
+    "whether X is a radius or a diameter is not said in a program that turns (G96): with DIAMOF or DIAMON, or by "
+    f'variables."{RESET_OF_DIAMETER}" = 1 or 2 in the setup file'
 )
 DIAMETER_SHIFT = "a shift of X while X is a diameter ({}) is in force: which of the two it is, machine data say"
 MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
@@ -160,13 +164,6 @@ def units(control: Sinumerik, code: int) -> None:
     control.refresh()
 
 
-def diameter(control: Sinumerik, name: str) -> None:
-    """DIAMON, DIAM90, DIAMOF."""
-    control.modes.diameter = "" if name == "diamof" else name.upper()
-    control.modal.diameter = name != "diamof"
-    control.refresh()
-
-
 def settable(control: Sinumerik, code: int) -> None:
     """G54 to G57, G505 to G599; G500 switches them off."""
     control.modes.carried = ""
@@ -188,6 +185,8 @@ def feed_mode(control: Sinumerik, code: int) -> None:
     if mode != control.modal.feed_mode:
         control.modal.feed, control.modal.feed_given = float("nan"), False
     control.modal.feed_mode = mode
+    if code in (960, 9610) and not control.modes.said:
+        control.suspended["diameter"] = UNSAID
 
 
 def compensation(control: Sinumerik, code: int) -> None:

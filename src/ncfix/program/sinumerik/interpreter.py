@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from functools import reduce
+from functools import partial, reduce
 from operator import or_
 
 import numpy as np
 
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program.flatten import RUNTIME, FlatLine
+from ncfix.program.follow.arc_lane import turned
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane import run_lane
 from ncfix.program.follow.places import mask_of
@@ -23,7 +24,7 @@ from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
 from ncfix.program.sinumerik.increments import stand
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
-from ncfix.program.sinumerik.orientation import leads_along, turning
+from ncfix.program.sinumerik.orientation import leads_along
 from ncfix.program.sinumerik.plans import Branching, Calling, Letting, Plan, is_statement
 from ncfix.program.sinumerik.poles import all_or_none
 from ncfix.program.sinumerik.state import Sinumerik
@@ -128,8 +129,10 @@ class Interpreter:
             main = not course.unit.external
             plan = course.unit.plan(course.block)
             if plan.lane is not None and self.lane_is_open():
-                run = run_lane if plan.vector is None else run_vectors
-                done = run(control, course.unit, course.block, main)
+                if plan.vector is None:
+                    done = run_lane(control, course.unit, course.block, main, partial(turned, control, course.unit))
+                else:
+                    done = run_vectors(control, course.unit, course.block, main)
                 if done:
                     self.stand(done)
                     course.block += done
@@ -171,7 +174,7 @@ class Interpreter:
             plans = [unit.plan_of_shape(shape) for shape in shapes.tolist()]
             named = reduce(or_, (plan.axes for plan in plans))
             if any(plan.vector is not None for plan in plans):
-                named |= mask_of(turning(control))
+                named |= mask_of(control.turning)
             stand(control, named, by_machine=False)
 
     # -- one block ----------------------------------------------------------------------------------------------------

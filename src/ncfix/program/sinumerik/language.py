@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ncfix.program.flatten import FlatLine
 from ncfix.program.follow.finish import finished
 from ncfix.program.follow.flat import FlatLines
-from ncfix.program.language import BulkLayout, Language, Run
-from ncfix.program.layout import bulk_layout
+from ncfix.program.language import ArcLayout, BulkLayout, Language, Run
+from ncfix.program.layout import arc_layout, bulk_layout
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.pieces import Pieces
 from ncfix.program.reach import whole_text
@@ -20,14 +20,15 @@ from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_on
 from ncfix.program.sinumerik.interpreter import Interpreter
-from ncfix.program.sinumerik.layout import layout_of
+from ncfix.program.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix.program.sinumerik.numbering import renumbered
 from ncfix.program.sinumerik.orientation import VECTOR
+from ncfix.program.sinumerik.plans import fixed_centre
 from ncfix.program.sinumerik.render import render
 from ncfix.program.sinumerik.scanning import scan
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unroll import Recorder
-from ncfix.program.tree import Program
+from ncfix.program.tree import Program, Word
 
 SPATIAL = frozenset("XYZ")
 
@@ -58,7 +59,21 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         return None
     found = bulk_layout(program, block, layout)
     further = not (layout.after or layout.prefix or layout.points)
-    return found and replace(found, further=further, led=layout.points)
+    return found and replace(found, further=further, led=layout.points, arc=arc_in_bulk(program, block, layout))
+
+
+def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
+    """The same of the words of an arc."""
+    fixed = fixed_centre(program.templates[int(program.template[block])])
+    if layout.via or layout.angle is not None:
+        return None
+    found = arc_layout(program, block, replace(layout, centre=without(layout.centre, fixed)))
+    return found and replace(found, centre={**found.centre, **fixed}, fixed=frozenset(fixed))
+
+
+def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, Word]:
+    """Words but for those with some addresses."""
+    return {address: word for address, word in words.items() if address not in addresses}
 
 
 def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.program.follow.coordinates import INDEX, LETTERS
 from ncfix.program.moves import Kind
-from ncfix.program.sinumerik.destination import End, Words, destination
+from ncfix.program.sinumerik.destination import End, Leg, Words, destination
 from ncfix.program.sinumerik.plans import Letting
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.vocabulary import (
@@ -45,7 +45,7 @@ def let_axis_go(control: Sinumerik, turn: Turn, step: Letting) -> None:
     if step.name in GO_SOMEWHERE:
         still = Words(turn.words.block, {}, {}, sum(1 << index for index in gone))
         lost = dict(control.lost) | dict.fromkeys(gone, AFTER_POSITIONING)
-        control.go(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why)
+        control.go(Leg(Kind.RAPID, still, End(control.position[:], control.unknown_for(lost), lost), 0, refusal=why))
     else:
         control.refusal = control.refusal or f"{why} is not followed"
 
@@ -58,7 +58,7 @@ def follow_polynomial(control: Sinumerik, turn: Turn, step: Letting, letter: str
     axes = [each for each in letters if INDEX[each] in control.machine]
     ends: dict[str, float | None] = dict.fromkeys(axes, None if isinstance(value, str) else value)
     words = Words(turn.words.block, ends, {}, sum(1 << INDEX[each] for each in axes))
-    control.go(Kind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS)
+    control.go(Leg(Kind.FEED, words, destination(control, words), MOTIONS["poly"], refusal=POLYNOMIALS))
 
 
 def note_letting(control: Sinumerik, turn: Turn, step: Letting) -> None:

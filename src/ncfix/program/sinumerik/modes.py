@@ -44,6 +44,7 @@ class Modes:
     """What is in force besides the modal state that all controls have.
 
     diameter     "", "DIAMON" or "DIAM90"
+    said         the program or the setup has said whether X is a diameter
     pole         of polar coordinates in the frame of the program, mm; None until one is programmed
     carried      TRAORI or TRAFOOF, if one came after the settable frame and no motion has come since
     in_plane     the plane has not changed since the start: a pole that nobody has set is the zero point
@@ -58,6 +59,7 @@ class Modes:
     """
 
     diameter: str = ""
+    said: bool = False
     pole: tuple[float, float] | None = None
     carried: str = ""
     in_plane: bool = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.circles import arc, through_point
-from ncfix.program.sinumerik.destination import End, Words, destination, doubtful_polar, machine_destination
+from ncfix.program.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import mind_carried, take_up
 from ncfix.program.sinumerik.orientation import oriented
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
@@ -35,11 +35,9 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
     if not machine:
         mind_carried(control)
-    timed = control.modal.feed_mode == 93 and code != 0 and "F" not in words.values
-    words.whole = timed or words.block in control.solitary or control.modes.modal_cycle is not None
     corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
     control.at_corner = not machine and (corner or control.cornered)
-    words.whole |= control.at_corner
+    words.whole = control.at_corner or is_one_piece(control, words)
     oriented(control, words)
     if machine:
         to_machine_position(control, words, machine.upper())
@@ -47,7 +45,27 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
         measure(control, words)
     elif "soft" in special:
         soft_approach(control, words)
-    elif code in (20, 30):
+    else:
+        as_coded(control, words, code)
+    control.wrap()
+    control.cornered, control.at_corner = corner, False
+
+
+def straight(control: Sinumerik, words: Words, code: int) -> None:
+    """G0 and G1."""
+    end = destination(control, words)
+    control.go(Leg(Kind.FEED if code else Kind.RAPID, words, end, code, refusal=refusal_of(control, words)))
+
+
+def is_one_piece(control: Sinumerik, words: Words) -> bool:
+    """Whether a motion must not be split: its time is another block's, REPEAT would miss lines, a hole follows."""
+    timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
+    return timed or words.block in control.solitary or control.modes.modal_cycle is not None
+
+
+def as_coded(control: Sinumerik, words: Words, code: int) -> None:
+    """The motion that the code in force makes of the words."""
+    if code in (20, 30):
         arc(control, words, code)
     elif code == CIP:
         through_point(control, words, code)
@@ -57,14 +75,6 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
         refused(control, words, code, UNFOLLOWED_MOTIONS[code])
     else:
         straight(control, words, 10 if code not in (0, 10) else code)
-    control.wrap()
-    control.cornered, control.at_corner = corner, False
-
-
-def straight(control: Sinumerik, words: Words, code: int) -> None:
-    """G0 and G1."""
-    end = destination(control, words)
-    control.go(Kind.FEED if code else Kind.RAPID, words, end, code, refusal=refusal_of(control, words))
 
 
 def refusal_of(control: Sinumerik, words: Words) -> str:
@@ -79,7 +89,7 @@ def refusal_of(control: Sinumerik, words: Words) -> str:
 def refused(control: Sinumerik, words: Words, code: int, why: str) -> None:
     """A motion that is followed only as far as its end."""
     control.settle_all()
-    control.go(Kind.FEED, words, destination(control, words), code, refusal=why)
+    control.go(Leg(Kind.FEED, words, destination(control, words), code, refusal=why))
 
 
 def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
@@ -87,7 +97,7 @@ def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
     kind = Kind.RAPID if code == 0 else Kind.FEED
-    control.go(kind, words, end, code, passing=MACHINE.format(name), by_machine=True)
+    control.go(Leg(kind, words, end, code, passing=MACHINE.format(name), by_machine=True))
 
 
 def measure(control: Sinumerik, words: Words) -> None:
@@ -96,7 +106,7 @@ def measure(control: Sinumerik, words: Words) -> None:
     gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
     lost = end.lost | dict.fromkeys(spread(control, gone), AFTER_MEASURING)
     ends = End(end.target, end.unknown | gone, lost)
-    control.go(Kind.FEED, words, ends, control.modal.motion, passing=MEASURING)
+    control.go(Leg(Kind.FEED, words, ends, control.modal.motion, passing=MEASURING))
 
 
 def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
@@ -119,11 +129,11 @@ def to_reference(control: Sinumerik, words: Words, code: int) -> None:
     lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
     words = Words(words.block, {}, {}, sum(1 << index for index in gone))
     end = End(control.position[:], unknown, lost)
-    control.go(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True)
+    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True))
 
 
 def dwell(control: Sinumerik, words: Words) -> None:
     """G4: F is seconds, S turns of the spindle."""
     still = Words(words.block, {}, {}, 0)
     end = End(control.position, control.unknown, control.lost)
-    control.go(Kind.DWELL, still, end, control.modal.motion, passing="dwell")
+    control.go(Leg(Kind.DWELL, still, end, control.modal.motion, passing="dwell"))

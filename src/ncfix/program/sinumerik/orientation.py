@@ -61,7 +61,7 @@ not concerned, but pieces of a motion that strays by more would point it elsewhe
 def oriented(control: Sinumerik, words: Words) -> None:
     """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
     if leads_along(control):
-        words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), turning(control))
+        words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), control.turning)
         return
     words.whole |= bool(NORMALS & words.values.keys())
     others = sorted(OTHERS & words.values.keys())
@@ -70,17 +70,12 @@ def oriented(control: Sinumerik, words: Words) -> None:
         return
     reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if len(ways) > 1 else by_direction(control, words)
     if reason:
-        words.refuse(reason, turning(control))
+        words.refuse(reason, control.turning)
 
 
 def leads_along(control: Sinumerik) -> bool:
     """Whether each motion turns the tool, as the path turns."""
     return control.modes.transformed and control.modes.orientation.startswith(BY_PATH)
-
-
-def turning(control: Sinumerik) -> list[int]:
-    """The rotary axes."""
-    return [index for index in control.machine if control.rotary[index]]
 
 
 def by_direction(control: Sinumerik, words: Words) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ncfix.program.moves import Kind
-from ncfix.program.sinumerik.destination import End, Words, command
+from ncfix.program.sinumerik.destination import End, Leg, Words, command
 from ncfix.program.sinumerik.values import number
 
 if TYPE_CHECKING:
@@ -87,4 +87,4 @@ def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: st
         lost.pop(index, None)
     end = End(command(control, program, moved), control.unknown_for(lost), lost)
     words = Words(block, {}, {}, 1 << plane.first | 1 << plane.second)
-    control.go(Kind.RAPID, words, end, 0, refusal=WRITE_OUT.format(name), settles=words.axes)
+    control.go(Leg(Kind.RAPID, words, end, 0, refusal=WRITE_OUT.format(name), settles=words.axes))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
-from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.sinumerik.blocks import STATEMENT
 from ncfix.program.sinumerik.build import BRACKET
 from ncfix.program.sinumerik.values import Evaluate, compiled, nothing
-from ncfix.program.sinumerik.vocabulary import FORMS
+from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS
 from ncfix.program.tree import (
     Assignment,
     Binary,
@@ -20,6 +20,7 @@ from ncfix.program.tree import (
     Constant,
     Expression,
     Flow,
+    Literal,
     NamedParameter,
     Opaque,
     Parameter,
@@ -36,6 +37,8 @@ LISTS = frozenset({BRACKET, "set", "rep"})
 
 ANY_PARAMETER = "r[]"
 LANE_LETTERS = INDEX.keys() | {"F", "N"}
+RADIUS = "CR"
+ARC_LETTERS = frozenset({*CENTRE_LETTERS, RADIUS})
 DIRECTION = ("A3", "B3", "C3")
 
 
@@ -229,17 +232,34 @@ def branching(item: Flow) -> Branching:
 
 
 def lane_of(plan: Plan) -> Lane | None:
-    """The fast lane's view of a plan, if the block is nothing but a straight motion with plain numbers."""
-    template, slots = plan.template, plan.template.slots
-    words = [word for word in template.words if not is_code(word)]
+    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
+    template, fixed = plan.template, fixed_centre(plan.template)
+    words, slots = [word for word in template.words if not is_code(word)], {**template.slots, **fixed}
     if len(slots) < len(words) or not all(isinstance(item, Word | Comment) for item in template.items):
         return None
     pointed = not slots.keys().isdisjoint(DIRECTION)
-    allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS
-    if plan.m or plan.g not in ((), (0,), (10,)) or not slots.keys() <= allowed:
+    round_ = not slots.keys().isdisjoint(ARC_LETTERS)
+    allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS | ARC_LETTERS
+    if plan.m or plan.g not in (((), (20,), (30,)) if round_ else ((), (0,), (10,))) or not slots.keys() <= allowed:
         return None
     axes = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)
-    return Lane(axes, slots.get("F", -1), plan.g[0] if plan.g else -1)
+    i, j, k = (slots.get(letter, -1) for letter in CENTRE_LETTERS)
+    motion, radius = plan.g[0] if plan.g else -1, slots.get(RADIUS, -1)
+    if radius >= 0 and max(i, j, k) >= 0:
+        return None
+    return Lane(axes, slots.get("F", -1), motion, (i, j, k), radius, ("I" in fixed, "J" in fixed, "K" in fixed))
+
+
+def fixed_centre(template: Template) -> dict[str, int]:
+    """The words of a centre that count from the origin, `I=AC(5)`: the slots of their numbers."""
+    found = {}
+    for word in template.words:
+        value = word.value
+        if word.address in CENTRE_LETTERS and isinstance(value, Call) and value.name == ABSOLUTE and not value.indexed:
+            match value.arguments:
+                case (Literal(slot),):
+                    found[word.address] = slot
+    return found
 
 
 def plain_text(expression: Expression | None) -> str | None:

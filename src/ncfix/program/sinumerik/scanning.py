@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.numbers import fill, find_numbers, is_numeric, runs_of, table
-from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, matches, odd_blocks, shape_keys
+from ncfix.program.shapes import NUMBER_MARK, Scan, block_of, in_slices, matches, odd_blocks, shape_keys
 
 FIXED = table(b"GgMmRr")
 """A number after these is no value but says which code or parameter it is."""
@@ -32,6 +32,11 @@ PATH = re.compile(rb"(?im)^[ \t]*;[ \t]*\$PATH[ \t]*=")
 
 def scan(source: bytes, blocks: NDArray[np.int64]) -> Scan:
     """Find the numbers and the shape of every block."""
+    return in_slices(source, blocks, scan_slice)
+
+
+def scan_slice(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """As `scan`, of so much that its columns do not take much room."""
     text = np.frombuffer(source, dtype=np.uint8)
     passive = list(matches(PASSIVE, source, b';"'))
     quiet = np.array([match.span() for match in passive], dtype=np.int64).reshape(-1, 2)

@@ -8,7 +8,7 @@ one unknown coordinate would hide three axes.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,11 +26,12 @@ from ncfix.program.moves import Kind, Rule
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
-from ncfix.program.sinumerik.variables import Variables
+from ncfix.program.sinumerik.values import Value
+from ncfix.program.sinumerik.variables import Variables, key_of
 from ncfix.program.sinumerik.vocabulary import TURNING
 
 if TYPE_CHECKING:
-    from ncfix.program.sinumerik.destination import End, Words
+    from ncfix.program.sinumerik.destination import Leg, Words
 
 GEOMETRY = (X, Y, Z)
 TURNED = "where the axis {} stands in the turned coordinates is not known"
@@ -44,6 +45,12 @@ def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
     rise = nx * step[0] + ny * step[1] + nz * step[2]
     round_ = ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
     return [arc.sweep * part + rise * across for part, across in zip(round_, arc.normal, strict=True)]
+
+
+RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
+"""Machine data: which of `DIAMETERS` is in force at the start."""
+
+DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 
 
 class Sinumerik(Control):
@@ -86,6 +93,16 @@ class Sinumerik(Control):
         self.counted: list[Footing] = list(self.footing)
         rollover.watch(self)
         self.builder.winding = rollover.Winding(np.zeros(len(run.axes), dtype=np.bool_))
+        at_start = DIAMETERS.get(self.variables.value(key_of(RESET_OF_DIAMETER)))
+        if at_start:
+            self.count_in(at_start)
+
+    def count_in(self, name: str) -> None:
+        """DIAMON, DIAM90 or DIAMOF, in lower case: X counts in diameters or not."""
+        self.modes.diameter = "" if name == "diamof" else name.upper()
+        self.modes.said, self.modal.diameter = True, name != "diamof"
+        self.suspended.pop("diameter", None)
+        self.refresh()
 
     # -- frames -------------------------------------------------------------------------------------------------------
 
@@ -236,39 +253,29 @@ class Sinumerik(Control):
 
     # -- motions ------------------------------------------------------------------------------------------------------
 
-    def go(
-        self,
-        kind: Kind,
-        words: Words,
-        end: End,
-        code: int,
-        *,
-        refusal: str = "",
-        passing: str = "",
-        arc: Arc | None = None,
-        settles: int | None = None,
-        by_machine: bool = False,
-    ) -> None:
-        """A motion to `end`, with the reason for which it is refused or passed; `settles` as in `Control.move`.
-
-        by_machine  its words are machine coordinates
-        """
-        axes = words.axes
-        if words.values.keys() & {"AP", "RP"}:
-            axes |= 1 << self.modal.plane.first | 1 << self.modal.plane.second
+    def go(self, leg: Leg) -> None:
+        """Make a motion of a block, and keep where it leads in coordinates of the program."""
+        words, end = leg.words, leg.end
+        axes, settles = self._axes_of(words), leg.settles
         if settles is None:
-            settles = 0 if passing else axes & ~mask_of(self._counted(words))
+            settles = 0 if leg.passing else axes & ~mask_of(self._counted(words))
         self.lost, self.fresh_tool = end.lost, False
-        refusal, self.whole = refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
+        refusal, self.whole = leg.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
         self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
-        if not passing and not refusal:
+        follows = not leg.passing and not refusal
+        if follows:
             self.ask_for_length()
-        self._note_heading(kind, end, arc, follows=not passing and not refusal)
-        self.move(kind, axes, end.target, end.unknown, code, refusal=refusal, passing=passing, arc=arc, settles=settles)
+        self._note_heading(leg, follows=follows)
+        self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, settles))
         self.whole = False
-        stand(self, axes, by_machine=by_machine)
+        stand(self, axes, by_machine=leg.by_machine)
         self.forget_settled()
+
+    def _axes_of(self, words: Words) -> int:
+        """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
+        plane = self.modal.plane
+        return words.axes | (1 << plane.first | 1 << plane.second if words.values.keys() & {"AP", "RP"} else 0)
 
     def _lost_at_end(self, motion: Motion) -> Unknown:
         """As for all controls; the book of turned coordinates is `lost`."""
@@ -283,9 +290,10 @@ class Sinumerik(Control):
         forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
         return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
 
-    def _note_heading(self, kind: Kind, end: End, arc: Arc | None, *, follows: bool) -> None:
+    def _note_heading(self, leg: Leg, *, follows: bool) -> None:
         """Keep the direction in which a motion ends: CT goes on in it."""
-        if kind == Kind.DWELL:
+        end, arc = leg.end, leg.arc
+        if leg.kind == Kind.DWELL:
             return
         gone = {index for index in GEOMETRY if index in self.unknown or index in end.unknown}
         step = [b - a for a, b in zip(self.position, end.target, strict=True)]
@@ -303,10 +311,12 @@ class Sinumerik(Control):
         stretch = self.builder.latest
         if stretch is None:
             return
-        steps = stretch.end - stretch.start
+        steps, (turned, arc) = stretch.end - stretch.start, self.builder.latest_arc() or (-1, None)
         rows = range(len(steps) - 1, -1, -1)
-        last = next((row for row in rows if steps[row].any()), None)
-        if last is not None:
+        last = next((row for row in rows if row == turned or steps[row].any()), -1)
+        if arc is not None and last == turned:
+            self.heading = departing(arc, stretch.end[last].tolist(), steps[last].tolist())[:3]
+        elif last >= 0:
             self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
 
     def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:

@@ -14,7 +14,7 @@ from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
 from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates
-from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix.program.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.swivel import swivel
 from ncfix.program.sinumerik.unit import Unit
 from ncfix.program.sinumerik.values import Evaluate, number
@@ -122,8 +122,8 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
         turn.frame = name
     elif name in MOTIONS:
         control.modal.motion, control.stated = MOTIONS[name], True
-    elif name in ("diamon", "diam90", "diamof"):
-        framing.diameter(control, name)
+    elif name in DIAMETERS.values():
+        control.count_in(name)
     elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
         return
     elif name == "cycle832":

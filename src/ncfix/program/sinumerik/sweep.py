@@ -11,7 +11,7 @@ import numpy as np
 
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.sinumerik.course import Course
-from ncfix.program.sinumerik.destination import End, Words
+from ncfix.program.sinumerik.destination import End, Leg, Words
 from ncfix.program.sinumerik.framing import PROGRAMMABLE
 from ncfix.program.sinumerik.plans import Branching, Plan
 from ncfix.program.sinumerik.state import Sinumerik
@@ -44,7 +44,7 @@ def refuse(control: Sinumerik, plan: Plan, block: int) -> None:
     control.row_block = block
     lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
     words = Words(block, {}, {}, plan.axes)
-    control.go(Kind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing)
+    control.go(Leg(Kind.RAPID, words, End(control.position[:], lost, dict(lost)), 0, passing=passing))
 
 
 def earliest(unit: Unit, block: int) -> int | None:

@@ -14,9 +14,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ncfix.program.follow.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotation
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
-from ncfix.program.sinumerik.destination import End, Words
+from ncfix.program.sinumerik.destination import End, Leg, Words
 from ncfix.program.sinumerik.orientation import WAY
 from ncfix.program.sinumerik.plans import Calling, plain_text
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
@@ -157,9 +158,9 @@ def tilted(control: Sinumerik, block: int, plane: Plane) -> None:
     gone = [index for index in control.machine if (control.rotary[index] and index not in axes) or index in (X, Y, Z)]
     lost = dict(control.lost) | dict.fromkeys(gone, AFTER_SWIVEL)
     lost = {index: why for index, why in lost.items() if index not in axes}
-    mask = sum(1 << index for index in control.machine if control.rotary[index])
+    mask = mask_of(control.turning)
     end = End(target, control.unknown_for(lost), lost)
-    control.go(Kind.RAPID, Words(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL)
+    control.go(Leg(Kind.RAPID, Words(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL))
 
 
 def turn_square(control: Sinumerik, plane: Plane) -> dict[int, float]:

@@ -14,7 +14,7 @@ from ncfix.program.follow.arcs import ARC_FAULT
 from ncfix.program.follow.faults import Fault
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.circles import POLAR_ARC, circle_of
-from ncfix.program.sinumerik.destination import Words, destination
+from ncfix.program.sinumerik.destination import Leg, Words, destination
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.vocabulary import CT_LEFT, CT_RIGHT
 
@@ -33,20 +33,20 @@ def tangential(control: Sinumerik, words: Words) -> None:
     ahead = (0.0, 0.0) if heading is None else (heading[plane.first], heading[plane.second])
     chord = step[plane.first], step[plane.second]
     if why or end.unknown or control.unknown or not math.hypot(*ahead):
-        control.go(Kind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING)
+        control.go(Leg(Kind.FEED, words, end, CT_LEFT, refusal=why or NO_HEADING))
         return
     along = ahead[0] * chord[0] + ahead[1] * chord[1]
     left = ahead[0] * chord[1] - ahead[1] * chord[0]
     if abs(left) <= STRAIGHT * math.hypot(*ahead) * math.hypot(*chord):
         if along <= 0.0 and any(chord):
             raise Fault(ARC_FAULT, "the arc (CT) would have to turn back on the spot: its end lies straight behind")
-        control.go(Kind.FEED, words, end, CT_LEFT)
+        control.go(Leg(Kind.FEED, words, end, CT_LEFT))
         return
     away = (chord[0] ** 2 + chord[1] ** 2) / (2 * left)
     sweep = 2 * math.atan2(left, along)
     sweep += math.copysign(2 * math.pi * max(round(words.get("TURN")), 0), left)
     circle = circle_of(control, plane, (-ahead[1] * away, ahead[0] * away), sweep)
-    control.go(Kind.ARC, words, end, CT_LEFT if left > 0 else CT_RIGHT, arc=circle)
+    control.go(Leg(Kind.ARC, words, end, CT_LEFT if left > 0 else CT_RIGHT, arc=circle))
 
 
 def refusal_of(words: Words) -> str:

@@ -114,7 +114,7 @@ class Recorder:
         if variables.scope_of(step.name) is not None:
             return item.span, ""
         parts = indices(item.target)
-        if is_plain(item.value) and all(part is not None and (is_plain(part) or is_name(part)) for part in parts):
+        if is_plain(item.value) and all(map(is_index, parts)):
             return None
         places = [number(part(scope)) for part in step.index]
         known = tuple(place for place in places if place is not None)
@@ -164,12 +164,11 @@ class Recorder:
         values = [
             None if part is None else value(scope) for value, part in zip(step.arguments, step.written, strict=True)
         ]
-        unknown = any(value is None and part is not None for value, part in zip(values, step.written, strict=True))
-        if unknown and command.name in HARMLESS:
+        if all(value is not None or part is None for value, part in zip(values, step.written, strict=True)):
+            return command.span, f"{command.name.upper()}({','.join(map(argument, values))})"
+        if command.name in HARMLESS:
             return command.span, ""
-        if unknown:
-            raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
-        return command.span, f"{command.name.upper()}({','.join(map(argument, values))})"
+        raise Fault(RUNTIME, f"an argument of {command.name.upper()} is known only at run time")
 
 
 def is_plain(value: Expression) -> bool:
@@ -199,9 +198,9 @@ def has_value(variables: Variables, name: str) -> bool:
     return name == ANY_PARAMETER or variables.value(key_of(name)) is not None
 
 
-def is_name(value: Expression) -> bool:
-    """Whether an index is a name, as that of an axis."""
-    return isinstance(value, NamedParameter)
+def is_index(value: Expression | None) -> bool:
+    """Whether an index is written as it is: a number, or a name, as that of an axis."""
+    return value is not None and (is_plain(value) or isinstance(value, NamedParameter))
 
 
 def is_head(turn: Turn) -> bool:
