@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import FOREIGN, Dialect
+from ncfix.program.dialect import FOREIGN, TURNING, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,7 +32,7 @@ FANUC = Dialect(
         rb"(?im)^[^(;\n]*,[ \t]*[RCA][ \t]*[-+]?[\d.#\[]",
         rb"(?m)^[ \t/]*(?:N\d+[ \t]*)?#[ \t]*\d+[ \t]*=[ \t]*[-+]?[ \t]*[\d.#][\d.# \t]*[-+*/]",
     ),
-    foreign=(*FOREIGN, VERICUT, O_WORDS),
+    foreign=(*FOREIGN, VERICUT, O_WORDS, *TURNING),
     upper_case=True,
     closure_mm=0.01,
     language="ncfix.program.fanuc.language:FANUC",
@@ -62,6 +62,7 @@ FANUC = Dialect(
         "what is computed from positions (#5001 ...), inputs and clocks: compensation or the machine changes it",
         "everything after a G code, a command or a setting (G10 L50, #5201) that is not known",
         "blocks executed from several states, and canned cycles with G91, without --flatten",
+        "programs for lathes: turning cycles (G71 P Q), G50 S, or G96 and no Y",
     ),
 )
 

@@ -106,11 +106,6 @@ class Record:
     kind: str
     values: tuple[tuple[int, str], ...]
 
-    def text(self) -> str:
-        """The line."""
-        words = "".join(f"{self.kind}{index if self.kind else ''}P{value}" for index, value in self.values)
-        return f"N{self.number:05d}{words};"
-
 
 def read_records(remarks: Remarks) -> tuple[Record, ...]:
     """The records of a punched parameter file."""
@@ -132,8 +127,3 @@ def read_records(remarks: Remarks) -> tuple[Record, ...]:
         else:
             remarks.refuse(line, "is no record N..P.. or N..A1P..A2P..")
     return tuple(found)
-
-
-def records_text(records: Sequence[Record]) -> bytes:
-    """The punched file."""
-    return "".join(f"{row}\n" for row in ["%", *(record.text() for record in records), "%"]).encode()

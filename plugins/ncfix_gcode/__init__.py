@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import FOREIGN, Dialect
+from ncfix.program.dialect import FOREIGN, TURNING, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,7 +17,7 @@ ISO = Dialect(
     title="ISO 6983 (common G-code)",
     grammar="iso.lark",
     suffixes=(".nc", ".gcode", ".tap", ".cnc", ".ncc", ".iso", ".g", ".gc", ".din", ".eia", ".min"),
-    foreign=FOREIGN,
+    foreign=(*FOREIGN, *TURNING),
     line_limit=65535,
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",
@@ -32,6 +32,7 @@ ISO = Dialect(
         "G16, G51, G51.1, G12.1, G68.2 while in force, threads, incremental canned cycles without --flatten",
         "everything after a G code that is not known, or a G10 that sets other things on other controls (L10, L20)",
         "blocks executed from several states without --flatten",
+        "programs for lathes: turning cycles, G50 S, or G96 and no Y",
     ),
 )
 

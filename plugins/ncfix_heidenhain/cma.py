@@ -24,25 +24,36 @@ def cma_text(axes: Sequence[str], tables: Mapping[str, str]) -> bytes:
 def read_cma(files: Files) -> tuple[tuple[str, ...], dict[str, str], Remarks]:
     """All axes in their order, and the file of each in the active line; with remarks."""
     names = [name for name in files if name.lower().endswith(".cma")]
-    path = names[0] if len(names) == 1 else CONFIG
-    remarks = Remarks.of(path, files[path] if len(names) == 1 else b"")
     if len(names) != 1:
+        remarks = Remarks.of(CONFIG, b"")
         remarks.refuse(0, f"{len(names)} .cma files instead of one")
         return (), {}, remarks
-    table = read_table(remarks, files[path])
+    remarks = Remarks.of(names[0], files[names[0]])
+    table = read_table(remarks, files[names[0]])
     if table is None:
         return (), {}, remarks
+    axes = _axes(table, remarks)
+    return axes, _active(table, axes, files, remarks), remarks
+
+
+def _axes(table: TextTable, remarks: Remarks) -> tuple[str, ...]:
+    """The axes that have a column, each of which should be there once."""
     axes = tuple(column.name for column in table.columns if column.name not in ("NR", ACTIVE))
     for axis in axes:
         if len(axis) != 1 or axis not in ORDER or axes.count(axis) > 1:
             remarks.refuse(0, f"the column {axis} is no axis, or is there twice")
+    return axes
+
+
+def _active(table: TextTable, axes: Sequence[str], files: Files, remarks: Remarks) -> dict[str, str]:
+    """Axis -> its file, of those that the active line names and that are there."""
     marked = [row for row, cell in enumerate(table.cells(ACTIVE)) if cell == "*"]
     if len(marked) != 1:
         remarks.refuse(0, f"{len(marked)} lines are marked with *", "exactly one line is active")
-        return axes, {}, remarks
+        return {}
     row = marked[0]
-    found = {axis: table.cells(axis)[row] for axis in axes if table.cells(axis)[row]}
-    for axis, name in found.items():
+    named = {axis: name for axis in axes if (name := table.cells(axis)[row])}
+    for axis, name in named.items():
         if name not in files:
             remarks.refuse(table.lines[row], f"the file {name} of axis {axis} is missing")
-    return axes, {axis: name for axis, name in found.items() if name in files}, remarks
+    return {axis: name for axis, name in named.items() if name in files}

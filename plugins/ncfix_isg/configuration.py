@@ -119,6 +119,7 @@ def _check_axes(entries: Entries, axes: list[str], remarks: Remarks) -> None:
 
 
 def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
+    """The names in `files` of the grids that are listed, in their order."""
     found = []
     for index in range(MOST_FILES):
         line, path = entries.get(f"file[{index}]", (0, ""))
@@ -133,10 +134,17 @@ def _grid_files(entries: Entries, remarks: Remarks, files: Files) -> list[str]:
             remarks.refuse(line, f"the file {name} is missing")
         else:
             found.append(name if name in here else here[0])
-    known = {f"{key}[{index}]" for index in range(len(found)) for key in ("file", "file_format")}
-    for name, (line, _) in entries.items():
-        if name.startswith("file") and name not in known and not remarks.wrong:
-            remarks.refuse(line, f"{name} does not follow on", f"file[0] to file[{MOST_FILES - 1}] in order")
-    if not found and not remarks.wrong:
-        remarks.refuse(0, "names no file")
+    if not remarks.wrong:
+        _check_listing(entries, remarks, len(found))
     return found
+
+
+def _check_listing(entries: Entries, remarks: Remarks, count: int) -> None:
+    """Files are numbered from 0 without a gap, and there is one at least."""
+    known = {f"{key}[{index}]" for index in range(count) for key in ("file", "file_format")}
+    stray = next((name for name in entries if name.startswith("file") and name not in known), None)
+    if stray is not None:
+        hint = f"file[0] to file[{MOST_FILES - 1}] in order"
+        remarks.refuse(entries[stray][0], f"{stray} does not follow on", hint)
+    elif not count:
+        remarks.refuse(0, "names no file")

@@ -9,7 +9,7 @@ things that they register. docs/plugins.md shows a plugin in 15 lines.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import pluggy
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import click
 
     from ncfix.machine.basis import Basis
+    from ncfix.machine.library import PluginEffect
     from ncfix.measure.measurement import Measurement
     from ncfix.program.dialect import Dialect
     from ncfix.report.document import Document
@@ -52,7 +53,7 @@ def register_bases(register: Register[type[Basis]]) -> None:
 
 
 @hookspec
-def register_effects(register: Register[Any]) -> None:
+def register_effects(register: Register[PluginEffect]) -> None:
     """Named error effects beyond ISO 230-1 for `name = "..."` of an effect in a machine file, and for diagnosis."""
 
 

@@ -10,7 +10,6 @@ from ncfix.diagnose.contest import COUNT, Contest, chance, climbed, exchanged, w
 from ncfix.diagnose.next_poses import (
     SURE,
     SURELY,
-    TOLD,
     Proposal,
     _beyond,
     _marked,
@@ -20,6 +19,7 @@ from ncfix.diagnose.next_poses import (
     _travels,
     _where_it_was,
 )
+from ncfix.diagnose.rounds import TOLD
 from ncfix.diagnose.view import view
 from ncfix.measure.program import skeleton
 from ncfix.measure.reader import reads

@@ -54,7 +54,7 @@ def test_play_that_changes_along_the_axis_takes_nodes() -> None:
 @pytest.mark.parametrize("size", [0.004, -0.004])
 def test_controls_take_it_off(control: str, topology: str, size: float) -> None:
     made = exported(control, with_play(size, topology=topology))
-    assert made.left.before.max() == pytest.approx(0.002, abs=1e-6)
+    assert made.left.before.max() == pytest.approx(0.002, abs=1e-12)
     assert made.left.after.max() < 1.1e-4  # a tenth of a micrometre is a detection unit
     assert not any("(play) is left" in note for note in made.notes)
     assert not made.messages
@@ -84,7 +84,7 @@ def test_golden_axis_list() -> None:
 @pytest.mark.parametrize("control", CONTROLS)
 def test_it_can_be_left(control: str) -> None:
     made = exported(control, with_play(0.004), play="no")
-    assert made.left.after.max() == pytest.approx(0.002, abs=1e-6)
+    assert made.left.after.max() == pytest.approx(0.002, abs=1e-12)
     assert any("(play) is left: up to 2.00 um" in note for note in made.notes)
 
 

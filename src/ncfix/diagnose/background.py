@@ -75,7 +75,7 @@ class Background:
 
 
 def in_noise(covariance: Array, relative: Array) -> Array:
-    """A covariance in units of each value's noise."""
+    """A covariance (m, m) in units of each value's noise; `relative` (m,)."""
     scaled: Array = covariance / relative[:, None] / relative
     return scaled
 

@@ -92,7 +92,7 @@ def chance(told: Array | Sequence[float] | float) -> Array:
 
 
 def merit(told: Sequence[Array]) -> Array:
-    """What poses are worth that tell the worst rival of each name apart so well: the chance that one name is left."""
+    """What poses are worth, (n,), that tell each name's worst rival apart so well, (n,): the chance that one stays."""
     worth = [chance(each) + LEAN * np.log1p(np.maximum(each, 0.0)) for each in told]
     found: Array = np.mean(worth, axis=0)
     return found

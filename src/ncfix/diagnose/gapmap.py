@@ -123,7 +123,10 @@ def _features(view: View) -> Iterator[tuple[str, Array]]:
 
 
 def clustering(ground: Background, residual: Array, places: Array) -> float:
-    """Moran's I of neighbouring poses: 0 for residuals that do not know of their neighbours, 1 for equal ones."""
+    """Moran's I of neighbouring poses: 0 for residuals that do not know of their neighbours, 1 for equal ones.
+
+    residual (m,) um; places (n, k) of the rows. Source: Moran, "Notes on continuous stochastic phenomena" (1950).
+    """
     from scipy.spatial import cKDTree
 
     view = ground.view

@@ -62,6 +62,6 @@ def _stands_behind(scale: Scale, selected: Selected, name: str) -> bool:
 
 
 def visible(view: View, shown: Array) -> float:
-    """The size of what an effect shows beside what is free, um."""
+    """The size of what an effect shows, (m,) um, beside what is free: rms over rows, um."""
     free = orthonormal(view.base / view.relative[:, None])
     return view.rms(without(free, (shown / view.relative)[:, None])[:, 0] * view.relative)

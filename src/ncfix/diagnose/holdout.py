@@ -68,7 +68,7 @@ def _predicted(ground: Background, signal: Array, share: float, tests: Sequence[
 
 
 def cells(u: Array, count: int = CELLS) -> Index:
-    """Regions of the poses with equally many rows: halved at the median of the widest direction, again and again."""
+    """Regions (n,) of poses u (n, k), with equally many rows: halved at the median of the widest way over and over."""
     label = np.zeros(len(u), dtype=np.int64)
     for _ in range(int(np.log2(count))):
         new = np.empty_like(label)

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 
 import numpy as np
 
 from ncfix.diagnose.addition import Mask
-from ncfix.diagnose.contest import Contest, chance, exchanged, worst
+from ncfix.diagnose.contest import chance, exchanged, worst
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
+from ncfix.diagnose.rounds import Rounds, Side
 from ncfix.diagnose.selection import Selected, aliases
 from ncfix.diagnose.view import View
 from ncfix.diagnose.weighing import Members, Scale
@@ -25,8 +25,6 @@ from ncfix.machine import Machine
 from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.kinds import STATES
 from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.observation import Observation
-from ncfix.measure.observe import observe
 
 OFFERED = 320
 DRAWN, FEW = 10, 60
@@ -40,30 +38,17 @@ LENGTHS = (100.0, 300.0)
 """mm: a short tool, and one as long as a test mandrel; of these one more is used, that which differs most from any."""
 OTHER = 50.0
 """mm: a tool that differs by less from one that is there is none more."""
-TOLD = 6.0
-"""Squared noise units from which on a rival may be told apart: then the odds are 20 to 1 in one of two measurements."""
 SURELY = 21.0
-"""The same for nineteen of twenty measurements."""
+"""Squared noise units from which on a rival is told apart in nineteen of twenty measurements."""
 SURE = 0.95
 """The chance that belongs to that."""
 FEWER = 0.8
 """Poses that ask for more must leave so much fewer cases open, as a share."""
 HELPS = 0.05
 """And any must raise the chance that one name stands alone by so much."""
-WEAK = 1e-6
-"""Prior on what is free, so that unseen combinations do no harm."""
 ROUNDED = 1e-3
 """mm, degree: by which a pose may be rounded beyond a travel."""
 Span = tuple[float, float]
-
-
-@dataclass(frozen=True, repr=False)
-class Side:
-    """A name with what it would be: its likeliest form, the numbers behind it, and all forms with their sizes in um."""
-
-    group: Group
-    numbers: Array
-    forms: tuple[tuple[Group, float], ...]
 
 
 @dataclass(frozen=True, repr=False)
@@ -146,7 +131,7 @@ def propose(court: Court, sides: Sequence[Side], sigma: float) -> Proposal:
     best: Proposal | None = None
     for far, roaming, lengths in ways:
         offered = _offered(view, travels if far else spans, lengths, roaming)
-        found = _of(court, sides, sigma, offered)
+        found = _best_of(court, sides, sigma, offered)
         if best is None or 1 - found.chance < FEWER * (1 - best.chance):
             best = found
         if best.chance >= SURE:
@@ -164,29 +149,26 @@ def _one_more(tools: tuple[float, ...]) -> tuple[float, ...]:
     return (*tools, other) if apart >= OTHER else tools
 
 
-def _of(court: Court, sides: Sequence[Side], sigma: float, offered: Measurement) -> Proposal:
+def _best_of(court: Court, sides: Sequence[Side], sigma: float, offered: Measurement) -> Proposal:
     """The best of the poses on offer."""
-    view, names = court.background.view, tuple(side.group.owner.name for side in sides)
-    new, every = observe(offered, view.machine), range(len(offered))
-    rounds = [[_contest(court, new, true, other, sigma) for other in sides if other is not true] for true in sides]
-    able = [[each.told(every) > TOLD for each in own] for own in rounds]
-    useful = [kept for own, can in zip(rounds, able, strict=True) if (kept := list(compress(own, can)))]
-    index = exchanged(useful, len(offered)) if useful else list(every)
-    chances = [float(np.mean(chance(worst(rounds, rows)))) for rows in ([], index)]
-    reason = _reason(court, sides[0].group, [side.group for side in sides[1:]])
-    before, after = (min(worst(useful or rounds, rows)) for rows in ([], index))
-    if not useful or chances[1] < chances[0] + HELPS:
-        return Proposal(names[0], None, before, after, chances[0], reason, names[1:])
-    plan = offered.rows(index)
-    told = tuple(name for k, name in enumerate(names[1:]) if able[0][k] or able[k + 1][0])
-    stuck = tuple(name for name, can in zip(names, able, strict=True) if not all(can))
+    rounds, everything = Rounds.of(court, sides, offered, sigma), list(range(len(offered)))
+    index = exchanged(rounds.useful, len(offered)) if rounds.useful else everything
+    chances = [float(np.mean(chance(worst(rounds.contests, rows)))) for rows in ([], index)]
+    before, after = (min(worst(rounds.useful or rounds.contests, rows)) for rows in ([], index))
+    reason, (name, *others) = _reason(court, [side.group for side in sides]), rounds.names
+    if not rounds.useful or chances[1] < chances[0] + HELPS:
+        return Proposal(name, None, before, after, chances[0], reason, tuple(others))
+    told = rounds.told_from_first
+    alike = tuple(each for each in others if each not in told)
+    found = Proposal(name, None, before, after, chances[1], reason, told, alike, rounds.stuck)
+    return _with_plan(found, offered.rows(index), court.background.view)
+
+
+def _with_plan(found: Proposal, plan: Measurement, view: View) -> Proposal:
+    """A proposal with its poses, and with what is new about them."""
     beyond, tools = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
     strays = not _where_it_was(view, plan).all()
-    alike = tuple(name for name in names[1:] if name not in told)
-    return Proposal(
-        names[0], _marked(plan, beyond, tools, strays), before, after, chances[1], reason,
-        told, alike, stuck, beyond, tools, strays,
-    )  # fmt: skip
+    return replace(found, plan=_marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:
@@ -258,46 +240,13 @@ def _offered(view: View, ranges: Mapping[str, Span], lengths: Sequence[float], r
     return replace(plan, columns={**plan.columns, **held}, labels={"set": sets})
 
 
-def _contest(court: Court, new: Observation, true: Side, other: Side, sigma: float) -> Contest:
-    """Columns: set-up of the old rows, of the new ones, constants of the machine, the forms of the other."""
+def _reason(court: Court, groups: Sequence[Group]) -> str:
+    """Why the data so far leave the first of them and the others alike."""
     view = court.background.view
-    constants = view.problem.design.shape[1]
-    used = view.base.shape[1] - constants
-    setup = 1e3 * new.unknown_design(new.unknowns.start)
-    fresh, weight = setup.shape[1], 1 / (sigma * view.relative)
-    imitating = [size * group.columns for group, size in other.forms]
-    old = np.concatenate([view.base[:, :used], np.zeros((len(view.y), fresh)), view.base[:, used:], *imitating], axis=1)
-    imitating = [size * _shown(new, group) for group, size in other.forms]
-    kinematic = 1e3 * new.design(view.problem.selection.estimated)
-    rows = np.concatenate([np.zeros((len(setup), used)), setup, kinematic, *imitating], axis=1)
-    free = used + fresh + constants
-    scale = np.ones(old.shape[1])
-    scale[:free] = np.sqrt((old[:, :free] ** 2).mean(axis=0) + (rows[:, :free] ** 2).mean(axis=0))
-    scale = np.where(scale > 0, scale, 1.0)
-    prior = np.concatenate([np.full(free, WEAK), np.ones(old.shape[1] - free)])
-    old, rows = old / scale * weight[:, None], rows / scale / sigma
-    signal = (true.group.columns @ true.numbers) * weight
-    count = len(new.measurement)
-    return Contest(
-        old.T @ old + np.diag(prior), old.T @ signal, float(signal @ signal),
-        rows.reshape(count, -1, rows.shape[1]), (_shown(new, true.group) @ true.numbers / sigma).reshape(count, -1),
-    )  # fmt: skip
-
-
-def _shown(new: Observation, group: Group) -> Array:
-    """What the numbers of a form show in the poses on offer, um."""
-    used = group.loading.any(axis=1)
-    shown: Array = 1e3 * new.design(group.owner.effects)[:, used] @ group.loading[used]
-    return shown
-
-
-def _reason(court: Court, chosen: Group, rivals: Sequence[Group]) -> str:
-    """Why the data so far leave them alike."""
-    view = court.background.view
-    turning = {any(effect.rotational for effect in group.owner.effects[:1]) for group in (chosen, *rivals)}
+    turning = {any(effect.rotational for effect in group.owner.effects[:1]) for group in groups}
     if len(set(np.round(view.column("tool_length"), 3).tolist())) == 1 and len(turning) == 2:
         return "one tool length: a shift and a tilt look alike where the lever is always the same"
-    own = chosen.owner.axis
+    own = groups[0].owner.axis
     if own and f"dir_{own}" not in view.reach.columns:
         return f"{own} came from one side only, so nothing shows what depends on its direction"
     return "at these poses they show nearly the same pattern"

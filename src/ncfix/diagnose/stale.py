@@ -15,6 +15,8 @@ from ncfix.measure.solve import orthonormal, without
 REACH = 0.16
 """Of the travel measured: how far a table may be off."""
 PLACES = 33
+OF_FILE = "stale table: the curves of the file belong some way beside: "
+OF_CONTROL = "stale table: the control corrects with a table shifted by "
 ROUNDS = 4
 
 
@@ -32,15 +34,11 @@ def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Mach
     shown = {name: _shown(seen, basis, curves[name], ways[name]) for name in curves}
     own = {name: rows[len(rows) // 2] for name, rows in shown.items()}
     y = _left(basis, seen.y / seen.relative) + sum(own.values(), np.zeros(len(seen.y)))
-    beside = _found(y, shown)
-    title = "stale table: the curves of the file belong some way beside: "
-    if any(k != PLACES // 2 for k in beside.values()):
-        yield _machine(machine, curves, ways, beside, False), title + _said(ways, beside)
     corrected = {name: own[name] - rows for name, rows in shown.items()}
-    beside = _found(y, corrected)
-    title = "stale table: the control corrects with a table shifted by "
-    if any(k != PLACES // 2 for k in beside.values()):
-        yield _machine(machine, curves, ways, beside, True), title + _said(ways, beside)
+    for title, by_control, patterns in ((OF_FILE, False, shown), (OF_CONTROL, True, corrected)):
+        beside = _found(y, patterns)
+        if any(k != PLACES // 2 for k in beside.values()):
+            yield _machine(machine, curves, ways, beside, by_control), title + _said(ways, beside)
 
 
 def _shown(seen: View, basis: Array, curves: Sequence[Effect], ways: Array) -> Array:

@@ -104,7 +104,7 @@ class View:
         return np.concatenate([each.q for each in self.problem.observations])
 
     def column(self, name: str) -> Array:
-        """A state column of all rows, zero where a file lacks it; directions as each kind of measurement says them."""
+        """A state column (n,) of all rows, zero where a file lacks it; directions as the kind of measurement says."""
         axis = name.removeprefix("dir_")
         if axis != name and axis in self.machine.axis_names:
             return self.directions[:, self.machine.axis_names.index(axis)]
@@ -148,7 +148,7 @@ class View:
         )
 
     def rms(self, values: Array, keep: NDArray[np.bool_] | None = None) -> float:
-        """Root mean square over rows of the length of what a row shows, um."""
+        """Root mean square over rows of the length of what each shows; values (m, ...), um, those in `keep` (m,)."""
         inside = self.row >= 0 if keep is None else (self.row >= 0) & keep
         rows = len(np.unique(self.row[inside]))
         return float(np.sqrt((values[inside] ** 2).sum() / max(rows, 1)))
@@ -205,7 +205,7 @@ def view(measurements: Sequence[Measurement], machine: Machine) -> View:
 
 
 def relative_noise(problem: Problem) -> Array:
-    """Standard deviation of each value against that of a plain one; files that do not tell are like those that do."""
+    """Standard deviation of each value against the usual one, (m,); files that do not tell are like those that do."""
     known = [each.sigma for each in problem.observations if each.noise_known]
     usual = float(np.median(np.concatenate(known))) if known else float(np.median(problem.sigma))
     own = [
@@ -217,7 +217,7 @@ def relative_noise(problem: Problem) -> Array:
 
 
 def damped(columns: Array, y: Array) -> Array:
-    """Least squares in which what the data hardly tell stays as it is."""
+    """Least squares of columns (m, k) to y (m,), in which what the data hardly tell stays zero: (k,)."""
     size = np.sqrt((columns**2).mean(axis=0))
     size = np.where(size > 0, size, 1.0)
     left, values, right = np.linalg.svd(columns / size, full_matrices=False)

@@ -76,7 +76,7 @@ class Problem:
 
     @property
     def start(self) -> Array:
-        """The first guess of the set-up."""
+        """The first guess of what is unknown about the set-ups, one after another, (k,), mm or rad."""
         return np.concatenate([np.zeros(0), *(each.unknowns.start for each in self.observations)])
 
     @property
@@ -85,14 +85,14 @@ class Problem:
         return all(each.noise_known for each in self.observations)
 
     def residual(self, coefficients: Array, unknowns: Array) -> Array:
-        """Values minus exact predictions."""
+        """Values minus exact predictions, (m,), mm or rad, for coefficients (p,) and unknowns (k,)."""
         machine = self.selection.machine(self.machine, coefficients.tolist())
         parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
         predicted = [each.predict(machine, part) for each, part in zip(self.observations, parts, strict=True)]
         return self.values - np.concatenate(predicted)
 
     def nuisance(self, unknowns: Array) -> Array:
-        """The derivative by the set-up, block by block."""
+        """The derivative of predictions by the unknowns at `unknowns` (k,): (m, k), a block for each observation."""
         columns = np.zeros((len(self.values), sum(self.sizes)))
         parts = np.split(unknowns, np.cumsum(self.sizes)[:-1])
         row = column = 0
@@ -150,7 +150,7 @@ class Calibration:
 
     @property
     def sigma(self) -> Array:
-        """Their standard deviations."""
+        """The standard deviations of all coefficients, (p,); NaN where they were held."""
         deviations: Array = np.sqrt(np.diag(self.covariance))
         return deviations
 

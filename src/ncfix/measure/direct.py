@@ -60,7 +60,7 @@ class DirectReading(Observation):
 
     @cached_property
     def sigma(self) -> Array:
-        """As for others, but that each row says for itself whether it is an angle, and angles have repeats, too."""
+        """As for others, (m,); but each row says for itself whether it is an angle, and angles have repeats, too."""
         lengths, angles = self.measurement.noise
         if angles is None and lengths is None:
             angles = self._repeats(self.turns)
@@ -126,7 +126,7 @@ class DirectReading(Observation):
 
     @property
     def rotational(self) -> NDArray[np.bool_]:
-        """Which rows are angles."""
+        """Which rows are angles, (n,)."""
         return np.array([name[1] in "ABC" for name in self.names])
 
     @cached_property

@@ -141,7 +141,7 @@ def _whitening(small: Array) -> Array:
 
 
 def information(pool: Pool, rows: Sequence[int]) -> Array:
-    """The information of some blocks, with next to nothing added so that it has an inverse."""
+    """The information matrix (p, p) of some blocks, with next to nothing added so that it has an inverse."""
     p = pool.blocks.shape[2]
     stacked = pool.blocks[list(rows)].reshape(-1, p)
     total: Array = stacked.T @ stacked + RIDGE * np.eye(p) * max(float((pool.blocks**2).mean()), 1e-300)

@@ -74,7 +74,7 @@ class Measurement:
         return self.labels.get("set", ("1",) * len(self))
 
     def column(self, name: str, default: float = 0.0) -> Array:
-        """A column of numbers, or the default in every row."""
+        """A column of numbers (n,), in the units of the file, or the default in every row."""
         return self.columns.get(name, np.full(len(self), default))
 
     def stacked(self, *names: str) -> Array:

@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 
 LEVER = 100.0
 """mm: noise of an angle, where only that of a length is given, is that of a length at this distance."""
+FREEDOM_LEAST = 10
+"""Degrees of freedom below which repeats do not tell the noise: what they say may be off by a quarter."""
 DEFAULT_NOISE = 1e-3
 """mm, where neither a header nor repeats tell; only the ratio of noises matters then."""
 
@@ -49,7 +51,7 @@ class Unknowns:
 
     @staticmethod
     def vectors(what: str, names: Sequence[str], start: Array | float = 0.0, spread: float = 0.05) -> Unknowns:
-        """Vectors of three, one for each name: `what` name, x y z."""
+        """Vectors of three, one for each name: `what` name, x y z; `start` (3,) or (names, 3), mm as `spread`."""
         labels = tuple(f"{what}{name} {axis}" for name in names for axis in "xyz")
         found = np.broadcast_to(np.asarray(start, dtype=np.float64), (len(names), 3)).reshape(-1)
         return Unknowns(labels, np.array(found), np.full(len(labels), spread))
@@ -99,12 +101,12 @@ class Observation(ABC):
 
     @property
     def extra_values(self) -> Array:
-        """Values that belong to no row: calibrated distances."""
+        """Values that belong to no row, (e,): calibrated distances, mm."""
         return np.zeros(0)
 
     @property
     def extra_sigma(self) -> Array:
-        """Their standard deviations."""
+        """Their standard deviations, (e,), mm."""
         return np.zeros(0)
 
     @cached_property
@@ -130,7 +132,7 @@ class Observation(ABC):
 
     @cached_property
     def sigma(self) -> Array:
-        """The standard deviation of each value, mm or rad: from the header, else from repeats, else 1 um."""
+        """The standard deviation of each value, (m,), mm or rad: from the header, else from repeats, else 1 um."""
         lengths, angles = self.measurement.noise
         if lengths is None:
             lengths = repeatability(self.measurement, self.components, self.angular) or DEFAULT_NOISE
@@ -146,7 +148,7 @@ class Observation(ABC):
         return repeatability(self.measurement, self.components, self.angular) is not None
 
     def with_values(self, values: Array) -> Measurement:
-        """The measurement with these values read."""
+        """The measurement with these values (m,) read; those that belong to no row are left out."""
         rows = values[: len(self.measurement) * len(self.components)].reshape(-1, len(self.components))
         return self.measurement.with_columns(dict(zip(self.components, rows.T, strict=True)))
 
@@ -158,20 +160,15 @@ def repeatability(
 
     Repeats are rows of one set, pose, direction and tool, among `rows` (n,) if given; time and temperatures may differ.
     """
-    names = [name for name in measurement.columns if not _varies(name) and name not in measurement.measured]
     found = [name for name, turn in zip(components, angular, strict=True) if name in measurement.columns and not turn]
-    if not found:
+    states = _states(measurement)
+    among = np.arange(len(states)) if rows is None else np.flatnonzero(rows)
+    if not found or not states or not among.size:
         return None
-    labels = [value for name, value in measurement.labels.items() if name != "repeat"]
-    numbers = [tuple(measurement.columns[name].tolist()) for name in names]
-    keys = [str(key) for key in zip(*labels, *numbers, strict=True)] if labels or numbers else []
-    among = np.arange(len(keys)) if rows is None else np.flatnonzero(rows)
-    if not keys or not among.size:
-        return None
-    _, group = groups([keys[row] for row in among])
+    _, group = groups([states[row] for row in among])
     counts = np.bincount(group)
     freedom = (counts - 1).clip(0).sum() * len(found)
-    if freedom < 10:
+    if freedom < FREEDOM_LEAST:
         return None
     squares = 0.0
     for name in found:
@@ -181,5 +178,14 @@ def repeatability(
     return float(np.sqrt(squares / freedom)) or None
 
 
+def _states(measurement: Measurement) -> list[str]:
+    """The state of each row, as text: what repeats of it share; none where nothing but readings was noted."""
+    labels = [value for name, value in measurement.labels.items() if name != "repeat"]
+    names = [name for name in measurement.columns if not _varies(name) and name not in measurement.measured]
+    numbers = [tuple(measurement.columns[name].tolist()) for name in names]
+    return [str(state) for state in zip(*labels, *numbers, strict=True)]
+
+
 def _varies(name: str) -> bool:
+    """Whether a column may differ between repeats."""
     return name in ("time_s", "run") or name.startswith("temp_")

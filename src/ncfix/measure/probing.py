@@ -61,12 +61,12 @@ class Probing(Observation):
 
     @property
     def extra_values(self) -> Array:
-        """The calibrated distances."""
+        """The calibrated distances, (e,), mm."""
         return np.array([length for _, _, length, _ in self.distances])
 
     @property
     def extra_sigma(self) -> Array:
-        """Half of their expanded uncertainties."""
+        """Half of their expanded uncertainties (k = 2), (e,), mm."""
         return np.array([uncertainty / COVERAGE for *_, uncertainty in self.distances])
 
     @cached_property
@@ -114,7 +114,7 @@ class Probing(Observation):
         return np.concatenate([columns.reshape(3 * n, -1), self._lengths_design(unknowns)])
 
     def with_bars(self, unknowns: Array, random: np.random.Generator) -> Array:
-        """The unknowns with the second ball of each calibrated distance as far away as its certificate has it."""
+        """The unknowns (k,) with the second ball of each calibrated distance as far away as its certificate has it."""
         moved = unknowns.copy()
         for first, second, length, uncertainty in self.distances:
             balls = self._balls(moved)

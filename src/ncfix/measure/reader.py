@@ -104,6 +104,7 @@ def _cells(line: str, number: int) -> list[Cell]:
 
 
 def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, plan: bool) -> None:
+    """Note columns that are unknown, there twice, or missing; a plan lacks what will be measured."""
     known = {*machine.axis_names, *form.columns, *form.labels, *LABELS, *machine.inputs, "tool_length", "time_s"}
     known |= {f"dir_{axis}" for axis in machine.axis_names}
     seen: set[str] = set()
@@ -117,12 +118,16 @@ def _check_names(text: Text, names: list[Cell], form: Kind, machine: Machine, pl
         _check_length_form(text, seen, names[0].line)
     if form.name == "probe" or (form.name == "length" and "ax" in seen):
         _check_named_once(text, names, form)
+    _check_missing(text, seen, form, names[0].line, plan)
+
+
+def _check_missing(text: Text, seen: set[str], form: Kind, line: int, plan: bool) -> None:
     wanted = form.required if plan or form.any_of else (*form.required, *form.measured)
     for missing in [each for each in wanted if each not in seen]:
-        text.note("NCF605", f"kind {form.name} has a column {missing!r}", names[0].line)
+        text.note("NCF605", f"kind {form.name} has a column {missing!r}", line)
     if form.any_of and not plan and not seen & set(form.measured):
         one = ", ".join(form.measured)
-        text.note("NCF605", f"kind {form.name} has at least one of {one}", names[0].line)
+        text.note("NCF605", f"kind {form.name} has at least one of {one}", line)
 
 
 def _unknown_name(text: Text, name: Cell, known: set[str], form: Kind, machine: Machine) -> None:

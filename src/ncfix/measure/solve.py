@@ -84,7 +84,7 @@ def orthonormal(columns: Array) -> Array:
 
 
 def without(basis: Array, columns: Array) -> Array:
-    """The part of the columns that is orthogonal to the basis; done twice, for the last digits."""
+    """The part of columns (m, ...) orthogonal to an orthonormal basis (m, k); done twice, for the last digits."""
     once = columns - basis @ (basis.T @ columns)
     twice: Array = once - basis @ (basis.T @ once)
     return twice

@@ -1,4 +1,7 @@
-"""Robust weights and outliers. Residuals are in units of the noise."""
+"""Robust weights and outliers. Residuals are in units of the noise.
+
+Source: Holland and Welsch, "Robust regression using iteratively reweighted least-squares" (1977).
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,12 @@ HEAVY = 1.6
 
 
 def spread(residual: Array) -> float:
-    """A robust standard deviation: the median size, made that of a normal distribution."""
+    """A robust standard deviation of residuals (m,): their median size over that of the normal distribution."""
     return float(np.median(np.abs(residual))) / 0.6745 or 1.0
 
 
 def of(loss: str, residual: Array) -> Array:
-    """The weights of iteratively reweighted least squares."""
+    """The weights (m,), 0 to 1, of iteratively reweighted least squares for residuals (m,); of Tukey unless Huber's."""
     size = np.abs(residual) / spread(residual)
     if loss == HUBER:
         return np.minimum(1.0, HUBER_K / np.maximum(size, 1e-12))

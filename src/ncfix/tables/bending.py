@@ -100,7 +100,7 @@ class Bending:
         return last
 
     def uneven(self) -> dict[int, tuple[Array, float]]:
-        """Number of nodes -> where they are best put, and the largest correction that they miss then, mm."""
+        """Number n of nodes -> where they are best put, (n,), and the largest correction that they miss then, mm."""
         if not self._uneven:
             ends = np.array([0, len(self.places) - 1])
             allowed = self._chord(0, len(self.places) - 1)

@@ -29,7 +29,7 @@ def projector(places: Array, nodes: Array) -> Array:
 
 
 def between(nodes: Array, within: int = WITHIN) -> Array:
-    """The nodes and evenly spaced places in the cells between them, ascending."""
+    """Nodes (n,) and evenly spaced places in the cells between them, ascending: (within (n - 1) + 1,)."""
     share = np.arange(within) / within
     inner = nodes[:-1, None] + share * np.diff(nodes)[:, None]
     found: Array = np.append(inner.reshape(-1), nodes[-1])

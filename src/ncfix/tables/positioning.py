@@ -68,7 +68,7 @@ def _table(
 
 
 def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
-    """How many evenly spaced nodes keep straight lines between them within `limit` of a curve; at most `most`."""
+    """How many even nodes keep straight lines between them within `limit` of a curve (n,) over `fine` (n,), at most."""
     for count in range(2, most):
         nodes = np.linspace(fine[0], fine[-1], count)
         if np.abs(np.interp(fine, nodes, np.interp(nodes, fine, curve)) - curve).max() <= limit:

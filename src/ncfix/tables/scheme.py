@@ -211,7 +211,8 @@ def ways_that_matter(machine: Machine) -> list[int]:
 def coarse_nodes(space: Array, turns: Sequence[bool], most: int = NODES) -> list[Array]:
     """Where corrections are taken apart: evenly over each axis, but not so evenly that a screw's period could hide.
 
-    The ends are among them, since most is left there; of axes that repeat (`turns`) there are none.
+    The ends of `space` (n_axes, 2), mm or rad, are among the nodes (n,) of each axis, since most is left there; of axes
+    that repeat (`turns`) they are not.
     """
     count = min(most, int(most ** (FULL / len(space)) + 1e-9))
     shaken = np.arange(count) + 0.5 + 0.3 * (np.mod(np.arange(1, count + 1) * 0.618034, 1.0) - 0.5)

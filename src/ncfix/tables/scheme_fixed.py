@@ -53,7 +53,7 @@ TURNS: Mapping[str, Function] = {
 
 
 def trigonometric(angle: Array) -> Array:
-    """1, cos, sin, cos sin, cos^2 of Eq. 44; its sin^2 is 1 - cos^2 and left out."""
+    """1, cos, sin, cos sin, cos^2 of angles (n,), rad: (n, 5), Eq. 44; its sin^2 is 1 - cos^2 and left out."""
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([np.ones_like(c), c, s, c * s, c * c], axis=1)
 

@@ -46,7 +46,7 @@ class Line:
 
     @property
     def fine(self) -> Array:
-        """All positions, from low to high or less than one part in a thousand beyond it, mm or rad."""
+        """All positions (steps + 1,), from low to high or less than one part in a thousand beyond it, mm or rad."""
         first = np.floor(self.low * SCALE + 1e-6)
         step = np.ceil((self.high * SCALE - first) / self.steps - 1e-6)
         positions: Array = (first + step * np.arange(self.steps + 1)) / SCALE * self.unit

@@ -44,7 +44,7 @@ class Product:
     size: float
 
     def on(self, axis: int) -> Array:
-        """The factor that is a function of this axis."""
+        """The factor that is a function of this axis, at its nodes, (n,)."""
         return self.first if axis == self.axes[0] else self.second
 
     def across(self, axis: int) -> int:

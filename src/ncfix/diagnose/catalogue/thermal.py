@@ -18,7 +18,7 @@ import numpy as np
 from ncfix.diagnose.catalogue import shapes
 from ncfix.diagnose.catalogue.candidate import LETTERS, TURNS, Candidate, Reach, across, along, stacked, weighed, zero
 from ncfix.diagnose.catalogue.weight import by_foundation
-from ncfix.machine import Effect
+from ncfix.machine import Axis, Effect
 from ncfix.machine.effect import SPINDLE
 from ncfix.machine.piecewise import Step
 from ncfix.machine.smooth import Polynomial
@@ -91,23 +91,10 @@ def candidates(reach: Reach) -> Iterator[Candidate]:
     yield _growth(reach, inside, clocked)
     yield from _drifts(reach, driven, clocked)
     for axis in reach.linear:
-        own = along(axis)
-        linear = reach.factor(axis)
-        if own is not None:
-            title = f"thermal scale of {axis.name}: positions stretch with temperature"
-            name = f"E{LETTERS[own]}{axis.name}"
-            places = np.linspace(*reach.spans[axis.name], HOLDS).tolist()
-            fixed = [[(name, linear | {"times_center": place}), (name, {})] for place in places]
-            yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven, among=[(1.0, BETWEEN)])
-        for turn in TURNS:
-            title = f"thermal bend: {axis.name} tilts about {LETTERS[TURNS.index(turn)]} with temperature"
-            name = f"E{turn}{axis.name}"
-            yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
+        yield from _scales(reach, axis, driven)
+        yield from _bends(axis, driven)
     for axis in reach.rotary:
-        lines = [f"E{LETTERS[k]}0{axis.name}" for k in across(axis)]
-        ways: list[Parts] = [[(line, how) for line in lines] for how in ({"carried": True}, {})]
-        title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
-        yield _driven(f"rotary centre drift {axis.name}", title, axis.name, ways, driven)
+        yield _centre(axis, driven)
     yield _artefact(reach, clocked)
     if clocked:
         yield from _slip(reach)
@@ -139,6 +126,32 @@ def _drifts(reach: Reach, driven: Drive, clocked: bool) -> Iterator[Candidate]:
         if air:
             title = f"ambient swing along {letter}: the frame follows the air"
             yield _driven(f"ambient swing {letter}", title, letter, parts, outside)
+
+
+def _scales(reach: Reach, axis: Axis, driven: Drive) -> Iterator[Candidate]:
+    """Positions of a linear axis stretch, from a place along its travel that nobody knows; none of a skewed axis."""
+    own = along(axis)
+    if own is None:
+        return
+    title, name = f"thermal scale of {axis.name}: positions stretch with temperature", f"E{LETTERS[own]}{axis.name}"
+    places = np.linspace(*reach.spans[axis.name], HOLDS).tolist()
+    fixed = [[(name, reach.factor(axis) | {"times_center": place}), (name, {})] for place in places]
+    yield _driven(f"thermal scale {axis.name}", title, axis.name, fixed, driven, among=[(1.0, BETWEEN)])
+
+
+def _bends(axis: Axis, driven: Drive) -> Iterator[Candidate]:
+    """A linear axis tilts about each direction."""
+    for turn, letter in zip(TURNS, LETTERS, strict=True):
+        title, name = f"thermal bend: {axis.name} tilts about {letter} with temperature", f"E{turn}{axis.name}"
+        yield _driven(f"thermal bend {name}", title, axis.name, [[(name, {})]], driven)
+
+
+def _centre(axis: Axis, driven: Drive) -> Candidate:
+    """The line of a rotary axis moves across itself, with what carries the axis or against it."""
+    lines = [f"E{LETTERS[k]}0{axis.name}" for k in across(axis)]
+    ways: list[Parts] = [[(line, how) for line in lines] for how in ({"carried": True}, {})]
+    title = f"rotary centre drift of {axis.name}: its axis line moves with temperature"
+    return _driven(f"rotary centre drift {axis.name}", title, axis.name, ways, driven)
 
 
 def _driven(
