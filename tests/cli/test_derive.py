@@ -77,6 +77,16 @@ def test_json(ncfix: Any, root: Path) -> None:
     ]
 
 
+def test_json_beside_a_file(ncfix: Any, root: Path, tmp_path: Path) -> None:
+    """The object goes to standard output and the formulas to the file, as each does alone."""
+    call, path = ("derive", "-m", root / HEAD, "--effects", "EXX"), tmp_path / "formulas.tex"
+    assert ncfix(*call, "--json", "--latex", "-o", path).out == ncfix(*call, "--json").out
+    assert path.read_bytes() == ncfix(*call, "--latex").out
+    refused = ncfix(*call, "--json", "--latex")
+    assert refused.code == 2
+    assert "--latex beside it needs -o FILE" in refused.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [

@@ -12,7 +12,6 @@ from ncfix.diagnostics import ExitCode
 
 NEITHER_OFFSET_NOR_START = b"G21 G90 G94 G54\nG1 X10 F100\nM2\n"
 STAMPED = b"(ncfix 0.1.0 machine 0123456789ab strategy full tolerance 1 um)\nG21 G90\nG0 X1 Y1 Z-1\nM2\n"
-OVER_THE_END = b"G21 G90 G94\nG0 X10 Y10 Z-1\nG1 X500 F600\nX500.03\nM2\n"
 
 
 def fixed(shop: Any, ncfix: Any, *options: object) -> Any:
@@ -231,6 +230,40 @@ def test_subprograms_are_found_beside_the_program(shop: Any, ncfix: Any) -> None
     missing = ncfix("trace", shop.program)
     assert missing.code == ExitCode.UNREADABLE
     assert "side" in missing.err
+
+
+@pytest.mark.parametrize("name", ["side.ngc", "SIDE.NGC", "side.CUT", "Side"])
+@pytest.mark.parametrize("how", ["option", "setup"])
+def test_subprograms_are_found_in_other_folders_whatever_the_case_of_their_names(
+    shop: Any, ncfix: Any, tmp_path: Path, name: str, how: str
+) -> None:
+    program, library, setup = shop.folder / "part.cut", tmp_path / "library", tmp_path / "shop" / "setup.toml"
+    program.write_bytes(b"G21 G90 G94\nG0 X10 Y10 Z-1\no<side> call\nM2\n")
+    for folder in (library, setup.parent):
+        folder.mkdir(exist_ok=True)
+    (library / name).write_bytes(b"o<side> sub\nG1 X100 F600\no<side> endsub\n")
+    setup.write_text('subprograms = ["../library"]\n')
+    given = ("--subprograms", library) if how == "option" else ("--setup", setup)
+    found = ncfix("trace", program, "--dialect", "linuxcnc", *given)
+    assert found.code == ExitCode.DONE, found.err
+    assert b"100.0,10.0,-1.0" in found.out
+
+
+def test_a_name_that_two_files_have_in_other_cases_is_no_subprogram(shop: Any, ncfix: Any) -> None:
+    shop.program.write_bytes(b"G21 G90 G94\nG0 X10 Y10 Z-1\no<side> call\nM2\n")
+    for name in ("Side.ngc", "SIDE.ngc"):
+        (shop.folder / name).write_bytes(b"o<side> sub\nG1 X100 F600\no<side> endsub\n")
+    assert "NCF231" in ncfix("trace", shop.program).err
+
+
+def test_a_folder_of_subprograms_that_is_not_there_is_named(shop: Any, ncfix: Any, tmp_path: Path) -> None:
+    setup = tmp_path / "setup.toml"
+    for text in ('subprograms = ["none"]', "subprograms = 5", 'subprograms = "none"'):
+        setup.write_text(text)
+        result = ncfix("trace", shop.program, "--setup", setup)
+        assert "setup.toml:1" in result.err
+        assert "NCF383: subprograms" in result.err
+    assert ncfix("trace", shop.program, "--subprograms", tmp_path / "none").code == ExitCode.USAGE
 
 
 def test_the_shipped_five_axis_example(examples: Path, ncfix: Any, tmp_path: Path) -> None:

@@ -66,6 +66,13 @@ def test_several_processes(jobs: int, part: int, long_program: Path, fix: Any, t
     assert (tmp_path / "out.ngc").read_bytes() == alone.out
 
 
+def test_where_processes_cannot_be_forked(long_program: Path, fix: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    shared_out = fix(PART, long_program, "--jobs", 2, "-o", "-").out
+    monkeypatch.setattr("ncfix.compensate.crew.FORKS", False)
+    monkeypatch.setattr("multiprocessing.get_context", None)
+    assert fix(PART, long_program, "--jobs", 2, "-o", "-").out == shared_out
+
+
 def test_a_file_that_is_changed_meanwhile(
     long_program: Path, fix: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

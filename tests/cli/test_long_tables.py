@@ -137,6 +137,14 @@ def test_a_table_is_there_when_it_is_whole(in_parts_of: Any, program: Path, tmp_
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.ngc", "motions.csv"]
 
 
+def test_both_forms_of_a_table_in_parts(in_parts_of: Any, program: Path, only_in_parts: Any, tmp_path: Path) -> None:
+    csv, json = (in_parts_of(WHOLE, *verb, program, *GIVEN).out for verb in (("trace",), ("trace", "--json")))
+    only_in_parts()
+    out = tmp_path / "motions.csv"
+    assert in_parts_of(1000, "trace", program, *GIVEN, "--json", "-o", out).out == json
+    assert out.read_bytes() == csv
+
+
 def test_the_dialect_is_told_by_the_same_text_in_any_parts(in_parts_of: Any, tmp_path: Path) -> None:
     """It shows behind the first parts only: G47 is a cycle of Haas, and where it ends is not known."""
     program = tmp_path / "a.nc"

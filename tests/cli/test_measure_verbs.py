@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from measure.poses import machine, plan
+from ncfix.diagnostics import ExitCode
 from ncfix.machine import load
 from ncfix.measure.synthetic import Faults, simulate
 from ncfix.measure.writer import dumps
@@ -200,3 +201,22 @@ def test_knots_and_time_constants_are_options(ncfix, measured, tmp_path):
     assert [row["name"] for row in knotted.json()["parameters"]][2:] == ["EXX above -0.333333", "EXX above 0.333333"]
     done = ncfix("calibrate", data, *options, "--effects", "EXX", "--time-constants")
     assert (done.code, "NCF639" in done.err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("call", "both"),
+    [
+        (("simulate", "--plan", "{poses}", "-o", "-", "--json"), "the measurement and the JSON object"),
+        (("calibrate", "{data}", "-o", "-", "--json"), "the machine and the JSON object"),
+        (("diagnose", "{data}", "-o", "-"), "the machine and what was found"),
+        (("diagnose", "{data}", "--next", "-", "--json"), "the poses and what was found"),
+        (("plan", "--gcode", "-"), "the program and the poses"),
+        (("plan", "--gcode", "-", "--json"), "the program and the JSON object"),
+    ],
+)
+def test_two_outputs_do_not_share_a_stream(ncfix, measured, call, both):
+    machine, poses, data = measured
+    result = ncfix(*(each.format(poses=poses, data=data) for each in call), "-m", machine)
+    assert result.code == ExitCode.USAGE
+    said = result.json()["errors"][0]["text"] if "--json" in call else result.err
+    assert f"{both} would both go to standard output" in said

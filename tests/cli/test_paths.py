@@ -55,6 +55,14 @@ def test_trace_as_json_and_into_a_file(shop: Any, ncfix: Any) -> None:
     assert "NCF004" in ncfix("trace", shop.program, "-o", shop.folder / "moves.csv").err
 
 
+def test_trace_as_json_beside_a_file(shop: Any, ncfix: Any) -> None:
+    """The object goes to standard output and the table to the file, as each does alone."""
+    both = ncfix("trace", shop.program, "--json", "-o", shop.folder / "moves.csv")
+    assert both.out == ncfix("trace", shop.program, "--json").out
+    assert (shop.folder / "moves.csv").read_bytes() == ncfix("trace", shop.program).out
+    assert ncfix("trace", shop.program, "--json", "-o", "-").out == both.out
+
+
 def test_simulate_says_how_wrong_it_will_be(shop: Any, ncfix: Any) -> None:
     result = ncfix("simulate", "-m", shop.machine, "--program", shop.program, "--assume-zero", "--json")
     assert result.code == ExitCode.DONE

@@ -10,7 +10,8 @@ FAMILIES = {"rs274", "fanuc", "sinumerik", "klartext"}
 ELSEWHERE = {
     "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures",
     "ncfix.diagnose", "ncfix.measure", "ncfix.report", "ncfix.machine.symbolic", "ncfix.kernel",
-    "ncfix.compensate.stream",
+    "ncfix.compensate.stream", "ncfix.compensate.flat", "ncfix.program.rs274.unroll",
+    "ncfix.program.setup_file", "ncfix.program.tool_table",
 }  # fmt: skip
 """What none of the verbs below needs for a program of a page and a machine with a few errors."""
 

@@ -8,7 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import FiniteRange, force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import STREAM, Outputs, each_once, read, shown, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode, RefusedError
 
 if TYPE_CHECKING:
@@ -75,6 +75,7 @@ def calibrate(
 
     each_once(measured)
     target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
+    check_streams([JSON] * as_json, machine=target)
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):

@@ -44,8 +44,8 @@ CODES = {
     ),
     "NCF010": Code(
         "two data streams for one output",
-        "The program and the JSON object would both go to standard output.",
-        "Write the program to a file with `-o FILE`.",
+        "Two outputs, a program and the JSON object, say, would both go to standard output.",
+        "Write one of them to a file: `-o FILE`.",
     ),
     "NCF011": Code(
         "two places for one output",

@@ -48,6 +48,8 @@ def derive(
     """
     if (machine_path is None) == (chain_path is None):
         raise click.UsageError("give one of --machine and --chain")
+    if as_json and form and output == STREAM:
+        raise click.UsageError(f"--json prints the formulas in a form of its own; --{form} beside it needs -o FILE")
     source = machine_path or chain_path or ""
     target = targets([source], Outputs(output, force=force))[0]
     from ncfix.machine import symbolic
@@ -59,12 +61,12 @@ def derive(
         include = list(CONSTANT) if include is None and form == "protocol" else include
         with console.busy("deriving"):
             derivation = symbolic.derive(load_machine(source), order, include, letters)
-    if as_json:
-        console.put_json(**_as_dict(derivation))
-    else:
+    if not as_json or target.file:
         with console.busy("writing the formulas"):
             text = _written(derivation, form, vary.split(","))
         target.write(text.encode())
+    if as_json:
+        console.put_json(**_as_dict(derivation))
 
 
 def _written(derivation: Derivation, form: str | None, vary: list[str]) -> str:

@@ -10,7 +10,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option
-from ncfix.cli.targets import STREAM, Outputs, each_once, read, shown, targets
+from ncfix.cli.targets import STREAM, Outputs, check_streams, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def diagnose(
     each_once(measured)
     inputs = (*measured, machine_path)
     machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
+    check_streams(["what was found"], machine=machine_target, poses=next_target, report=page_target)
     form = form_of(report) if report is not None else None
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]

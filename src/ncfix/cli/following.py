@@ -48,16 +48,16 @@ class Following:
         from ncfix.program.trace import trace
 
         if self.machine is not None:
-            return traced(program, self.machine, self.setup, subprograms(path))
-        return trace(program, self.setup, *self._axes(program), subprograms(path))
+            return traced(program, self.machine, self.setup, subprograms(self.setup, path))
+        return trace(program, self.setup, *self._axes(program), subprograms(self.setup, path))
 
     def checked(self, program: Program, path: str) -> Checked:
         """What is found in a program."""
         from ncfix.compensate.checking import check_alone, check_on
 
         if self.machine is None:
-            return check_alone(program, self.setup, *self._axes(program), subprograms(path))
-        return check_on(program, self.machine, self.setup, subprograms(path))
+            return check_alone(program, self.setup, *self._axes(program), subprograms(self.setup, path))
+        return check_on(program, self.machine, self.setup, subprograms(self.setup, path))
 
     def _axes(self, program: Program) -> tuple[tuple[str, ...], frozenset[str]]:
         """The axes of the machine, or without one those that the program names; and which of them turn."""
@@ -72,7 +72,7 @@ class Following:
         from ncfix.compensate.following import follow
 
         assert self.machine is not None
-        found = follow(program, self.machine, self.setup, subprograms(*paths))
+        found = follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
         return found.machine, found.trace.moves
 
 

@@ -18,6 +18,7 @@ from ncfix.cli.targets import STREAM, read, shown
 if TYPE_CHECKING:
     from ncfix.machine import Machine
     from ncfix.program.dialect import Dialect
+    from ncfix.program.setup import Setup
     from ncfix.program.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
@@ -31,8 +32,8 @@ dialect_option = click.option("--dialect", metavar="NAME", help="The control's l
 table_option = click.option("-o", "--output", metavar="FILE", default=STREAM, help="Where to write the table (CSV).")
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
-SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".SPF", ".mpf", ".MPF")
-"""Under what a subprogram's file may go besides its name."""
+SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")
+"""Under what a subprogram's file may go besides its name, beside the suffix of the program that calls it."""
 
 
 LONGEST = 5000.0
@@ -129,22 +130,39 @@ def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix."""
+    """Finds the files of subprograms in folders, the first first, by their name with or without a suffix.
+
+    Where no file has the name as it is written, one is taken that has it in another case, if it is the only one.
+    """
 
     folders: tuple[str, ...]
+    suffixes: tuple[str, ...] = SUBPROGRAM_SUFFIXES
 
     def __call__(self, name: str) -> bytes | None:
         """The text of a subprogram; None if there is none."""
         if os.path.basename(name) != name:
             return None
         for folder in self.folders:
-            for suffix in SUBPROGRAM_SUFFIXES:
-                candidate = os.path.join(folder, name + suffix)
-                if os.path.isfile(candidate):
-                    return read(candidate)
+            for suffix in self.suffixes:
+                if found := file_of(folder, name + suffix):
+                    return read(found)
         return None
 
 
-def subprograms(*paths: str) -> Callable[[str], bytes | None]:
-    """Finds the files of subprograms: beside the program, and beside the one that it was made of if that is named."""
-    return Beside(tuple("." if path == STREAM else os.path.dirname(path) or "." for path in paths))
+def file_of(folder: str, name: str) -> str:
+    """The path of a file in a folder, its name in any case; empty if there is none, or if there are several."""
+    path = os.path.join(folder, name)
+    if os.path.isfile(path):
+        return path
+    try:
+        alike = [os.path.join(folder, each) for each in os.listdir(folder) if each.lower() == name.lower()]
+    except OSError:
+        return ""
+    return alike[0] if len(alike) == 1 and os.path.isfile(alike[0]) else ""
+
+
+def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
+    """Finds the files of subprograms: beside the program and the one that it was made of, and where the setup says."""
+    beside = dict.fromkeys("." if path == STREAM else os.path.dirname(path) or "." for path in paths)
+    suffixes = dict.fromkeys((*SUBPROGRAM_SUFFIXES, *(os.path.splitext(path)[1].lower() for path in paths)))
+    return Beside((*beside, *setup.subprograms), tuple(suffixes))

@@ -9,7 +9,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.options import Length, force_option, json_option, load_machine, machine_option, table_option
-from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 
 if TYPE_CHECKING:
     from ncfix.measure.candidates import Room
@@ -67,6 +67,7 @@ def plan(
     sources = () if existing is None else (existing,)
     target = targets([machine_path], Outputs(output, force=force), sources)[0]
     program = targets([machine_path], Outputs(gcode, force=force), sources)[0] if gcode else None
+    check_streams([JSON] * as_json, program=program, poses=None if as_json else target)
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []

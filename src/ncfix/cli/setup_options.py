@@ -129,6 +129,13 @@ OPTIONS = (
         metavar="[calculator|IS-A|IS-B|IS-C]",
         help="What a number without a decimal point means: units, or least increments (IS-B: X50 is 0.050 mm).",
     ),
+    click.option(
+        "--subprograms",
+        type=click.Path(exists=True, file_okay=False),
+        multiple=True,
+        metavar="DIR",
+        help="Where subprograms are that are not beside the program (repeatable).",
+    ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
 )
 
@@ -145,6 +152,7 @@ class SetupOptions:
     inputs: tuple[tuple[str, float], ...] = ()
     no_point: str | None = None
     assume_zero: bool = False
+    subprograms: tuple[str, ...] = ()
 
     @property
     def files(self) -> tuple[str | None, str | None]:
@@ -153,13 +161,17 @@ class SetupOptions:
 
     def load(self) -> Setup:
         """The setup: the file, then the tool table, then the single options, each over the one before."""
-        from ncfix.program import setup_file
         from ncfix.program.setup import Setup, Tool
-        from ncfix.program.tool_table import load_tool_table
 
-        setup = Setup() if self.setup_file is None else setup_file.load(self.setup_file)
+        setup = Setup()
+        if self.setup_file is not None:
+            from ncfix.program.setup_file import load
+
+            setup = load(self.setup_file)
         tools = dict(setup.tools)
         if self.tool_table is not None:
+            from ncfix.program.tool_table import load_tool_table
+
             tools |= load_tool_table(self.tool_table)
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
@@ -173,6 +185,7 @@ class SetupOptions:
             inputs={**setup.inputs, **dict(self.inputs)},
             no_point=self.no_point or setup.no_point,
             assume_zero=setup.assume_zero or self.assume_zero,
+            subprograms=(*self.subprograms, *setup.subprograms),
         )
 
 
@@ -190,9 +203,11 @@ def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
         inputs: tuple[tuple[str, float], ...],
         no_point: str | None,
         assume_zero: bool,
+        subprograms: tuple[str, ...],
         **others: Any,
     ) -> Any:
-        given = SetupOptions(setup_file, offsets, tools, tool_table, initial, inputs, no_point, assume_zero)
+        single = (offsets, tools, tool_table, initial, inputs, no_point, assume_zero, subprograms)
+        given = SetupOptions(setup_file, *single)
         return command(*arguments, given=given, **others)
 
     for option in reversed(OPTIONS):

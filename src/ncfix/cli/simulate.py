@@ -16,7 +16,7 @@ from ncfix.cli.following import Following, figures
 from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.parts import Keep, Source, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 from ncfix.cli.through import dialect_in, task_of, through
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def simulate(
     assert program is not None
     inputs = (machine_path, *given.files)
     target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
+    check_streams([JSON] * as_json, table=target)
     following = Following.of(machine_path, dialect, given)
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
@@ -137,6 +138,7 @@ def _simulate_plan(
     from ncfix.measure.writer import dumps
 
     target = targets([plan], Outputs(output or STREAM, force=force), (machine_path,))[0]
+    check_streams([JSON] * (as_json and output is not None), measurement=target)
     machine = load_machine(machine_path)
     measurement = reads(read(plan), machine, shown(plan), plan=True)
     console.tell(*measurement.remarks)

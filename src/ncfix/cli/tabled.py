@@ -84,7 +84,8 @@ def rewritten(following: Following, settings: Mapping[str, str], path: str) -> F
 
     assert following.machine is not None
     options = FixOptions(strategy=settings["strategy"], tolerance_um=float(settings["tolerance_um"]))
-    return fix_program(following.read(path), following.machine, following.setup, options, subprograms(path))
+    find = subprograms(following.setup, path)
+    return fix_program(following.read(path), following.machine, following.setup, options, find)
 
 
 def rewritten_file(following: Following, settings: Mapping[str, str], path: str) -> dict[str, bytes]:
@@ -107,4 +108,4 @@ def _followed(following: Following, path: str) -> tuple[Program, Followed]:
         text = "the program has been corrected already: with tables of the same errors it would be corrected twice"
         place = program.place(block)
         raise RefusedError.of("NCF493", text, place, INSTEAD)
-    return program, follow(program, following.machine, following.setup, subprograms(path))
+    return program, follow(program, following.machine, following.setup, subprograms(following.setup, path))

@@ -17,6 +17,7 @@ from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 
 STREAM = "-"
+JSON = "the JSON object"
 """Standard input or output as a file name."""
 _TAKEN: WeakSet[IO[bytes]] = WeakSet()
 """Standard input, when an input has been read from it."""
@@ -139,6 +140,18 @@ def targets(
         elif target.path != STREAM:
             _check_output(target, inputs)
     return found
+
+
+def check_streams(others: Sequence[str], **outputs: Target | None) -> None:
+    """Refuse more than one thing on standard output: NCF010.
+
+    others   what goes there in any case, in words
+    outputs  what is called so, and where it goes, if anywhere
+    """
+    streamed = [f"the {name}" for name, target in outputs.items() if target is not None and target.path == STREAM]
+    both = [*streamed, *others]
+    if len(both) > 1:
+        raise UsageError.of("NCF010", f"{' and '.join(both)} would both go to standard output", hint="-o FILE")
 
 
 def each_once(given: Sequence[str]) -> None:

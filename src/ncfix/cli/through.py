@@ -54,7 +54,7 @@ def task_of(following: Following, source: Source, dialect: Dialect, *beside: str
     from ncfix.compensate.task import Task
 
     assert following.machine is not None
-    find = subprograms(source.path, *beside)
+    find = subprograms(following.setup, source.path, *beside)
     return Task(following.machine, following.setup, OPTIONS, find, shown(source.path), dialect, part_bytes())
 
 
@@ -75,7 +75,8 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
         follower = task_of(following, source, dialect).follower()
     else:
         axes = axes_of(PartReader(reader.path, dialect).read(source.first_lines).templates)
-        follower = follower_of(dialect, Run(following.setup, axes, frozenset(ROTARY), subprograms(source.path)))
+        find = subprograms(following.setup, source.path)
+        follower = follower_of(dialect, Run(following.setup, axes, frozenset(ROTARY), find))
     parts = Parts(OPTIONS, reader, follower, source.read, part_bytes())
 
     def found() -> Iterator[Part]:

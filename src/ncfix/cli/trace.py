@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -52,45 +52,56 @@ def trace(
     (target,) = targets([program], Outputs(output, force=force), (machine_path, *given.files))
     following = Following.of(machine_path, dialect, given)
     with source_of(program) as source, ExitStack() as opened:
-        motions = Motions(following, source, as_json, Keep(None if as_json else target.file, opened))
+        csv = None if as_json and target.file is None else Keep(target.file, opened)
+        motions = Motions(following, source, csv, Keep(None, opened) if as_json else None)
         with console.busy(f"following {shown(program)}"):
             table, messages = through([source], motions.in_parts, motions.whole)
         console.tell(*messages)
-        if as_json:
-            console.put_all(table)
-        else:
-            target.write(table)
+        if csv:
+            target.write(table.csv)
+        console.put_all(table.json)
+
+
+class Texts(NamedTuple):
+    """A table as text; empty in a form that is not asked for."""
+
+    csv: Iterable[bytes]
+    json: Iterable[bytes]
 
 
 @dataclass(frozen=True, slots=True)
 class Motions:
-    """The motions of a program, to be written as a table."""
+    """The motions of a program, to be written as a table: `csv`, `json`, or both."""
 
     following: Following
     source: Source
-    as_json: bool
-    keep: Keep
+    csv: Keep | None
+    json: Keep | None
 
-    def written(self, tables: Iterable[Columns]) -> Iterator[bytes]:
+    def written(self, tables: Iterable[Columns]) -> Texts:
         """The table as text."""
         from ncfix.cli.table import as_csv, as_json
 
-        return as_json(tables, path=shown(self.source.path)) if self.as_json else as_csv(tables)
+        tables = list(tables) if self.csv and self.json else tables
+        return Texts(
+            self.csv(as_csv(tables)) if self.csv else (),
+            self.json(as_json(tables, path=shown(self.source.path))) if self.json else (),
+        )
 
-    def in_parts(self) -> tuple[Iterable[bytes], Sequence[Message]]:
+    def in_parts(self) -> tuple[Texts, Sequence[Message]]:
         """The table and what there is to say, of a program that is read; raises what that does, `NotInPartsError`."""
         machine = self.following.machine
         parts, found = parts_of(self.following, self.source, dialect_in(self.following, self.source))
-        table = self.keep(self.written(table_of(part.program, part.moves, machine) for part in found))
+        table = self.written(table_of(part.program, part.moves, machine) for part in found)
         parts.blocks_behind()
         return table, parts.follower.messages
 
-    def whole(self) -> tuple[Iterable[bytes], Sequence[Message]]:
+    def whole(self) -> tuple[Texts, Sequence[Message]]:
         """The same of a program as a whole."""
         path = self.source.path
         program = self.following.read(path, self.source.everything())
         found = self.following.trace(program, path)
-        return list(self.written([table_of(program, found.moves, self.following.machine)])), found.messages
+        return self.written([table_of(program, found.moves, self.following.machine)]), found.messages
 
 
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
