@@ -94,15 +94,17 @@ def contenders(program: Path, folder: Path, blocks: int) -> list[Contender]:
     output = folder / OUTPUT
     fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(output), "--force", "--dialect", "linuxcnc"]
     fix += ["--offset", "G54=0,0,0,0,0", "--tool", "0=0"]
+    two, fix = [*fix, "--jobs", "2"], [*fix, "--jobs", "1"]
     found = [
         Contender("ncfix, plain", fix, {"NCFIX_NO_FAST": "1"}),
         Contender("ncfix, plain, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": "1"}),
+        Contender("ncfix, plain, two jobs", two, {"NCFIX_NO_FAST": "1"}),
     ]
     if has_numba():
         found += [
             Contender("ncfix, `fast`", fix, {"NCFIX_NO_FAST": ""}),
             Contender("ncfix, `fast`, without figures", [*fix, "--no-figures"], {"NCFIX_NO_FAST": ""}),
-            Contender("ncfix, `fast`, two jobs", [*fix, "--jobs", "2"], {"NCFIX_NO_FAST": ""}),
+            Contender("ncfix, `fast`, two jobs", two, {"NCFIX_NO_FAST": ""}),
         ]
     if shutil.which("rs274"):
         ini, tools = folder / "bench.ini", folder / "tools.tbl"
@@ -239,7 +241,7 @@ def ways_of(control: controls.OtherControl, program: Path) -> list[Contender]:
     """ncfix on a program of another control, plain and compiled."""
     ncfix = shutil.which("ncfix", path=str(Path(sys.executable).parent)) or "ncfix"
     fix = [ncfix, "fix", str(program), "-m", str(MACHINE), "-o", str(program.with_name(OUTPUT)), "--force"]
-    fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", *control.options]
+    fix += ["--dialect", control.dialect, "--assume-zero", "--allow-refused", "--jobs", "1", *control.options]
     found = [Contender("plain", fix, {"NCFIX_NO_FAST": "1"})]
     return [*found, Contender("`fast`", fix, {"NCFIX_NO_FAST": ""})] if has_numba() else found
 
