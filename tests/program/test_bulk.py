@@ -233,6 +233,41 @@ def test_arcs_and_dwells_do_not_part_a_stretch() -> None:
     assert_same(program, moves, pieces)
 
 
+@pytest.mark.parametrize(
+    ("dialect", "dwell"),
+    [
+        ("fanuc", "G4 X1.5"),
+        ("fanuc", "G04 X0.5 F30"),
+        ("fanuc", "/G4 X1.5"),
+        ("fanuc", "G4 X1.5\nG4 X2.5"),
+        ("fanuc", "G4 P1500"),
+        ("iso", "G4 X1.5"),
+        ("haas", "G4 X1.5"),
+        ("siemens", "G4 F1 X5"),
+        ("siemens", "G4 F1"),
+        ("linuxcnc", "G1 X1. G4 P1"),
+        ("linuxcnc", "G4 P1 X5."),
+        ("linuxcnc", "G4 P1 G1 X33.5"),
+    ],
+)
+def test_times_and_motions_with_letters_of_axes_in_dwells(dialect: str, dwell: str) -> None:
+    line = [f"X{n / 7:.3f} Y1. Z{n / 9:.3f} B{n / 5:.3f} C0." for n in range(1, 41)]
+    units = "G71" if dialect == "siemens" else "G21"
+    lines = [
+        f"G90 {units} G94 G17",
+        "G0 X0. Y0. Z0. B0. C0.",
+        "G1 F1000",
+        *line,
+        *dwell.split("\n"),
+        *line,
+        dwell,
+        *line,
+    ]
+    program, moves = followed("\n".join([*lines, "M2\n"]).encode(), dialect)
+    assert (moves.kind == Kind.DWELL).any()
+    assert_same(program, moves, moved(moves, 2, 0.01))
+
+
 @EXAMPLES
 @given(
     centre=st.sampled_from(["I2.0000000001 J0", "I2.00000000000000000 J0.", "R2.8284"]),

@@ -74,7 +74,7 @@ class Bulk:
         fit &= np.array([_is_plain(each) for each in frames], dtype=np.bool_)[frame] if len(moves) else False
         if language.one_by_one is not None and fit.any():
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        fit = with_dwells(fit, moves, pieces, first_piece)
+        fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
         stop = _stops(fit & ~jumps.any(axis=1) if jumps.any() else fit)
         changes = np.append(np.flatnonzero(np.diff(frame)) + 1, len(moves))
         stop[:-1] = np.minimum(stop[:-1], changes[np.searchsorted(changes, np.arange(len(moves)), side="right")])
@@ -116,7 +116,8 @@ class Bulk:
             fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)
-        return cls(program, moves, pieces, first_piece, layouts, _stops(with_dwells(fit, moves, pieces, first_piece)))
+        fit = with_dwells(fit, program, moves, pieces, first_piece, layouts)
+        return cls(program, moves, pieces, first_piece, layouts, _stops(fit))
 
     def take(self, row: int, position: FloatArray, frame: FrameMap, decimals: IntArray) -> FloatArray | None:
         """Write the stretch that begins with motion `row`, as far as it is clear, but for centres of arcs.

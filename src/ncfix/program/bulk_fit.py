@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.bulk_arcs import whole_arcs
-from ncfix.program.bulk_layouts import Layouts
+from ncfix.program.bulk_layouts import NONE, Layouts
 from ncfix.program.moves import FeedMode, Kind, Moves, Rule
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import Program
@@ -40,14 +40,20 @@ def sound(moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
     return fit
 
 
-def with_dwells(fit: Mask, moves: Moves, pieces: Pieces, first_piece: IntArray) -> Mask:
+def with_dwells(
+    fit: Mask, program: Program, moves: Moves, pieces: Pieces, first_piece: IntArray, layouts: Layouts
+) -> Mask:
     """Motions `fit` (n,), and dwells just behind them at which the axes shall stand where these leave them.
 
-    Nothing is written of such a dwell.
+    Nothing is written of such a dwell: its block is its own, and none of its numbers is the place of an axis (times and
+    motions that go with a dwell may have these letters).
     """
     rows = np.flatnonzero(moves.kind[1:] == Kind.DWELL) + 1
-    at = first_piece[rows]
-    rows = rows[fit[rows - 1] & pieces.kept[at] & (pieces.end[at] == pieces.end[at - 1]).all(axis=1)]
+    at, block = first_piece[rows], moves.block[rows]
+    alone = (block != moves.block[rows - 1]) & (block != np.append(moves.block, -1)[rows + 1])
+    wordless = (layouts.slots[program.template[block]] == NONE).all(axis=1)
+    stays = pieces.kept[at] & (pieces.end[at] == pieces.end[at - 1]).all(axis=1)
+    rows = rows[fit[rows - 1] & stays & alone & wordless]
     found = fit.copy()
     found[rows] = True
     return found
