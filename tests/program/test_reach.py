@@ -6,7 +6,7 @@ import pytest
 
 from ncfix.diagnostics import SourceError
 from ncfix.program.reach import UNREAD
-from ncfix.program.reader import read, unread_error
+from ncfix.program.reader import read
 from ncfix.program.tree import Opaque, Program
 from program.lanes import assert_read_right
 
@@ -49,11 +49,6 @@ def test_lines_within_reach_are_errors(source: bytes, line: int) -> None:
     place = caught.value.messages[0].place
     assert place is not None
     assert place.line == line
-
-
-def test_whoever_gets_there_is_told_why_it_could_not_be_read() -> None:
-    program = read(b"M2\nG0 X1.2.3\n", "part.ngc", "linuxcnc")
-    assert str(unread_error(program, 1)).startswith("part.ngc:2:8: NCF115: the number has a second point")
 
 
 def test_what_was_passed_through_once_is_an_error_elsewhere() -> None:

@@ -65,17 +65,6 @@ def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None =
     return Reading(source, path, known, language, blocks, language.end(source, blocks)).program()
 
 
-def unread_error(program: Program, block: int) -> SourceError:
-    """Why an `Opaque` block of the kind `reach.UNREAD` could not be read: for whoever gets to it after all."""
-    text = program.text_of(block)
-    try:
-        check_length(program.dialect, len(text))
-        parse_block(program.dialect, text)
-    except BlockError as fault:
-        return source_error(program.path, block, text, fault)
-    raise AssertionError(f"block {block} of {program.path} can be read")
-
-
 def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
     """A fault of a block as an error with its place."""
     return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, text), fault.hint)

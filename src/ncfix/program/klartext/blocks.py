@@ -66,17 +66,6 @@ def parse_block(dialect: Dialect, text: str) -> Parsed:
         return unread_block()
 
 
-def complaint(dialect: Dialect, text: str) -> int:
-    """The place in the text of a block at which it stops being Klartext."""
-    code = BLANKED.sub(lambda found: found[0] if found[0][0] == '"' else " " * len(found[0]), text)
-    try:
-        parse(dialect, code)
-    except UnexpectedInput as error:
-        place = error.pos_in_stream
-        return len(code.rstrip()) if place is None or place < 0 else min(int(place), len(text))
-    return 0
-
-
 def unread_block() -> Parsed:
     """A block that is not Klartext."""
     return Parsed(Template((Opaque(UNREAD, Span(Anchor(-1, 0), Anchor(END, 0))),), 0), (), (), -1)
