@@ -158,3 +158,24 @@ def test_a_rapid_in_the_middle_of_a_cut_is_found_however_short_it_is(
         fixed.write_text("\n".join(wrong) + "\n")
         found = ncfix("verify", original, fixed, *given, "--json").json()
         assert found["left_out_um"]["max"] == pytest.approx(150, abs=1), "half of it, from where the cut ends"
+
+
+def test_parts_and_programs_that_cut_nothing_are_compared_on_a_machine_with_play(
+    root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A part of rapids between two of cuts; then a program of rapids alone, which cuts something else."""
+    original, fixed, rapids = (tmp_path / f"{name}.ngc" for name in "abc")
+    given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc")
+    head = "G21 G90 G94 G17 F900\nG0 X20 Y5 Z5\n"
+    cuts, moves = ("".join(f"{word} X{20 + 9 * (k % 2)} Y{10 + 0.5 * k}\n" for k in range(60)) for word in ("G1", "G0"))
+    original.write_text(f"{head}{cuts}{4 * moves}{cuts}M2\n")
+    rapids.write_text(f"{head}{moves}M2\n")
+    assert ncfix("fix", original, "-o", fixed, *given).code == ExitCode.DONE
+    whole = ncfix("verify", original, fixed, *given, "--json").json()
+    assert whole["within"]
+    for one, other in ((original, rapids), (rapids, original)):
+        result = ncfix("verify", one, other, *given)
+        assert (result.code, "NCF420" in result.err) == (ExitCode.FINDINGS, True)
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
+    assert same(ncfix("verify", original, fixed, *given, "--json").json(), whole)

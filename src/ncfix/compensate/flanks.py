@@ -59,7 +59,7 @@ class Flank:
         moved = np.zeros((len(actual), 3, 3), dtype=np.float32)
         aside = np.zeros_like(moved)
         place = (2 * at.share).astype(np.intp)
-        for axis in range(sides.shape[1]):
+        for axis in range(sides.shape[1]) if len(turning.rows) else ():  # a path without a cut has no sides
             side, lost = turning.side(axis)
             near = turning.near(axis) & (lost < LATERAL)
             sides[turning.rows, axis] = np.sign(side)
