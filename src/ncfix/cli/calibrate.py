@@ -75,7 +75,7 @@ def calibrate(
 
     each_once(measured)
     target = targets([measured[0]], Outputs(output, force=force), (machine_path, *measured[1:]))[0]
-    check_streams([JSON] * as_json, machine=target)
+    check_streams(JSON if as_json else None, machine=target)
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):

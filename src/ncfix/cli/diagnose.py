@@ -53,7 +53,7 @@ def diagnose(
     each_once(measured)
     inputs = (*measured, machine_path)
     machine_target, next_target, page_target = (_target(path, force, inputs) for path in (output, next_path, report))
-    check_streams(["what was found"], machine=machine_target, poses=next_target, report=page_target)
+    check_streams("what was found", machine=machine_target, poses=next_target, report=page_target)
     form = form_of(report) if report is not None else None
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]

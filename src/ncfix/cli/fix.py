@@ -82,12 +82,12 @@ def fix(
     from ncfix.cli.batch import Batch
 
     outputs = Outputs(output, in_place, force, resume)
-    found = targets(programs, outputs, (machine_path, *given.files), folders=True)
-    for target in found:
-        check_streams([JSON] * as_json, program=target)
+    wanted = targets(programs, outputs, (machine_path, *given.files), folders=True)
+    for target in wanted:
+        check_streams(JSON if as_json else None, program=target)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # many small matrices: threads cost more than they give
     job = _job(machine_path, dialect, given, {**choices, "force": force})
-    outcomes = list(Batch(job, found, outputs.folder(programs), resume).run(settled(jobs, found), staff(executor)))
+    outcomes = list(Batch(job, wanted, outputs.folder(programs), resume).run(settled(jobs, wanted), staff(executor)))
     if len(outcomes) > 1:
         written = sum(outcome.entry["output"] is not None for outcome in outcomes)
         console.say(f"{len(outcomes)} programs: {written} written, {len(outcomes) - written} not")

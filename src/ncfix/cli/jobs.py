@@ -12,13 +12,13 @@ from ncfix.cli.targets import STREAM, Target
 from ncfix.processors import processors
 
 AUTO = 0
-"""As many as pay: what `--jobs auto` is as a number."""
+"""`--jobs auto` as a number: as many as pay."""
 PAYS_BYTES = 8 << 20
-"""A process more pays for so much text: what it costs to start one is a tenth of what correcting this takes."""
+"""One process more pays for each so much text: starting it costs a tenth of what correcting this text takes."""
 PAYS_PROGRAMS = 8
-"""Or for so many programs."""
+"""And one for each so many programs besides the first."""
 ON_ONE = 8
-"""More do not pay for one program: each of them reads all of it."""
+"""At most so many for a single program: each of them reads all of it."""
 
 
 class Jobs(click.IntRange):
@@ -33,12 +33,12 @@ class Jobs(click.IntRange):
         return number
 
 
-def settled(jobs: int, found: Sequence[Target]) -> int:
+def settled(jobs: int, programs: Sequence[Target]) -> int:
     """How many processes work on these programs: what was asked for, or as many as pay, at most one a processor."""
     if jobs != AUTO:
         return jobs
-    pay = sum(map(_size, found)) / PAYS_BYTES + (len(found) - 1) / PAYS_PROGRAMS
-    return max(1, min(int(pay), processors(), ON_ONE if len(found) == 1 else len(found)))
+    pay = sum(map(_size, programs)) / PAYS_BYTES + (len(programs) - 1) / PAYS_PROGRAMS
+    return max(1, min(int(pay), processors(), ON_ONE if len(programs) == 1 else len(programs)))
 
 
 def _size(target: Target) -> int:

@@ -67,7 +67,7 @@ def plan(
     sources = () if existing is None else (existing,)
     target = targets([machine_path], Outputs(output, force=force), sources)[0]
     program = targets([machine_path], Outputs(gcode, force=force), sources)[0] if gcode else None
-    check_streams([JSON] * as_json, program=program, poses=None if as_json else target)
+    check_streams(JSON if as_json else None, program=program, poses=None if as_json else target)
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -193,22 +193,9 @@ def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a verb these options; it gets them as one argument `given`."""
 
     @wraps(command)
-    def with_given(
-        *arguments: Any,
-        setup_file: str | None,
-        offsets: tuple[tuple[str, dict[str, float]], ...],
-        tools: tuple[tuple[str, tuple[float, ...]], ...],
-        tool_table: str | None,
-        initial: tuple[dict[str, float], ...],
-        inputs: tuple[tuple[str, float], ...],
-        no_point: str | None,
-        assume_zero: bool,
-        subprograms: tuple[str, ...],
-        **others: Any,
-    ) -> Any:
-        single = (offsets, tools, tool_table, initial, inputs, no_point, assume_zero, subprograms)
-        given = SetupOptions(setup_file, *single)
-        return command(*arguments, given=given, **others)
+    def with_given(*arguments: Any, **options: Any) -> Any:
+        given = SetupOptions(**{field.name: options.pop(field.name) for field in fields(SetupOptions)})
+        return command(*arguments, given=given, **options)
 
     for option in reversed(OPTIONS):
         with_given = option(with_given)

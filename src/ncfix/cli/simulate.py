@@ -72,7 +72,7 @@ def simulate(
     assert program is not None
     inputs = (machine_path, *given.files)
     target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
-    check_streams([JSON] * as_json, table=target)
+    check_streams(JSON if as_json else None, table=target)
     following = Following.of(machine_path, dialect, given)
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
@@ -138,7 +138,7 @@ def _simulate_plan(
     from ncfix.measure.writer import dumps
 
     target = targets([plan], Outputs(output or STREAM, force=force), (machine_path,))[0]
-    check_streams([JSON] * (as_json and output is not None), measurement=target)
+    check_streams(JSON if as_json and output is not None else None, measurement=target)
     machine = load_machine(machine_path)
     measurement = reads(read(plan), machine, shown(plan), plan=True)
     console.tell(*measurement.remarks)

@@ -17,8 +17,9 @@ from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
 
 STREAM = "-"
-JSON = "the JSON object"
 """Standard input or output as a file name."""
+JSON = "the JSON object"
+"""What `--json` prints, as messages name it."""
 _TAKEN: WeakSet[IO[bytes]] = WeakSet()
 """Standard input, when an input has been read from it."""
 
@@ -142,16 +143,17 @@ def targets(
     return found
 
 
-def check_streams(others: Sequence[str], **outputs: Target | None) -> None:
+def check_streams(printed: str | None, **outputs: Target | None) -> None:
     """Refuse more than one thing on standard output: NCF010.
 
-    others   what goes there in any case, in words
-    outputs  what is called so, and where it goes, if anywhere
+    printed  what goes there in any case, in words; None if nothing does
+    outputs  by their names, where the others go; None of one that is not asked for
     """
     streamed = [f"the {name}" for name, target in outputs.items() if target is not None and target.path == STREAM]
-    both = [*streamed, *others]
-    if len(both) > 1:
-        raise UsageError.of("NCF010", f"{' and '.join(both)} would both go to standard output", hint="-o FILE")
+    if printed is not None:
+        streamed.append(printed)
+    if len(streamed) > 1:
+        raise UsageError.of("NCF010", f"{' and '.join(streamed)} would both go to standard output", hint="-o FILE")
 
 
 def each_once(given: Sequence[str]) -> None:
