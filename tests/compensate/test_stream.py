@@ -19,7 +19,8 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.task import Task
 from ncfix.diagnostics import NcfixError, SourceError
-from ncfix.machine import Machine, load
+from ncfix.machine import Effect, Machine, load
+from ncfix.machine.smooth import Backlash
 from ncfix.program import dialects
 from ncfix.program.parts import NotInPartsError
 from ncfix.program.reader import read
@@ -191,6 +192,16 @@ def test_play_remembers_the_way_across_parts(root: Path) -> None:
     )
     assert all(assert_same(source + b"M2\n", machine, size) for size in (150, 400))
     assert streamed(source + b"M2\n", machine, 150, jobs=2) == streamed(source + b"M2\n", machine, 150)
+
+
+def test_play_of_axes_that_rest_while_others_turn_round(root: Path) -> None:
+    """Z rests on one side of its play from the first part on, when X turns round and C gets a word there."""
+    machine = load(root / "examples" / "machines" / "wCBXFZYSt.toml")
+    machine = machine.replace(effects=(*machine.effects, *(Effect(f"E{a}{a}", (0.005,), Backlash()) for a in "XYZ")))
+    source = b"G21 G90 G94 F800\nG0 X0 Y0 Z50 B0 C0\nG1 X5 Y5 Z5\n" + b"".join(
+        b"X%.3f C%.3f\n" % (5 + k % 2, 10 + 0.1 * k) for k in range(60)
+    )
+    assert all(assert_same(source + b"M2\n", machine, size) for size in (150, 220))
 
 
 def test_what_looks_at_the_whole_path_is_not_done_in_parts(machine: Machine) -> None:

@@ -13,17 +13,18 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import picked, some
-from ncfix.machine import Machine, State
+from ncfix.machine import Machine
 from ncfix.program.moves import Moves
 from ncfix.program.number_style import decimals_for
 from ncfix.program.pieces import Pieces
 
 
-def on_digits(machine: Machine, moves: Moves, pieces: Pieces, among: Index | None = None) -> Pieces:
+def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pieces:
     """The pieces with rotary positions as they will be written; those that the program wrote stay as they are.
 
     among  (k,) pieces that may have others; all if not given
     """
+    machine, moves = intent.machine, intent.moves
     rows = _newly_written(moves, pieces, np.arange(len(pieces)) if among is None else among)
     if not rows.size:
         return pieces
@@ -31,7 +32,7 @@ def on_digits(machine: Machine, moves: Moves, pieces: Pieces, among: Index | Non
     commands = picked(pieces.end, rows)
     offset = np.array([frame.offset for frame in moves.frames])[moves.frame[move]][:, moves.rotary]
     commands[:, moves.rotary] = offset + _rounded(commands[:, moves.rotary] - offset, machine)
-    solved, arrived = Intent(machine, moves, State()).aimed(move, pieces.fraction[rows], commands)
+    solved, arrived = intent.aimed(move, pieces.fraction[rows], commands)
     end = pieces.end.copy()
     solved = np.where(moves.wordless[move], end[rows], solved)
     end[rows[arrived]] = solved[arrived]

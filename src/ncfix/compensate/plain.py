@@ -151,7 +151,7 @@ class Planner:
         pieces, first = pieces_of(real, over, parts, others)
         inner = np.flatnonzero((pieces.fraction < 1) & alone[pieces.move])
         if inner.size:
-            pieces = on_digits(self.machine, moves, pieces, inner)
+            pieces = on_digits(intent, pieces, inner)
             if not self._fine_inside(poses, real, pieces, inner, found.q):
                 return None
         behind_rapid = bool(unit.head.moves.kind[-1] == Kind.RAPID)

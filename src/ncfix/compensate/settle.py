@@ -19,6 +19,7 @@ from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.idle import without_idle
+from ncfix.compensate.intent import Intent
 from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
@@ -157,7 +158,7 @@ def agree(
             reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
         kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
         planned = _planned(dialect, moves, machine, options, kept, state, before)
-        planned = replace(planned, pieces=on_digits(machine, moves, planned.pieces))
+        planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
