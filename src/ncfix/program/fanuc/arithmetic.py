@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Protocol, cast
 
 from ncfix.program.follow.arithmetic import ARITHMETIC, FUNCTIONS, divide, power
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.scope import literal
 from ncfix.program.rs274.expressions import Evaluate, Scope
 from ncfix.program.tree import Binary, Constant, Expression, Literal, Parameter, Unary
 
@@ -135,7 +137,7 @@ def compiled(expression: Expression, address: str = "") -> Evaluate:
     """
     match expression:
         case Literal(slot):
-            return lambda scope: scope.numbers[scope.first + slot]
+            return literal(slot)
         case Constant(value):
             return lambda scope: value
         case Parameter(index):
@@ -170,9 +172,16 @@ ROUNDED = frozenset("XYZABCUVWIJKRQ")
 """Addresses in which ROUND works to the least increment."""
 
 
+class MacroScope(Scope, Protocol):
+    """The scope of this family's expressions."""
+
+    def least_increment(self, address: str) -> float:
+        """The least increment of an address, in its own unit."""
+
+
 def to_increments(value: float, scope: Scope, address: str) -> float:
     """`ROUND` in a word: to the least increment of its address."""
-    increment: float = getattr(scope, "least_increment", lambda letter: 0.001)(address)
+    increment = cast(MacroScope, scope).least_increment(address)
     return rounded(value / increment) * increment
 
 

@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 
 from ncfix.program.follow.arithmetic import ARITHMETIC
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.scope import literal
 from ncfix.program.tree import Binary, Call, Constant, Expression, Literal, NamedParameter, Text, Unary
 
 EQUAL = 1e-9
+"""Two numbers are equal that differ by less."""
 
 
 @dataclass(slots=True)
@@ -125,7 +127,7 @@ def compiled(expression: Expression) -> Evaluate:
     """The function that computes a formula; it raises `Fault` where the control would stop."""
     match expression:
         case Literal(slot):
-            return lambda scope: scope.numbers[scope.first + slot]
+            return literal(slot)
         case Constant(value):
             return lambda scope: value
         case NamedParameter(name):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
+from ncfix.program.follow.arithmetic import ARITHMETIC
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.scope import BlockNumbers, literal
 from ncfix.program.rs274.arithmetic import BINARY, UNARY, in_doubt, whole
 from ncfix.program.tree import Binary, Constant, Exists, Expression, Literal, NamedParameter, Parameter, Unary
 
@@ -29,16 +31,8 @@ class Values(Protocol):
         """Whether the parameter has been defined."""
 
 
-class Scope(Protocol):
+class Scope(BlockNumbers, Protocol):
     """What an expression may refer to."""
-
-    @property
-    def numbers(self) -> Sequence[float]:
-        """The numbers of the program."""
-
-    @property
-    def first(self) -> int:
-        """Where those of the block begin."""
 
     @property
     def parameters(self) -> Values:
@@ -52,7 +46,7 @@ def compiled(expression: Expression) -> Evaluate:
     """The function that computes an expression; it raises `Fault` where the control would stop."""
     match expression:
         case Literal(slot):
-            return lambda scope: scope.numbers[scope.first + slot]
+            return literal(slot)
         case Constant(value):
             return lambda scope: value
         case Parameter(index):
@@ -86,7 +80,7 @@ def binary(operator: str, left: Evaluate, right: Evaluate) -> Evaluate:
             scope.parameters.touched = True
         value = function(a, b)
         if not math.isfinite(value):
-            raise Fault("NCF210", f"the result of {operator} is not a finite number")
+            raise Fault(ARITHMETIC, f"the result of {operator} is not a finite number")
         return value
 
     return evaluate

@@ -7,12 +7,13 @@ Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning", arithmetic f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Protocol
 
 from ncfix.program.follow import arithmetic
 from ncfix.program.follow.arithmetic import ARITHMETIC, divide, power
 from ncfix.program.follow.faults import Fault
+from ncfix.program.follow.scope import BlockNumbers, literal
 from ncfix.program.sinumerik.build import BRACKET
 from ncfix.program.sinumerik.texts import TEXT_FUNCTIONS, of_texts
 from ncfix.program.tree import (
@@ -45,16 +46,8 @@ class Values(Protocol):
         """The value of a variable, None if nobody knows it."""
 
 
-class Scope(Protocol):
+class Scope(BlockNumbers, Protocol):
     """What an expression may refer to."""
-
-    @property
-    def numbers(self) -> Sequence[float]:
-        """The numbers of the program."""
-
-    @property
-    def first(self) -> int:
-        """Where those of the block begin."""
 
     @property
     def variables(self) -> Values:
@@ -68,7 +61,7 @@ def compiled(expression: Expression) -> Evaluate:
     """The function that computes an expression; it raises `Fault` where the control would stop."""
     match expression:
         case Literal(slot):
-            return lambda scope: scope.numbers[scope.first + slot]
+            return literal(slot)
         case Constant(value):
             return lambda scope: value
         case Text(text):
