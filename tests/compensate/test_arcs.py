@@ -192,6 +192,18 @@ def test_under_cutter_compensation_an_arc_stays_one_or_is_kept_and_named() -> No
     assert moves.kind[2] == Kind.ARC
 
 
+@pytest.mark.parametrize(("rise", "kept"), [(2.0, False), (60.0, True)])
+def test_a_full_circle_whose_ends_come_apart_does_not_get_another_centre(rise: float, kept: bool) -> None:
+    """Z leads X off by 0.4 and 12 um; the bisector of ends so near to each other leads away from the centre."""
+    machine = perfect("w F X Y Z t").replace(effects=(Effect("EXZ", (0.05,), Polynomial((1,)), 0.0, 250.0),))
+    circle = Arc((20, 20, 0), (0, 0, 1), -2 * np.pi, rise)
+    moves = motions(machine, (27, 27, 0), [(27, 27, 0), circle])
+    whole = planned(machine, changed(moves, compensated=np.array([False, True])), ROUNDING / 10).pieces
+    assert whole.kept.tolist() == [False, kept]
+    assert np.linalg.norm((whole.centre[1] - moves.centre[1])[:2]) < 0.02
+    assert worst(machine, moves, planned(machine, moves, ROUNDING / 10)) < TOLERANCE
+
+
 def test_a_little_more_than_a_turn_is_a_turn_more() -> None:
     sweeps = np.array([2 * np.pi, 2 * np.pi + 1e-4, -2 * np.pi + 1e-4, -4 * np.pi, 4 * np.pi + 1e-12, 0.1])
     assert turns_begun(sweeps).tolist() == [1, 2, 1, 2, 2, 1]

@@ -229,6 +229,12 @@ def test_a_refusal_that_reaches_back_through_refused_motions_is_seen(machine: Ma
         streamed(source, machine, 100)
 
 
+def test_a_path_that_strays_is_not_written_in_parts(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(corrector, "strays", lambda errors: errors.after.max > 0)
+    with pytest.raises(NotInPartsError, match="strays"):
+        streamed(program(1, 30, 0.0), machine, 300)
+
+
 def test_errors_are_those_of_the_whole(machine: Machine) -> None:
     source = program(1, 60, 0.0)
     for wrong in (b"G1 X1 X2", b"G1 X%", b"G2 X1 Y1 I5 J5", b"U5", b"G84.5"):

@@ -74,7 +74,11 @@ def _fitted(intent: Intent, standing: Segments, rows: Index, closure: Closure, r
     best = _best_on_bisector(arcs, ends, centre, wanted)
     centre = np.where(closed[:, None], centre, best)
     sweep = np.where(closed, arcs.sweep, sweep_between(*ends, centre, arcs.normal, arcs.sweep))
-    return Fitted(centre, sweep, _sound(arcs, ends, centre, sweep, closed, closure, rounding))
+    sound = _sound(arcs, ends, centre, sweep, closed, closure, rounding)
+    off = wanted - _points(arcs, ends, centre)
+    before = wanted - programmed, (ends[0] - picked(intent.moves.start, rows)[:, intent.columns]).T[:, None]
+    sound &= _farthest(off) <= np.maximum(closure.mm / 2, sum(map(_farthest, before)))
+    return Fitted(centre, sweep, sound)
 
 
 def full_circles(intent: Intent, rows: Index) -> Mask:
@@ -136,8 +140,14 @@ def _best_on_bisector(arcs: Segments, ends: Pair, centre: Array, wanted: Array) 
     off = wanted - here
     squares, share = (np.einsum("ijk,ijk->k", slope, each) for each in (slope, off))
     amount = share / np.maximum(squares, 1e-12)
-    limit = 10 * np.sqrt((off * off).sum(axis=0).max(axis=0)) + NUDGE
+    limit = 10 * _farthest(off) + NUDGE
     result: Array = centre + np.clip(amount, -limit, limit)[:, None] * way
+    return result
+
+
+def _farthest(off: Array) -> Array:
+    """The longest of vectors (3, looks, k) of each arc, (k,)."""
+    result: Array = np.sqrt((off * off).sum(axis=0).max(axis=0))
     return result
 
 

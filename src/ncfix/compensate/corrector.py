@@ -10,7 +10,7 @@ import numpy as np
 from ncfix import fast
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.findings import Mask
-from ncfix.compensate.fix import stamp_of
+from ncfix.compensate.fix import stamp_of, strays
 from ncfix.compensate.partition import Part
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
@@ -20,7 +20,7 @@ from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, 
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Unit, Units
-from ncfix.compensate.verify import path_error
+from ncfix.compensate.verify import PathError, path_error
 from ncfix.diagnostics import NcfixError
 from ncfix.files import put_at
 from ncfix.machine import State
@@ -131,7 +131,7 @@ class Corrector:
         tally = Tally(self.machine.least_increment[0])
         tally.add_plain(part.program, settled, largest_shift(course, plain))
         if self.task.options.verify:
-            tally.figures(figures(course, plain, self.task.options.split_rapids), part.program, moves)
+            _note(tally, figures(course, plain, self.task.options.split_rapids), part.program, moves)
         return Done(text, tally, part.program.first_line + part.program.lines_ended)
 
     def _agreed(self, unit: Unit) -> Agreed:
@@ -211,7 +211,14 @@ class Corrector:
             tilts=False,
             known=settled.plan.known,
         )
-        tally.figures(errors, part.program, moves)
+        _note(tally, errors, part.program, moves)
+
+
+def _note(tally: Tally, errors: PathError, program: Program, moves: Moves) -> None:
+    """Take in the tip errors of a part; raises `NotInPartsError` where these say that its path strays."""
+    if strays(errors):
+        raise NotInPartsError("the path of a part strays")
+    tally.figures(errors, program, moves)
 
 
 def _check(wrong: Mask | None) -> None:

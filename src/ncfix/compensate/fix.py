@@ -135,9 +135,14 @@ def _errors(machine: Machine, settled: Settled, split_rapids: bool) -> PathError
     return path_error(machine, settled.moves, pieces, emission.start, rows=rows, tilts=False, known=known)
 
 
+def strays(errors: PathError) -> bool:
+    """Whether the corrected path is no longer that of the program at all."""
+    return errors.after.max > max(ASTRAY, 10 * errors.before.max)
+
+
 def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:
-    """Raise `SelfCheckError` where the corrected path is no longer that of the program at all."""
-    if errors.after.max > max(ASTRAY, 10 * errors.before.max):
+    """Raise `SelfCheckError` for a path that strays."""
+    if strays(errors):
         line = _line_of(program, settled.moves, errors.after)
         raise SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
 
