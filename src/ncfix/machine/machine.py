@@ -110,8 +110,10 @@ class Machine:
         return route_of(self.axes, self.tool, self._chain.joints, self._model, self.workpiece_offset)
 
     @cached_property
-    def _perfect_route(self) -> Route | None:
-        return route_of(self.axes, self.tool, self._chain.joints, None, self.workpiece_offset)
+    def _perfect_route(self) -> Route:
+        route = route_of(self.axes, self.tool, self._chain.joints, None, self.workpiece_offset)
+        assert route is not None, "only errors keep a chain from being written as steps"
+        return route
 
     @cached_property
     def _approach(self) -> Approach | None:
@@ -172,7 +174,6 @@ class Machine:
         None without these axes, or if a rotary axis between them turns some of them only.
         """
         names = [self.axis_names.index(name) for name in "XYZ" if name in self.axis_names]
-        assert self._perfect_route is not None
         return self._perfect_route.ways_together(names) if len(names) == 3 else None
 
     @cached_property
@@ -201,7 +202,6 @@ class Machine:
         All (n, n_axes); (n, 3) mm each, and `tip`: where that is, if known. Sines are worked out once if they can be.
         """
         model, perfect = None if self.is_perfect else self._model, self._perfect_route
-        assert perfect is not None
         route = perfect if model is None else self._route
         goals = self._poses(meant, state, model)[1]
         others = [goals if q is meant else self._poses(q, state, model)[1] for q in done]
@@ -234,7 +234,7 @@ class Machine:
 
     def _aim(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
         approach, perfect = self._approach, self._perfect_route
-        if approach is None or perfect is None or approach.axes != axes:
+        if approach is None or approach.axes != axes:
             return self._aim_at_length(poses, axes, target)
         found, rows = aimed_ahead(poses, perfect, approach, target)
         if rows.size:
@@ -244,7 +244,6 @@ class Machine:
 
     def _aim_at_length(self, poses: Poses, axes: tuple[int, int, int], target: Array | None) -> Aim:
         perfect, route = self._perfect_route, self._route
-        assert perfect is not None
 
         def tips(here: Poses, turns: Turns) -> tuple[Array, Array]:
             return self._tips_along(route, here, self._model, turns), np.zeros(1)
@@ -274,7 +273,6 @@ class Machine:
     def follows(self, q: ArrayLike, axes: tuple[int, ...]) -> Array:
         """How the tip of a perfect machine follows linear axes, shape (..., 3, axes) mm per mm, workpiece frame."""
         shape, poses = flatten(q, State(), self.axes, frozenset())
-        assert self._perfect_route is not None
         out = np.empty((3, len(axes), poses.positions.shape[1]))
         for part, chunk in poses.chunks():
             out[:, :, part] = self._perfect_route.follows(chunk, axes)
@@ -287,7 +285,7 @@ class Machine:
 
         Shape (n, 3). Only with `linear_ways` that span space.
         """
-        assert self.linear_ways is not None and self._perfect_route is not None  # noqa: PT018
+        assert self.linear_ways is not None
         _, poses = flatten(q, State(tool_length), self.axes, frozenset())
         goal = np.ascontiguousarray(np.asarray(target, dtype=np.float64).T)
         back: Array = np.linalg.inv(self.linear_ways).astype(np.float64)

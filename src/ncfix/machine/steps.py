@@ -78,18 +78,9 @@ class Functions(NamedTuple):
 
 
 def turned(
-    x: Number,
-    y: Number,
-    z: Number,
-    dx: Number,
-    dy: Number,
-    dz: Number,
-    px: Number,
-    py: Number,
-    pz: Number,
-    sine: Number,
-    versine: Number,
-) -> Any:
+    x: Number, y: Number, z: Number, dx: Number, dy: Number, dz: Number, px: Number, py: Number, pz: Number,
+    sine: Number, versine: Number,
+) -> Any:  # fmt: skip
     """A point turned about an axis with direction d through p; versine is 1 - cosine."""
     ex, ey, ez = twice_crossed(dx, dy, dz, sine, versine, x - px, y - py, z - pz)
     return x + ex, y + ey, z + ez
@@ -118,34 +109,14 @@ def screwed(s: Number, u: Number, v: Number, w: Number, a: Number, b: Number, c:
     return a + ex, b + ey, c + ez
 
 
-def moved_forth(
-    x: Number,
-    y: Number,
-    z: Number,
-    s: Number,
-    t: Any,
-    r: Any,
-    a: Number,
-    b: Number,
-    c: Number,
-) -> Any:
+def moved_forth(x: Number, y: Number, z: Number, s: Number, t: Any, r: Any, a: Number, b: Number, c: Number) -> Any:
     """A point after a rotation r of squared size s about a b c, and a translation t."""
     first, second = factors(s)
     ex, ey, ez = twice_crossed(r[0], r[1], r[2], first, second, x - a, y - b, z - c)
     return x + ex + t[0], y + ey + t[1], z + ez + t[2]
 
 
-def moved_back(
-    x: Number,
-    y: Number,
-    z: Number,
-    s: Number,
-    t: Any,
-    r: Any,
-    a: Number,
-    b: Number,
-    c: Number,
-) -> Any:
+def moved_back(x: Number, y: Number, z: Number, s: Number, t: Any, r: Any, a: Number, b: Number, c: Number) -> Any:
     """The point that `moved_forth` takes to x y z."""
     first, second = factors(s)
     x, y, z = x - t[0], y - t[1], z - t[2]
@@ -269,8 +240,8 @@ def brought_back(
     axes   their columns; no rotary axis stands between them
     turns  sines and versines of the rotary ones
     """
-    start, d, p, (sine, versine) = steps.start, steps.direction, steps.point, turns
-    ax, ay, az = start[0] + start[3] * length, start[1] + start[4] * length, start[2] + start[5] * length
+    d, p, (sine, versine) = steps.direction, steps.point, turns
+    ax, ay, az = at_tip(steps, length)
     led = [i for i, axis in enumerate(steps.axis) if steps.kind[i] == SHIFT and axis in axes]
     for i in range(led[0]):
         axis, j = steps.axis[i], 3 * i
