@@ -82,6 +82,10 @@ def test_wrong_use(ncfix, measured, tmp_path):
     machine, _, data = measured
     assert ncfix("simulate", "-m", machine).code == 2
     assert ncfix("plan", "-m", machine, "--range", "Q=0,1").code == 2
+    done = ncfix("plan", "-m", machine, "--range", "X=0,5000")
+    assert (done.code, "X goes from" in done.err) == (2, True)
+    for options in (("--program", data, "--noise-um", "1"), ("--plan", data, "--input", "temp_spindle=24")):
+        assert ncfix("simulate", "-m", machine, *options).code == 2
     done = ncfix("calibrate", data, "-m", machine, "-o", tmp_path / "m.toml", "--effects", "EXQ")
     assert done.code == 2
     assert "NCF635" in done.err

@@ -73,6 +73,8 @@ def test_start_positions_may_be_given_one_by_one_as_messages_ask_for_them() -> N
         (["--initial", "X0"], "not an axis and a number"),
         (["--initial", "XY=0"], "not an axis and a number"),
         (["--initial", "X=1,5"], "not an axis and a number"),
+        (["--initial", "X=1,X=2"], "X is there twice"),
+        (["--offset", "G54=X1,Z2,X3"], "an axis is there twice"),
     ],
 )
 def test_what_is_wrong_is_said(arguments: list[str], said: str) -> None:

@@ -12,9 +12,12 @@ from ncfix.cli.options import Length, force_option, json_option, load_machine, m
 from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 
 if TYPE_CHECKING:
+    from ncfix.machine import Machine
     from ncfix.measure.candidates import Room
 
 KINDS = ("tcp", "tcp6", "probe", "length")
+ROUNDING = 1e-9
+"""mm or degree: no way beyond the travel."""
 
 
 @click.command()
@@ -71,7 +74,7 @@ def plan(
     machine = load_machine(machine_path)
     before = reads(read(existing), machine, shown(existing)) if existing else None
     names = [name.strip() for name in separate.split(",")] if separate else []
-    room = _room(ranges, lengths, balls, reaches, inputs, machine.axis_names)
+    room = _room(ranges, lengths, balls, reaches, inputs, machine)
     with console.busy("choosing poses"):
         found = planned(machine, kind, count, room, effects, names, before, seed)
     empty = found.plan.form.measured if kind != "probe" else ()
@@ -101,14 +104,18 @@ def _room(
     balls: tuple[str, ...],
     reaches: tuple[str, ...],
     inputs: tuple[str, ...],
-    axes: tuple[str, ...],
+    machine: Machine,
 ) -> Room:
     from ncfix.measure.candidates import Room
 
     limits = _limits(ranges, "--range")
-    for name in limits:
-        if name not in axes:
-            raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(axes)}", param_hint="--range")
+    travels = {axis.name: tuple(limit / axis.unit for limit in axis.range) for axis in machine.axes}
+    for name, (low, high) in limits.items():
+        if name not in travels:
+            raise click.BadParameter(f"the machine has no axis {name}, only {' '.join(travels)}", param_hint="--range")
+        lowest, highest = travels[name]
+        if low < lowest - ROUNDING or high > highest + ROUNDING:
+            raise click.BadParameter(f"{name} goes from {lowest:g} to {highest:g} only", param_hint="--range")
     reach = _limits(reaches, "--reach")
     for name in reach:
         if name not in ("x", "y", "z"):

@@ -57,7 +57,10 @@ def offset_values(name: str, text: str) -> dict[str, float]:
     if not re.fullmatch(r"G5[4-9](\.[1-9]\d*(P[1-9]\d*)?)?|G500|G5(0[5-9]|[1-9]\d)|PRESET\d*", name):
         raise ValueError(f"{name} is not a work offset")
     if all(AXIS.match(part.upper()) for part in parts):
-        return {part[0].upper(): number(part[1:].removeprefix("=")) for part in parts}
+        letters = [part[0].upper() for part in parts]
+        if len(set(letters)) < len(letters):
+            raise ValueError("an axis is there twice")
+        return {letter: number(part[1:].removeprefix("=")) for letter, part in zip(letters, parts, strict=True)}
     if not 1 <= len(parts) <= len(OFFSET_AXES):
         raise ValueError(f"{len(parts)} numbers, at most {len(OFFSET_AXES)} axes")
     return dict(zip(OFFSET_AXES, map(number, parts), strict=False))
@@ -86,6 +89,8 @@ class Position(click.ParamType):  # type: ignore[type-arg]
             try:
                 if not equals or not AXIS.fullmatch(letter):
                     raise ValueError(f"{part.strip()!r} is not an axis and a number")
+                if letter in found:
+                    raise ValueError(f"{letter} is there twice")
                 found[letter] = number(text)
             except ValueError as error:
                 self.fail(f"{value!r}: {error}; it reads like {self.name}", param, ctx)

@@ -10,6 +10,7 @@ from itertools import chain
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from ncfix.cli import console
 from ncfix.cli.following import Following, figures
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from ncfix.measure.synthetic import Faults
 
 NOT_NEGATIVE = FiniteRange(min=0.0, max=1e6)
+OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
+"""Options that say nothing of a program."""
 
 
 @click.command()
@@ -63,6 +66,7 @@ def simulate(
     """
     if (program is None) == (plan is None):
         raise click.UsageError("give either --program or --plan")
+    _check_apt(of_plan=plan is not None, of_program=dialect is not None or given != SetupOptions())
     if plan is not None:
         from ncfix.measure.synthetic import Faults
 
@@ -85,6 +89,18 @@ def simulate(
         console.put_json(path=shown(program), error_um=found, output=target.path if target else None)
     elif not target or target.path != "-":
         console.put(f"tip error: {console.error_figures(found)}\n")
+
+
+def _check_apt(of_plan: bool, of_program: bool) -> None:
+    """Refuse options that would say nothing."""
+    context = click.get_current_context()
+    said = [name for name in OF_PLANS if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
+    if said and not of_plan:
+        raise click.UsageError(f"--{said[0].replace('_', '-')} is for a measurement (--plan), not for a program")
+    if of_plan and of_program:
+        raise click.UsageError(
+            "--dialect and the options of the set-up are for a program; a plan has columns for states"
+        )
 
 
 @dataclass(frozen=True, slots=True)
