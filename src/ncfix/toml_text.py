@@ -27,9 +27,11 @@ def decoded(source: bytes, path: str, code: str) -> str:
     try:
         return source.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ConfigError.of(
-            code, f"not a text in UTF-8 (byte {error.start})", Place(path), "save it as UTF-8"
-        ) from error
+        before = source[: error.start].decode("utf-8-sig")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        place = Place(path, line, column, _row(source.decode(errors="replace").removeprefix("\ufeff"), line))
+        text = f"not a text in UTF-8: byte 0x{source[error.start]:02X}"
+        raise ConfigError.of(code, text, place, "save it as UTF-8") from error
 
 
 def parsed(text: str, path: str, code: str, hint: str = "") -> dict[str, Any]:

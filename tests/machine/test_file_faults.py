@@ -216,9 +216,17 @@ def test_values_where_tables_should_be() -> None:
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="NCF300: cannot read the machine file: No such file"):
         load(tmp_path / "missing.toml")
-    (tmp_path / "binary.toml").write_bytes(b'name = "\xff\xfe"')
-    with pytest.raises(ConfigError, match=r"binary.toml: NCF301: not a text in UTF-8 \(byte 8\)"):
-        load(tmp_path / "binary.toml")
+    (tmp_path / "latin.toml").write_bytes(b'ncfix = 1\r\nname = "M\xfchle"\r\n')
+    with pytest.raises(
+        ConfigError, match=r"latin.toml:2:10: NCF301: not a text in UTF-8: byte 0xFC\n    name = "
+    ) as raised:
+        load(tmp_path / "latin.toml")
+    assert raised.value.messages[0].hint == "save it as UTF-8"
     for encoding in ("utf-8", "utf-8-sig"):
         (tmp_path / "good.toml").write_text(GOOD, encoding=encoding)
         assert load(tmp_path / "good.toml") == loads(GOOD)
+
+
+def test_a_setup_file_is_known_for_one() -> None:
+    found = faults("[work_offsets]\nG54 = [0, 0, 0]\n[tools]\n1 = { length = 100.0 }\n")
+    assert [(each.code, each.text) for each in found] == [("NCF303", "this is a setup file, not a machine file")]

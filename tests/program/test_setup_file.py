@@ -165,3 +165,9 @@ def test_wrong_lines_are_named_all_at_once(tmp_path: Path, name: str, text: str,
         table(tmp_path, name, text)
     assert [message.place.line for message in caught.value.messages if message.place] == faults
     assert {message.code for message in caught.value.messages} == {"NCF385"}
+
+
+def test_a_machine_file_is_known_for_one(root: Path) -> None:
+    with pytest.raises(ConfigError, match="this is a machine file, not a setup file") as raised:
+        load(str(root / "examples/machines/dmu50.toml"))
+    assert len(raised.value.messages) == 1

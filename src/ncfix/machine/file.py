@@ -27,6 +27,8 @@ from ncfix.toml_text import decoded, key_lines, parsed
 SCHEMA = 1
 TOP = ("ncfix", "name", "topology", "control", "least_increment", "max_correction", "workpiece_offset")
 """Keys that stand above the tables."""
+SETUP = {"work_offsets", "tools", "initial", "references", "variables"}
+"""Tables that only a setup file has."""
 DEGREE = np.pi / 180
 EXACT = 1e-14
 """A vector this near to unit length is left as it is written."""
@@ -50,6 +52,8 @@ def loads(source: str | bytes, path: str = "<machine>") -> Machine:
     """The machine that a text describes. Raises `ConfigError` with every fault found; `path` is for messages."""
     text = source if isinstance(source, str) else decoded(source, path, "NCF301")
     values = parsed(text, path, "NCF301")
+    if "topology" not in values and SETUP & values.keys():
+        raise ConfigError.of("NCF303", "this is a setup file, not a machine file", Place(path), "--setup is for setups")
     report = Report(path, text, key_lines(text), top=set(TOP))
     machine = _machine(Section(values, (), report))
     if machine is None or report.messages:

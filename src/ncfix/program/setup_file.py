@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
-from ncfix.diagnostics import ConfigError, Message
+from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
 from ncfix.program.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.program.tool_table import load_tool_table
@@ -49,6 +49,8 @@ def load(path: str) -> Setup:
 def loads(text: str, path: str = "<setup>") -> Setup:
     """The setup in a text; raises ConfigError NCF38x with all that is wrong in it."""
     content = parsed(text, path, NOT_TOML, "docs/formats.md shows a setup file")
+    if "topology" in content:
+        raise ConfigError.of(UNKNOWN_KEY, "this is a machine file, not a setup file", Place(path), "-m is for machines")
     reading = Reading(path, text, key_lines(text))
     values = {key: reading.entry(key, value) for key, value in content.items()}
     if reading.faults:
