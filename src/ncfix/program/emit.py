@@ -107,7 +107,24 @@ def emit(
 
 
 class _Emitter:
-    """The walk over the motions; `run()` is called once."""
+    """The walk over the motions; `run()` is called once.
+
+    The control's book:
+
+    position     (n_axes,) the command at which it stands, as emitted
+    jumps        (n, n_axes) where a motion does not start where the one before ended
+    replaced     the motion code in force, in tenths, where it is not the program's own; else None
+    replaced_by  the block that has put it there
+    cycle_end    (n_axes,) the bottom of the last hole while canned cycles follow each other; None otherwise
+    levels       the level R of canned cycles
+
+    What is written:
+
+    in_stretch   (n,) motions that were written in bulk
+    written      block -> what was written of each of the others
+    latest       the blocks among these whose edits have not been taken yet
+    end, centre, start, conflicts  as in `Emission`
+    """
 
     def __init__(
         self,
@@ -163,7 +180,7 @@ class _Emitter:
                 self.cycle_end = None
                 self.levels.forget()
             row += 1
-        self._turn()
+        self._write_centres()
         splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
 
@@ -197,7 +214,7 @@ class _Emitter:
         self.cycle_end = None
         return stop - row
 
-    def _turn(self) -> None:
+    def _write_centres(self) -> None:
         """Write the centres of the arcs in stretches; where these are not clear, the arc by itself."""
         rows = self.pieces.move[np.flatnonzero(self.pieces.arc)]
         rows = rows[self.in_stretch[rows]]
@@ -352,7 +369,9 @@ class _Emitter:
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
             wordless=tuple(wordless.tolist()),
-            **self.levels.wanted(row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position),
+            level=self.levels.wanted(
+                row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position
+            ),
         )
 
     def _turn_minutes(self, row: int) -> float:

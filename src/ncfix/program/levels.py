@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ncfix.program.frames import FrameMap
 from ncfix.program.moves import Moves
 from ncfix.program.pieces import Pieces
-from ncfix.program.target import Rendered, Target
+from ncfix.program.target import Level, Rendered, Target
 
 FloatArray = NDArray[np.float64]
 
@@ -37,24 +37,22 @@ class LevelBook:
 
     def wanted(
         self, row: int, piece: int, number: int, frame: FrameMap, as_programmed: FrameMap, here: FloatArray
-    ) -> dict[str, Any]:
-        """What a target has to say of R, in the numbers of `frame` (its `number`), while the axes stand `here`."""
+    ) -> Level | None:
+        """What R shall be in the numbers of `frame` (its `number`), while the axes stand `here`; None of no cycle."""
         moves, approach = self.moves, self.pieces.approach
         if approach is None or moves.approach is None or not np.isfinite(approach[piece]).all():
-            return {}
+            return None
         nominal = as_programmed.program(moves.approach[row].copy())
         across = int(np.argmax(np.abs(nominal - as_programmed.program(moves.end[row].copy()))))
-        known = self.in_force is not None and self.in_force[0] == number
+        in_frame, level = self.in_force or (-1, math.nan)
         stands = bool(as_programmed.program(moves.start[row].copy())[across] == nominal[across])
-        return {
-            "across": across,
-            "level": float(frame.program(approach[piece].copy())[across]),
-            "nominal_level": float(nominal[across]),
-            "level_before": self.in_force[1] if known and self.in_force is not None else float("nan"),
-            "least_level": float(frame.program(here.copy())[across])
-            if stands and not self.comes_back(row)
-            else float("nan"),
-        }
+        return Level(
+            across,
+            wanted=float(frame.program(approach[piece].copy())[across]),
+            nominal=float(nominal[across]),
+            before=level if in_frame == number else math.nan,
+            least=float(frame.program(here.copy())[across]) if stands and not self.comes_back(row) else math.nan,
+        )
 
     def comes_back(self, row: int) -> bool:
         """Whether the control ends at R (G99) behind a cycle, and not where it began."""
@@ -67,9 +65,9 @@ class LevelBook:
     def note(self, number: int, frame: FrameMap, target: Target, rendered: Rendered) -> None:
         """Note what was written."""
         self.forget()
-        if rendered.level is not None:
+        if rendered.level is not None and target.level is not None:
             over = rendered.ends[-1].copy()
-            over[target.across] = rendered.level
+            over[target.level.across] = rendered.level
             self.in_force, self.approach = (number, rendered.level), frame.command(over)
 
     def returns(self, row: int) -> NDArray[np.bool_]:

@@ -136,20 +136,19 @@ class BlockRenderer(TurnWriter):
 
     def _level(self) -> None:
         """The level R of a canned cycle: its word, or one more where another level is in force."""
-        target, word = self.target, self.layout.radius
-        if not math.isfinite(target.level):
+        level, word = self.target.level, self.layout.radius
+        if level is None:
             return
-        decimals, half = int(target.decimals[target.across]), self.half[target.across]
-        level, least = target.level, target.least_level
-        if level < least:
-            level = float(np.ceil(least / (2 * half) - GRAIN) * 2 * half)
-        self.out.level = target.level_before if word is None else self._value(word, target.nominal_level)
-        if abs(level - self.out.level) < half and not self.out.level < least - 2 * GRAIN * half:
+        decimals, half, wanted = int(self.target.decimals[level.across]), self.half[level.across], level.wanted
+        if wanted < level.least:
+            wanted = float(np.ceil(level.least / (2 * half) - GRAIN) * 2 * half)
+        self.out.level = level.before if word is None else self._value(word, level.nominal)
+        if abs(wanted - self.out.level) < half and not self.out.level < level.least - 2 * GRAIN * half:
             return
         if word is not None:
-            self.out.level = self._rewrite(word, level, decimals)
+            self.out.level = self._rewrite(word, wanted, decimals)
         else:
-            text = f"{level:.{decimals}f}"
+            text = f"{wanted:.{decimals}f}"
             self._add("R", text)
             self.out.level = float(text)
 

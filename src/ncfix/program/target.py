@@ -20,6 +20,24 @@ is corrected they are not the same arcs any more, and are written as those that 
 
 
 @dataclass(frozen=True, slots=True)
+class Level:
+    """What the level R of a canned cycle shall be, in program numbers.
+
+    across   the column of the axis along which the cycle drills
+    wanted   what R shall be
+    nominal  what it was as programmed
+    before   what is in force before the block, NaN where that is not known
+    least    R must not be lower; NaN: it may
+    """
+
+    across: int
+    wanted: float
+    nominal: float
+    before: float
+    least: float
+
+
+@dataclass(frozen=True, slots=True)
 class Target:
     """What one motion shall become, in program numbers.
 
@@ -51,10 +69,7 @@ class Target:
     pointing     how rotary positions (rad) point the tool, where the program gives its direction
     rotation     (3, 3) how the frame is turned
     offset       (n_axes,) of the frame, mm and rad
-    across       of a canned cycle with a level R: the column of the axis along which it drills
-    level        what R shall be, NaN where it is not to be written
-    nominal_level, level_before  what it was as programmed, and what is in force before the block (NaN: not known)
-    least_level  R must not be lower; NaN: it may
+    level        of a canned cycle whose R is to be written: what it shall be
     wordless     (n_axes,) axes that have no word and must get none; empty: no axis
     """
 
@@ -88,11 +103,7 @@ class Target:
     pointing: Pointing | None = None
     rotation: FloatArray | None = None
     offset: FloatArray | None = None
-    across: int = -1
-    level: float = float("nan")
-    nominal_level: float = float("nan")
-    level_before: float = float("nan")
-    least_level: float = float("nan")
+    level: Level | None = None
     wordless: tuple[bool, ...] = ()
 
     def may_name(self, column: int) -> bool:
