@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.poses import machine, plan
+from measure.poses import TARGETS, machine, plan
 from ncfix.machine import se3
+from ncfix.measure.calibrate import calibrate
 from ncfix.measure.observe import observe
 from ncfix.measure.synthetic import Faults, simulate
 
@@ -47,3 +48,20 @@ def test_what_the_readings_leave_open_stays_where_the_header_says():
     seen = observe(data, clean)
     assert np.abs(seen.places - PLACES).max() < 1e-6
     assert np.abs(seen.stands[0, :3, :3] - turn).max() < 1e-9
+
+
+def test_one_target_that_the_header_has_places_the_others():
+    """It stays where the header has it, and is not averaged with targets of which nobody said where they are."""
+    turn = se3.rotation(np.array([0.3, -2.0, 1.1]))
+    targets = (("target", "2 " + " ".join(map(str, PLACES[1]))),)
+    data, clean = seen_from(turn, np.array([800.0, -900.0, 300.0]), "tool", "wCBXFZYSt", targets)
+    assert np.abs(observe(data, clean).places - PLACES).max() < 0.1  # mm; what is known gives way by 1e-4 of the rest
+
+
+@pytest.mark.parametrize(("targets", "said"), [((), True), (TARGETS, False)])
+def test_targets_whose_levers_are_not_known_are_remarked_on(targets, said):
+    """Angles of a slide cannot be told from its displacements unless it is known where on it the targets are."""
+    truth = machine("three_axis")
+    aim = replace(plan(truth, "tool", 90), headers=(("carried_by", "tool"), *targets, ("noise_um", "1")))
+    found = calibrate([simulate(aim, truth, Faults(noise_um=1.0), seed=3)], truth, "E?Z")
+    assert ("NCF643" in {message.code for message in found.remarks}) is said

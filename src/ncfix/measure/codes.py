@@ -153,4 +153,11 @@ CODES = {
         "Look at the row that is named, and at what else is remarked. `ncfix diagnose` tests for such mistakes; "
         "`--allow-misfit` writes the machine file all the same.",
     ),
+    "NCF643": Code(
+        "targets whose place the readings leave open",
+        "Where only linear axes move what carries the targets, readings show how targets lie to each other, not where "
+        "they are. Angles act on them by levers, so that estimated angles and displacements go with the place that was "
+        "taken: as near the tip of a tool of no length, or the origin of the workpiece, as the readings allow.",
+        "A line `# target: NAME x y z` in the header says where one of them nearly is.",
+    ),
 }

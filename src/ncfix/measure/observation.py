@@ -9,13 +9,14 @@ design matrix `projection(q) . Jacobian(q) . basis(state)` is made here and nowh
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine
 from ncfix.measure.measurement import Array, Index, Measurement, groups
 
@@ -65,6 +66,10 @@ class Observation(ABC):
         self.machine = machine
         self.q = measurement.positions(machine)
         self.state = measurement.state(machine)
+
+    def doubts(self, machine: Machine) -> Iterator[Message]:
+        """What had to be assumed of the set-up and matters with the errors of this machine."""
+        yield from ()
 
     # -- what was read ------------------------------------------------------------------------------------------------
 

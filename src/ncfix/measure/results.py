@@ -42,6 +42,7 @@ def result(problem: Problem, estimate: Estimate, loss: str) -> Calibration:
     remarks += [message for each in _swapped(problem, estimate) for message in each]
     before, after = _rms_before(problem), _rms(problem, estimate.residual, estimate.weight > 0)
     machine = _machine(problem, estimate, scale, {"rms_before_um": before, "rms_after_um": after, "loss": loss})
+    remarks += [message for seen in problem.observations for message in seen.doubts(machine)]
     return Calibration(machine, problem, estimate, scale, tuple(remarks), before, after)
 
 

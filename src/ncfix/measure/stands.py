@@ -17,6 +17,7 @@ import numpy as np
 from ncfix.machine import se3
 from ncfix.measure.geometry import best_rotation
 from ncfix.measure.measurement import Array, Index
+from ncfix.measure.observation import LEVER, Mask
 
 STEPS = 40
 """Gauss-Newton steps from one start; a good one takes some ten."""
@@ -28,17 +29,23 @@ CLEARLY = 0.5
 """A later start replaces an earlier one if it leaves less than this of its rms."""
 CHEAP = 1e5
 """A shift of the instrument is this much likelier than one of the targets, where the readings leave the choice."""
+FIRM = 1e-2
+"""A target whose place the header has moves this much less than one whose place nobody said, for the same reason."""
 OPEN = 1e-9
 """Combinations that the readings show this much less than the best are left as they are."""
 
 
 @dataclass(frozen=True)
 class Sights:
-    """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set."""
+    """What belongs to each of n readings: base_from_body (n, 4, 4), and the numbers of the target and of the set.
+
+    known  (t,) of which targets the header says nearly where they are
+    """
 
     poses: Array
     target: Index
     sets: Index
+    known: Mask
 
     def base(self, places: Array) -> Array:
         """Where the targets are in the base frame, places (t, 3) -> (n, 3)."""
@@ -64,11 +71,36 @@ class Sights:
         result: Array = columns.reshape(3 * n, -1)
         return result
 
+    def left_open(self, places: Array, turns: Array) -> Array:
+        """Changes of places, shifts and turns that no reading shows, places that are known apart: rows (k, 3 t + 6 s).
+
+        In each of them the target that moves most moves by `LEVER`.
+        """
+        free = np.concatenate([np.repeat(~self.known, 3), np.ones(6 * len(turns), dtype=bool)])
+        design = self.design(places, turns)[:, free]
+        size = np.linalg.norm(design, axis=0)
+        _, values, right = np.linalg.svd(design / size, full_matrices=False)
+        changes = np.zeros(((values < OPEN * values[0]).sum(), len(free)))
+        changes[:, free] = right[values < OPEN * values[0]] / size
+        most = np.abs(changes[:, : places.size]).max(axis=1, initial=0.0)
+        moving = most > OPEN * np.abs(changes).max(axis=1, initial=0.0)
+        found: Array = changes[moving] * (LEVER / most[moving])[:, None]
+        return found
+
     def of_set(self, number: int) -> tuple[Sights, Index]:
         """Some readings of one set, as if there were no other, and which these are."""
         rows = np.flatnonzero(self.sets == number)
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, ENOUGH).astype(int))]
-        return Sights(self.poses[rows], self.target[rows], np.zeros(len(rows), int)), rows
+        return Sights(self.poses[rows], self.target[rows], np.zeros(len(rows), int), self.known), rows
+
+    def step(self, places: Array, turns: Array, gap: Array, turning: bool = True) -> Array:
+        """The least change of places, shifts and, if `turning`, turns that explains a gap (n, 3) in the readings."""
+        scale = np.repeat([CHEAP, 1.0], 3 * len(turns))
+        scale = np.concatenate([np.repeat(np.where(self.known, FIRM, 1.0), 3), scale])
+        columns = len(scale) if turning else len(scale) - 3 * len(turns)
+        design = self.design(places, turns)[:, :columns] * scale[:columns]
+        change: Array = scale[:columns] * np.linalg.lstsq(design, gap.ravel(), rcond=OPEN)[0]
+        return change
 
 
 @dataclass(frozen=True)
@@ -86,16 +118,16 @@ class Standing:
         return se3.rigid(self.turns, self.shifts)
 
 
-def first_guess(sights: Sights, readings: Array, places: Array, known: Array, along_base: bool) -> Standing:
+def first_guess(sights: Sights, readings: Array, places: Array, along_base: bool) -> Standing:
     """The stand of the instrument per set and the places of the targets, from the motions of a perfect machine.
 
-    `places` (t, 3) is where the targets are nearly, mm, as far as `known` (t,) says so; what the readings leave open
-    stays as it is there. `along_base`: the instrument's axes are nearly those of the base.
+    `places` (t, 3) is where the targets are nearly, mm, of those that are known; what the readings leave open stays as
+    it is there. `along_base`: the instrument's axes are nearly those of the base.
     """
     numbers = range(int(sights.sets.max()) + 1)
     if along_base:
         return _fitted(sights, readings, places, np.stack([np.eye(3) for _ in numbers]))
-    turns = np.concatenate([_turn(*_some(sights, readings, k), places, known) for k in numbers])
+    turns = np.concatenate([_turn(*_some(sights, readings, k), places) for k in numbers])
     return _settled(sights, readings, _fitted(sights, readings, places, turns))
 
 
@@ -104,10 +136,10 @@ def _some(sights: Sights, readings: Array, number: int) -> tuple[Sights, Array]:
     return part, readings[rows]
 
 
-def _turn(sights: Sights, readings: Array, places: Array, known: Array) -> Array:
+def _turn(sights: Sights, readings: Array, places: Array) -> Array:
     """The turn of the instrument in one set, (1, 3, 3): of all starts the one that leads nearest to the readings."""
     best: Standing | None = None
-    for start in _starts(sights, readings, places, known):
+    for start in _starts(sights, readings, places):
         found = _settled(sights, readings, _fitted(sights, readings, places, start[None]))
         if best is None or found.rms < CLEARLY * best.rms:
             best = found
@@ -115,8 +147,8 @@ def _turn(sights: Sights, readings: Array, places: Array, known: Array) -> Array
     return best.turns
 
 
-def _starts(sights: Sights, readings: Array, places: Array, known: Array) -> Iterator[Array]:
-    rows = known[sights.target]
+def _starts(sights: Sights, readings: Array, places: Array) -> Iterator[Array]:
+    rows = sights.known[sights.target]
     if rows.any():
         base = sights.base(places)[rows]
         yield best_rotation(readings[rows] - readings[rows].mean(0), base - base.mean(0))
@@ -130,9 +162,7 @@ def _starts(sights: Sights, readings: Array, places: Array, known: Array) -> Ite
 def _fitted(sights: Sights, readings: Array, places: Array, turns: Array) -> Standing:
     """Places and shifts for turns that are given."""
     shifts = np.zeros((len(turns), 3))
-    columns = places.size + shifts.size
-    gap = readings - sights.seen(places, turns, shifts)
-    step = _step(sights.design(places, turns)[:, :columns], gap, places.size, shifts.size)
+    step = sights.step(places, turns, readings - sights.seen(places, turns, shifts), turning=False)
     return _standing(sights, readings, places + step[: places.size].reshape(-1, 3), turns, step[places.size :])
 
 
@@ -140,7 +170,7 @@ def _settled(sights: Sights, readings: Array, standing: Standing) -> Standing:
     """The nearest standing whose rms no small change makes less."""
     for _ in range(STEPS):
         gap = readings - sights.seen(standing.places, standing.turns, standing.shifts)
-        step = _step(sights.design(standing.places, standing.turns), gap, standing.places.size, standing.shifts.size)
+        step = sights.step(standing.places, standing.turns, gap)
         change = step[standing.places.size + standing.shifts.size :].reshape(-1, 3)
         change *= min(1.0, STRIDE / max(float(np.abs(change).max()), 1e-300))
         moved = _fitted(sights, readings, standing.places, se3.rotation(change) @ standing.turns)
@@ -148,14 +178,6 @@ def _settled(sights: Sights, readings: Array, standing: Standing) -> Standing:
             return standing
         standing = moved
     return standing
-
-
-def _step(design: Array, gap: Array, places: int, shifts: int) -> Array:
-    """The least change that explains the gap; the first columns are those of places, the next those of shifts."""
-    scale = np.ones(design.shape[1])
-    scale[places : places + shifts] = CHEAP
-    step: Array = scale * np.linalg.lstsq(design * scale, gap.ravel(), rcond=OPEN)[0]
-    return step
 
 
 def _standing(sights: Sights, readings: Array, places: Array, turns: Array, shifts: Array) -> Standing:

@@ -6,16 +6,17 @@ s how the instrument stands. Places and stand are unknown. Three or more targets
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
+from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine, State, se3
 from ncfix.measure.geometry import TOOL, WORKPIECE, branch
 from ncfix.measure.measurement import Array, Measurement, groups
-from ncfix.measure.observation import Observation, Unknowns
+from ncfix.measure.observation import LEVER, Observation, Unknowns
 from ncfix.measure.stands import Sights, first_guess
 
 READ = ("x", "y", "z")
@@ -36,8 +37,10 @@ class Targets(Observation):
         self.poses = self._base_from_body(self.body.nominal(self.own, 0.0))
         self.names, self.index = groups(measurement.labels["target"])
         self.set_names, self.set_index = groups(measurement.sets)
-        self.sights = Sights(self.poses, self.index, self.set_index)
-        self.stands, self.places = self._first_guess()
+        stated = self._stated()
+        known = np.array([name in stated for name in self.names])
+        self.sights = Sights(self.poses, self.index, self.set_index, known)
+        self.stands, self.places = self._first_guess(stated)
 
     def _other_axes(self) -> dict[str, Array]:
         """The axes of the other branch, which errors of this one may depend on, as inputs in the file's units."""
@@ -83,6 +86,21 @@ class Targets(Observation):
         places, _, turns = self._parts(unknowns)
         return self.sights.design(places, se3.rotation(turns) @ self.stands[:, :3, :3])
 
+    def doubts(self, machine: Machine) -> Iterator[Message]:
+        """See `Observation`: angles act by levers, which no reading shows where only linear axes move."""
+        start = self.unknowns.start
+        read = self.predict(machine, start)
+        changes = self.sights.left_open(self.places, self.stands[:, :3, :3])
+        levers = [self.predict(machine, start + change) - read for change in changes]
+        size = max((float(np.linalg.norm(each / self.sigma)) for each in levers), default=0.0)
+        if size > 1:
+            most = 1e3 * max(float(np.abs(each).max()) for each in levers)
+            text = (
+                f"the readings do not tell where the targets are on what carries them; {LEVER:g} mm elsewhere, "
+                f"the estimated angles would move them by up to {most:.1f} um more or less"
+            )
+            yield Message("NCF643", text, self.measurement.place(0), "a line `# target: NAME x y z` in the header")
+
     def _parts(self, unknowns: Array) -> tuple[Array, Array, Array]:
         t, s = len(self.names), len(self.set_names)
         parts = np.split(unknowns.reshape(-1, 3), [t, t + s])
@@ -111,16 +129,16 @@ class Targets(Observation):
         result: Array = seen.reshape(-1, seen.shape[-1])
         return result
 
-    def _first_guess(self) -> tuple[Array, Array]:
+    def _stated(self) -> dict[str, list[float]]:
+        """Where targets are nearly, by name, mm, as the header has it."""
+        lines = [text.split() for text in self.measurement.all_headers("target")]
+        return {name: [float(each) for each in numbers] for name, *numbers in lines}
+
+    def _first_guess(self, stated: dict[str, list[float]]) -> tuple[Array, Array]:
         """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
-        places, known = np.zeros((len(self.names), 3)), np.zeros(len(self.names), bool)
-        for text in self.measurement.all_headers("target"):
-            name, *numbers = text.split()
-            if name in self.names:
-                places[self.names.index(name)] = [float(each) for each in numbers]
-                known[self.names.index(name)] = True
+        places = np.array([stated.get(name, [0.0, 0.0, 0.0]) for name in self.names])
         if not all(name in self.measurement.columns for name in READ):
             return np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy(), places
         along_base = self.measurement.header("frame") == "base"
-        found = first_guess(self.sights, self.measurement.stacked(*READ), places, known, along_base)
+        found = first_guess(self.sights, self.measurement.stacked(*READ), places, along_base)
         return found.stands, found.places
