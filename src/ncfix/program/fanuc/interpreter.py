@@ -14,29 +14,23 @@ from ncfix.program.fanuc.control import MacroControl
 from ncfix.program.fanuc.corners import CORNER
 from ncfix.program.fanuc.flow import BAD_JUMP, MacroFlow
 from ncfix.program.fanuc.lengths import LENGTH_IN_STEPS, lone_number
-from ncfix.program.fanuc.rules import ALL_CYCLES, MACRO
+from ncfix.program.fanuc.points import G15, G16, is_angle, is_scaled
+from ncfix.program.fanuc.rules import MACRO
 from ncfix.program.fanuc.variables import POSITION_READ, is_system
 from ncfix.program.follow.coordinates import INCH, LETTERS, PLANES, Z
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.places import mask_of
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block
-from ncfix.program.rs274.groups import NON_MODAL, ROTATION
 from ncfix.program.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
-from ncfix.program.rs274.order import DWELL, MACHINE
+from ncfix.program.rs274.order import MACHINE
 from ncfix.program.rs274.parameters import Store
 from ncfix.program.rs274.plans import Codes, Plan, plan_of
 from ncfix.program.tree import Literal, Opaque, Program, Span, Template, Word
 
-G15, G16, G20, G21, G90, G91 = 150, 160, 200, 210, 900, 910
-G65, G66, G66_1, G67 = 650, 660, 661, 670
+G20, G21, G90, G91 = 200, 210, 900, 910
+G65, G66_1, G67 = 650, 661, 670
 SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
-ANGLES = frozenset("IJKR")
-"""Of a rotation (G68, G68.2)."""
-
-DRILLING = frozenset("KLQ")
-"""K and L may be the repeats of a cycle, Q is the depth of its pecks."""
-SCALED = frozenset("XYZABCUVWIJKRQ")
 NO_UNIT = "NCF215"
 NOT_SET = "NCF244"
 ANGLE = ",A"
@@ -196,9 +190,9 @@ class MacroInterpreter(Interpreter):
     def take_points(self, plan: Plan, block: Block) -> None:
         """Numbers without a decimal point count increments, or as the setup says."""
         for letter in plan.pointless:
-            if self.is_scaled(letter, plan.codes) and not (letter == "R" and self.is_level(plan)):
+            if is_scaled(self.control, plan, letter):
                 self.span = next(word.span for word in plan.template.words if word.address == letter)
-                angle = self.is_angle(letter, plan.codes)
+                angle = is_angle(self.control, plan, letter)
                 block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
         self.span = None
 
@@ -224,31 +218,6 @@ class MacroInterpreter(Interpreter):
         changed = self.control.offsets.tool[Z] != before and not codes.takes
         if changed and self.control.modal.incremental and "Z" in block.values:
             self.control.lose((Z,), LENGTH_IN_STEPS)
-
-    def is_angle(self, letter: str, codes: Codes | None) -> bool:
-        """Whether the number of a word counts degrees though its address is none of a rotary axis."""
-        found = {} if codes is None else codes.g
-        if ROTATION in found:
-            return letter in ANGLES
-        polar_words = (self.control.polar is not None or G16 in found.values()) and G15 not in found.values()
-        return polar_words and letter == LETTERS[self.control.modal.plane.second]
-
-    def is_scaled(self, letter: str, codes: Codes | None) -> bool:
-        """Whether the number of a word counts least increments when it has no point."""
-        if letter not in SCALED:
-            return False
-        if codes is None:
-            return letter not in DRILLING
-        if codes.g.get(NON_MODAL) == DWELL:
-            return False
-        cycle = (self.control.modal.motion if codes.motion is None else codes.motion) in ALL_CYCLES
-        return letter not in DRILLING or (letter == "K" and not cycle) or (letter == "Q" and cycle)
-
-    def is_level(self, plan: Plan) -> bool:
-        """Whether R of a block is no length: no axis, cycle, plane or setting takes it (G5.1 Q1 R3, G332 R1)."""
-        if plan.axes or plan.codes is None or not plan.codes.g.keys().isdisjoint((NON_MODAL, ROTATION)):
-            return False
-        return (self.control.modal.motion if plan.codes.motion is None else plan.codes.motion) not in ALL_CYCLES
 
     def assign(self, plan: Plan) -> None:
         """Set the variables that a block sets, one after the other."""
