@@ -7,6 +7,7 @@ from ncfix.program.emit import SEVERAL_STATES, emit
 from ncfix.program.moves import Kind, Moves
 from ncfix.program.pieces import Pieces
 from ncfix.program.reader import read
+from ncfix.program.render import NO_TIME
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.writer import apply
@@ -130,6 +131,23 @@ def test_an_arc_made_of_lines_states_the_codes_around_it():
     emission = emit(program, moves, split(moves, 1, 0.5), STEP)
     text = apply(program.source, emission.edits).decode()
     assert text.splitlines()[1:4] == ["G1 X1 Y0 F9", "X2.000", "G2 X4 I1 J0"]
+
+
+def test_a_full_circle_behind_a_blank_becomes_lines():
+    program, moves = traced("G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\n I-1 J0\nX4 Y0 I1 J0\nM2\n")
+    emission = emit(program, moves, split(moves, 2, 0.5), STEP)
+    text = apply(program.source, emission.edits).decode()
+    assert text.splitlines()[2:5:2] == [" G1  X2.000", "G2 X4 Y0 I1 J0"]
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text"),
+    [("linuxcnc", "#1=2\nG0 X0 Y0 Z0\nG93\nG1 X10. F#1\nM2\n"), ("fanuc", "F9.\nG0 X0 Y0 Z0\nG93\nG1 X10.\nM2\n")],
+)
+def test_a_block_that_cannot_share_out_its_time_is_a_conflict(dialect: str, text: str):
+    program = read(text.encode(), "test", dialect)
+    moves = trace(program, GIVEN, AXES, frozenset()).moves
+    assert emit(program, moves, split(moves, 1, 0.4), STEP).conflicts == {3: NO_TIME}
 
 
 def test_a_loop_that_needs_different_corrections_is_a_conflict():

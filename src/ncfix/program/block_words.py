@@ -85,8 +85,10 @@ class WordWriter(BlockWriter[Layout]):
         return float(text) * increment
 
     def _remove(self, word: Word) -> None:
+        """Take a word out with the blank before it, if nothing has been put between them."""
         start, stop = self.program.span(self.block, word.span)
-        if self.program.source[start - 1 : start] in (b" ", b"\t") and start > self.program.blocks[self.block, 0]:
+        blank = self.program.source[start - 1 : start] in (b" ", b"\t") and start > self.program.blocks[self.block, 0]
+        if blank and all(edit[:2] != (start, start) for edit in self.out.edits):
             start -= 1
         self.out.edits.append((start, stop, ""))
 

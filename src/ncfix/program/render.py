@@ -31,6 +31,8 @@ CLOSED, EXACT = 1e-6, 1e-9
 NEAR = 3.0
 """Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
 
+NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
+
 
 class BlockRenderer(TurnWriter):
     """Renders one motion of one block. A short-lived worker: `render()` is called once."""
@@ -72,8 +74,8 @@ class BlockRenderer(TurnWriter):
         self._level()
         if self.dragged:
             self._time_of_turn(base, position)
-        elif self.target.inverse_time and len(self.target.ends) > 1 and self.layout.feed is not None:
-            self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
+        elif self.target.inverse_time and len(self.target.ends) > 1:
+            self._share_time()
         return position
 
     def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
@@ -250,7 +252,7 @@ class BlockRenderer(TurnWriter):
             words += self._centre_of_piece(piece, begin)
         if self.dragged:
             words.append(self._cased("F") + self._turn_feed(piece, begin, position))
-        elif target.inverse_time:
+        elif target.inverse_time and not self.out.conflict:
             words.append(self._cased("F") + f"{self._feed_share(piece):.{FEED_DECIMALS}f}")
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + (self.layout.blank).join(words))
@@ -292,6 +294,13 @@ class BlockRenderer(TurnWriter):
             centre[index] = base[index] + float(text)
         self.out.centres[piece] = centre
         return words
+
+    def _share_time(self) -> None:
+        """In G93 the pieces of a block take shares of its time, which its own F has to say in a plain number."""
+        if self.layout.feed is None or not math.isfinite(self._feed_share(0)):
+            self.out.conflict = NO_TIME
+        else:
+            self._rewrite(self.layout.feed, self._feed_share(0), FEED_DECIMALS)
 
     def _feed_share(self, piece: int) -> float:
         assert self.layout.feed is not None
