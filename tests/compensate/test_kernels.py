@@ -15,7 +15,7 @@ from ncfix import fast
 from ncfix.compensate.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.ends import corrected
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.judge import _look, bounds, uneasy_starts
+from ncfix.compensate.judge import bounds, deviations_seen, uneasy_starts
 from ncfix.compensate.known import Known
 from ncfix.compensate.nearest import Search
 from ncfix.compensate.path import plan
@@ -110,7 +110,7 @@ def test_no_look_finds_more_than_the_bound(root: Path, step: float, passing: flo
     start = np.concatenate([moves.start[:1], done[:-1]])
     real = replace(Segments.of_moves(moves, intent.columns), start=start, end=done)
     rows, uneasy = np.arange(1, len(moves)), uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
-    bound, found = bounds(intent, real, rows, uneasy), _look(intent, real, rows, uneasy, 8, 15)
+    bound, found = bounds(intent, real, rows, uneasy), deviations_seen(intent, real, rows, uneasy, 8, 15)
     assert (found <= bound).all()
     assert (bound < 2.5e-3).mean() >= passing
     assert found.max() > 1e-8
@@ -129,7 +129,7 @@ def test_no_look_at_a_led_tip_finds_more_than_the_bound(root: Path, name: str, s
     done = corrected(intent, get_strategy("position"), np.arange(len(moves))).wanted
     real = replace(Segments.of_moves(moves, intent.columns), start=np.vstack((moves.start[:1], done[:-1])), end=done)
     uneasy = uneasy_starts(intent, np.zeros(len(moves), dtype=bool))
-    bound, found = bounds(intent, real, rows, uneasy), _look(intent, real, rows, uneasy, 8, 15)
+    bound, found = bounds(intent, real, rows, uneasy), deviations_seen(intent, real, rows, uneasy, 8, 15)
     assert np.isfinite(bound).mean() > 0.5
     assert (found <= bound).all()
     assert found.max() > 1e-8

@@ -7,7 +7,7 @@ import pytest
 
 from machine.chains import four_kinds
 from measure.poses import plan
-from ncfix.diagnose.fields import _frames
+from ncfix.diagnose.fields import frames_of
 from ncfix.diagnose.view import view
 from ncfix.machine import Effect
 from ncfix.machine.effect import SPINDLE
@@ -25,7 +25,7 @@ def test_a_shift_of_the_whole_frame_is_among_them(name: str, count: int) -> None
     known = four_kinds()[name]
     seen = view([simulate(plan(known, "tcp", 40), known, Faults(1.0), 1)], known)
     tip = seen.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"]) / 1e3
-    frames = _frames(seen, tip)
+    frames = frames_of(seen, tip)
     held = next(axis.name for axis in known.axes if not axis.workpiece_side)
     shifted = seen.design([Effect(f"E{letter}0{held}", (0.0,), carried=True) for letter in "XYZ"]) / 1e3
     own = seen.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in "XYZ"]) / 1e3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from ncfix.diagnose.power import _odds, blind, said
+from ncfix.diagnose.power import blind, mean_odds, said
 
 DRAWS = 4000
 
@@ -18,7 +18,7 @@ def test_odds_are_the_mean_of_those_of_effects_of_that_size(size: float) -> None
     there = np.eye(30) + size**2 * columns @ columns.T
     y = random.multivariate_normal(np.zeros(30), there, DRAWS)
     odds = multivariate_normal(np.zeros(30), there).logpdf(y) - multivariate_normal(np.zeros(30), np.eye(30)).logpdf(y)
-    wanted = _odds(size**2 * np.linalg.eigvalsh(columns.T @ columns).clip(0.0))
+    wanted = mean_odds(size**2 * np.linalg.eigvalsh(columns.T @ columns).clip(0.0))
     assert wanted == pytest.approx(odds.mean(), abs=4 * odds.std() / np.sqrt(DRAWS))  # four standard errors
 
 

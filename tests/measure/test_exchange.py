@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.measure.exchange import Pool, _best_addition, choose, variances
+from ncfix.measure.exchange import Pool, best_addition, choose, variances
 
 
 def pool(seed: int, candidates: int = 150, targets: int = 200) -> Pool:
@@ -20,7 +20,7 @@ def test_the_best_addition_is_that_of_all_variances_written_out(seed: int, count
     whole = pool(seed)
     others = np.random.default_rng(seed).permutation(len(whole.blocks))[:count].tolist()
     worst = [np.inf if k in others else float(variances(whole, [*others, k]).max()) for k in range(len(whole.blocks))]
-    best, value = _best_addition(whole, others)
+    best, value = best_addition(whole, others)
     assert worst[best] == pytest.approx(min(worst), rel=1e-6)  # a ridge of 1e-9 where the others leave much open
     assert value == pytest.approx(min(worst), rel=1e-6)
 
@@ -31,4 +31,4 @@ def test_a_choice_cannot_be_bettered_by_one_exchange() -> None:
     worst = variances(whole, chosen).max()
     for place in range(len(chosen)):
         others = chosen[:place] + chosen[place + 1 :]
-        assert _best_addition(whole, others)[1] > 0.98 * worst  # a pass that gains half a percent is the last one
+        assert best_addition(whole, others)[1] > 0.98 * worst  # a pass that gains half a percent is the last one

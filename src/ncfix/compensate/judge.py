@@ -52,10 +52,10 @@ def looked_at(intent: Intent, real: Segments, rows: Index, uneasy: Mask, toleran
     seen = np.flatnonzero(samples < MOST)
     for part in batches(np.ceil(samples[seen]).astype(np.intp), MOST):
         now = seen[part]
-        worst[now] = _look(intent, real, rows[now], uneasy, FIRST, 1)
+        worst[now] = deviations_seen(intent, real, rows[now], uneasy, FIRST, 1)
         doubtful = now[~(worst[now] <= SURE * tolerance)]
         if doubtful.size:
-            closer = _look(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
+            closer = deviations_seen(intent, real, rows[doubtful], uneasy, DENSITY, LEAST)
             worst[doubtful] = np.maximum(worst[doubtful], closer)
     return worst
 
@@ -133,7 +133,8 @@ def straight_bounds(
     return most
 
 
-def _look(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int) -> Array:
+def deviations_seen(intent: Intent, real: Segments, rows: Index, uneasy: Mask, per_bend: float, least: int) -> Array:
+    """As `deviations`, (k,) mm, by samples alone: at least so many, and so many for each time the error may bend."""
     counts, fraction = interior(intent, real, rows, per_bend, least)
     starts = np.flatnonzero(uneasy[rows])
     if starts.size:

@@ -48,12 +48,12 @@ def fields(view: View) -> Iterator[Group | None]:
     """All of them; none where the data do not show the tool tip."""
     tip = view.design([Effect(f"E{letter}{SPINDLE}", (0.0,)) for letter in LETTERS]) / 1e3
     if np.abs(tip).max() > 0:
-        for way in _frames(view, tip):
+        for way in frames_of(view, tip):
             for owner, kernel in _kernels(view):
                 yield _at_tip(view, owner, way, kernel)
 
 
-def _frames(view: View, tip: Array) -> tuple[Array, ...]:
+def frames_of(view: View, tip: Array) -> tuple[Array, ...]:
     """What a shift of the tip along axes of the tool, of the base and of the workpiece shows, (m, 3) each.
 
     Those that are one are there once: tool and base where nothing turns the tool, base and workpiece where nothing

@@ -27,11 +27,12 @@ def findable(scale: Scale) -> dict[str, float]:
 def _smallest(court: Court, name: str, share: float, needed: float) -> float:
     """Of the form that shows best."""
     strengths = [court.strength(group, share) for group in court.forms[name]]
-    enough = (size for size in SIZES if max(_odds(size**2 * each) for each in strengths) >= needed)
+    enough = (size for size in SIZES if max(mean_odds(size**2 * each) for each in strengths) >= needed)
     return next(enough, float("inf"))
 
 
-def _odds(shown: Array) -> float:
+def mean_odds(shown: Array) -> float:
+    """The log odds that an effect has on average, by the variances (k,) that it shows over those of noise: s^2 d."""
     return 0.5 * float((shown - np.log1p(shown)).sum())
 
 

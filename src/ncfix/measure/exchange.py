@@ -86,13 +86,13 @@ def _passed(pool: Pool, start: list[int], fixed: int) -> list[int]:
     worst = float(variances(pool, [*range(fixed), *chosen]).max())
     for place in range(len(chosen)):
         others = [*range(fixed), *chosen[:place], *chosen[place + 1 :]]
-        better, value = _best_addition(pool, others)
+        better, value = best_addition(pool, others)
         if value < worst * (1 - EXCHANGED):
             chosen[place], worst = better, value
     return chosen
 
 
-def _best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
+def best_addition(pool: Pool, others: list[int]) -> tuple[int, float]:
     """The candidate that, added to the others, leaves the smallest worst variance, and that variance.
 
     With the rows B of a candidate and the information M without it, a target t gains |L^-1 B M^-1 t|^2, where
