@@ -110,6 +110,21 @@ def test_one_setting_of_an_axis_hides_its_location():
     assert np.isnan(found.sigma).tolist() == [True, False]
 
 
+@pytest.mark.parametrize("kind", ["tcp", "probe"])
+def test_each_tool_has_a_stylus_of_its_own_also_where_nothing_turns(kind):
+    """Two tools of a three-axis machine never sit alike in the spindle; that is no error of the machine."""
+    known = perfect(machine("three_axis"))
+    data = simulate(plan(known, kind, 120), known, Faults(noise_um=1.0), seed=2)
+    second = data.column("tool_length") == data.column("tool_length").max()
+    first, *others = data.measured
+    moved = data.with_columns({first: data.columns[first] + 0.02 * second})
+    found = calibrate([moved], known, "EC0Y,EB0Z,EA0Z,EXX,EYY,EZZ")
+    assert others
+    assert 0.7 < found.chi_square < 1.3
+    told = np.isfinite(found.sigma)
+    assert (np.abs(found.estimate.coefficients[told]) < 4.5 * found.sigma[told]).all()
+
+
 def test_too_few_rows_are_refused():
     known = machine("three_axis")
     data = simulate(plan(known, "tcp", 10), known, Faults(noise_um=1.0))

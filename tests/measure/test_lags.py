@@ -21,8 +21,8 @@ def warmed(known: Machine, rows: int = 200) -> Measurement:
     """Poses over six hours in which the spindle runs for three; 1 um of noise."""
     time = np.linspace(0, 6 * 3600, rows)
     warm = 20 + 15 * np.where(time < 3 * 3600, 1 - np.exp(-time / 600), np.exp(-(time - 3 * 3600) / 600))
-    poses = plan(known, "tcp", rows).with_columns({"time_s": time, "temp_spindle": warm})
-    return simulate(poses, known, Faults(noise_um=1.0), seed=3).with_header("setup", "rigid")
+    poses = plan(known, "tcp", rows).with_columns({"time_s": time, "temp_spindle": warm}).with_header("setup", "rigid")
+    return simulate(poses, known, Faults(noise_um=1.0), seed=3)
 
 
 def late(constant: float, size: float = 0.003) -> Effect:
@@ -89,8 +89,8 @@ def test_two_thermal_states_come_back():
     )
     time = np.linspace(0, 10 * 3600, 300)
     warm = 20 + 8 * ((time // 5400) % 2) + 3 * np.sin(time / 4000)
-    poses = plan(THREE, "tcp", 300).with_columns({"time_s": time, "temp_structure": warm})
-    data = simulate(poses, THREE.replace(effects=states), Faults(noise_um=0.5), seed=1).with_header("setup", "rigid")
+    poses = plan(THREE, "tcp", 300).with_columns({"time_s": time, "temp_structure": warm}).with_header("setup", "rigid")
+    data = simulate(poses, THREE.replace(effects=states), Faults(noise_um=0.5), seed=1)
     found = calibrate([data], THREE, "warming-X", time_constants=True)
     for effect, true in zip(found.machine.effects, states, strict=True):
         assert effect.time_constant_s == pytest.approx(true.time_constant_s, rel=0.03)

@@ -71,9 +71,9 @@ class Probing(Observation):
 
     @cached_property
     def has_stylus(self) -> bool:
-        """Whether orientations vary, so that the stylus offset is not the same as a common shift of all balls."""
+        """Whether tools or orientations vary, so that the stylus offset is no common shift of all balls."""
         turned = self.nominal[:, :3, :3] @ self.held
-        return bool(np.abs(turned - turned[:1]).max() > SAME)
+        return len(self.tools) > 1 or bool(np.abs(turned - turned[:1]).max() > SAME)
 
     @cached_property
     def unknowns(self) -> Unknowns:

@@ -50,9 +50,10 @@ class TipErrors(Observation):
 
     @cached_property
     def has_stylus(self) -> bool:
-        """Whether tool orientation or spindle angle vary, so that the stylus offset is seen apart from the ball's."""
+        """Whether the stylus offset is seen apart from the ball's: there are tools, orientations or spindle angles."""
         turned = self.nominal[:, :3, :3] @ self.held
-        return self.setup == BALL and bool(np.abs(turned - turned[:1]).max() > SAME)
+        vary = len(self.tool_names) > 1 or bool(np.abs(turned - turned[:1]).max() > SAME)
+        return self.setup == BALL and vary
 
     @cached_property
     def unknowns(self) -> Unknowns:
