@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from ncfix import fast
 from ncfix.diagnostics import NcfixError
 from ncfix.program.follow import lane
-from ncfix.program.moves import Kind, Moves
+from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.rs274 import arc_motion
 from ncfix.program.setup import Setup
 from program.arcs import full_of_arcs
@@ -221,6 +221,20 @@ def test_a_subprogram_before_what_was_looked_at_is_taken_as_it_is_written() -> N
     assert not isinstance(one, str)
     assert not isinstance(other, str)
     np.testing.assert_array_equal(one["end"], other["end"])
+
+
+CALLS = {"fanuc": ("M98 P8", "M99", "8"), "siemens": ("HOP", "M17", "hop")}
+
+
+@pytest.mark.parametrize("dialect", CALLS)
+def test_motions_of_subprogram_files_and_behind_their_calls(dialect: str) -> None:
+    call, end, file = CALLS[dialect]
+    lines = [f"X{i}." for i in range(20)]
+    text, sub = "\n".join(["G1 F100. X5. Y6.", *lines, call, *lines]), "\n".join([*lines, end, ""])
+    with stretches_of(lane.SHORTEST):
+        moves = follow(text, setup=Setup(assume_zero=True), dialect=dialect, files={file: sub}).moves
+    assert moves.block.tolist() == [*range(21), *[21] * 20, *range(22, 42)]
+    assert [bool(rule == Rule.CORRECT) for rule in moves.rule] == [block != 21 for block in moves.block]
 
 
 def test_the_lane_takes_what_it_should() -> None:

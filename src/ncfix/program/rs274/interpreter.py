@@ -117,6 +117,7 @@ class Interpreter:
                 self.at_end_of_text()
                 return
             plan = flow.unit.plan(flow.block)
+            self.control.external = "" if flow.unit is self.main else flow.unit.name
             if plan.lane is not None and self.takes_stretches():
                 circles = partial(turned, self.control, flow.unit)
                 done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
@@ -168,9 +169,7 @@ class Interpreter:
         control, unit, index = self.control, self.flow.unit, self.flow.block - 1
         control.numbers, control.first = unit.numbers, unit.first[index]
         if unit is self.main:
-            control.row_block, control.external = index, ""
-        else:
-            control.external = unit.name
+            control.row_block = index
         if plan.skip and self.is_skipped():
             return False
         if plan.tape:

@@ -127,7 +127,7 @@ class Interpreter:
                 course.finish()
                 continue
             main = not course.unit.external
-            plan = course.unit.plan(course.block)
+            plan, control.external = course.unit.plan(course.block), course.unit.external
             if plan.lane is not None and self.lane_is_open():
                 if plan.vector is None:
                     done = run_lane(control, course.unit, course.block, main, partial(turned, control, course.unit))
@@ -185,7 +185,6 @@ class Interpreter:
         unit, index = course.unit, course.block - 1
         control.numbers, control.first = unit.text.numbers, unit.text.first[index]
         self.span = None
-        control.external = unit.external
         if not unit.external:
             control.row_block = index
         if plan.skip >= 0 and self.is_skipped():
