@@ -84,3 +84,8 @@ def test_shapes_that_begin_alike_are_told_apart() -> None:
         head + tail for head in ("G1 X", "G1 X1 Y", "G1", "G1 X-", "G1 X+ ") for tail in ("", "2", " Z3", "-4.", "#")
     ]
     assert_same("\n".join([*lines, *lines[::-1], *lines, "M2", ""]).encode("latin-1"))
+
+
+@pytest.mark.parametrize("line", [lambda k: "X1Y2Z3", lambda k: f"X1 (row {k:x} of many) Y2"])
+def test_many_numbers_or_shapes_for_the_length_of_the_text(line: Callable[[int], str]) -> None:
+    assert_same("\n".join([*map(line, range(4000)), "M2", ""]).encode("latin-1"))

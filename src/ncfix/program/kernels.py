@@ -22,8 +22,8 @@ Tables = tuple[Bytes, Mask, Mask, Mask]
 LIBRARY = Library(__name__, (word_at,))
 
 POINT, ZERO, MINUS, OPEN, CLOSE, TAIL = (ord(character) for character in ".0-();")
-UNTOUCHED = -1
-"""Instead of the number of shapes: there is a block that must be taken as it is."""
+UNTOUCHED, CRAMPED = -1, -2
+"""Instead of the number of shapes: there is a block that must be taken as it is, or more than there is room for."""
 NONE, BROKEN = -1, -2
 FREE, FIXED = 1, 2
 """A number, and one that belongs to the shape."""
@@ -152,14 +152,14 @@ def scan(
     numbers: tuple[Ints, Floats],
     found: tuple[Bytes, Ints, Rows],
 ) -> int:
-    """Scan the n blocks of a text; how many shapes there are, or `UNTOUCHED`.
+    """Scan the n blocks of a text; how many shapes there are, or `UNTOUCHED`, or `CRAMPED`.
 
     tables  of the 256 bytes: their kinds, and fixed, unsigned_after, blank (see `numbers` and `shapes`)
     most    see `numbers.BLANKS` and `numbers.EXACT_DIGITS`
     marks   of a number, of one without a point, of the comment that ends a block
     powers  of ten
 
-    Room for results:
+    Room for results, that of numbers and of the tree for each byte of the text, or for fewer:
 
     columns  which shape each block has, where its last comment begins (-1: it has none), and (n + 1,) its first number
     numbers  spans and values
@@ -172,6 +172,8 @@ def scan(
     for block in range(len(blocks)):
         first[block], end, place, stop = count, starts[known], blocks[block, 0], blocks[block, 1]
         row, row_at_sign, end_at_sign = 0, 0, end
+        if max(count - len(values), size - len(tree)) + stop - place > 0:
+            return CRAMPED
         while place < stop:
             character, past = text[np.uint64(place)], place + 1
             kind = kinds[character]

@@ -183,6 +183,9 @@ def mixed(own: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> N
 SLICE_BYTES = 1 << 19
 """How much of a text of any kind is scanned at once: the columns take about a hundred times as much."""
 
+SPARE, DENSE, VARIED = 1 << 12, 5, 16
+"""What room there is at first: for so many numbers and characters of different shapes, and for one in so many bytes."""
+
 PlainScan = Callable[[bytes, NDArray[np.int64]], Scan]
 
 
@@ -236,21 +239,24 @@ def scan_compiled(
     for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (odd, kernels.ODD)):
         kinds[members] = kind
     kinds[list(comments)] = kernels.COMMENT
-    n, most = len(blocks), len(text) // 2 + 1
+    n = len(blocks)
     group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
-    spans, values = np.empty((most, 2), np.int64), np.empty(most)
     shapes, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)
-    known = kernels.scan(
-        text,
-        np.ascontiguousarray(blocks),
-        (kinds, fixed, UNSIGNED_AFTER, BLANK),
-        (BLANKS, EXACT_DIGITS),
-        (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
-        POWERS,
-        (group, comment, first),
-        (spans, values),
-        (shapes, starts, np.empty((len(text) + 1, 4), np.int32)),
-    )
+    for most, rows in ((SPARE + len(text) // DENSE, SPARE + len(text) // VARIED), (len(text), len(text) + 1)):
+        spans, values = np.empty((most, 2), np.int64), np.empty(most)
+        known = kernels.scan(
+            text,
+            np.ascontiguousarray(blocks),
+            (kinds, fixed, UNSIGNED_AFTER, BLANK),
+            (BLANKS, EXACT_DIGITS),
+            (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
+            POWERS,
+            (group, comment, first),
+            (spans, values),
+            (shapes, starts, np.empty((rows, 4), np.int32)),
+        )
+        if known != kernels.CRAMPED:
+            break
     if known == kernels.UNTOUCHED:
         return None
     edges, count = starts[: known + 1].tolist(), int(first[n])
