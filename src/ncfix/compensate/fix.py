@@ -27,9 +27,9 @@ from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine
 from ncfix.program import stamp
-from ncfix.program.emit import Reading
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves, Trace
+from ncfix.program.second_reading import SecondReading
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
@@ -75,7 +75,7 @@ def fix_program(
 
     followed = with_tool_lengths(program, follow(program), machine, setup)
 
-    def attempt(reading: Reading | None) -> tuple[Settled, bytes]:
+    def attempt(reading: SecondReading | None) -> tuple[Settled, bytes]:
         settled = settle(program, followed.moves, on_machine, options, reading)
         return settled, _written(program, settled, machine, options, followed)
 

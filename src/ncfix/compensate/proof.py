@@ -12,9 +12,9 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import every, picked
 from ncfix.compensate.settle import Settled
 from ncfix.diagnostics import NcfixError
-from ncfix.program.emit import Reading
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.reader import read
+from ncfix.program.second_reading import SecondReading
 from ncfix.program.tree import Program
 
 SAME = 1e-6
@@ -27,6 +27,7 @@ TURN = 1.0
 ATTEMPTS = 16
 """The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
 
+Attempt = Callable[[SecondReading | None], tuple[Settled, bytes]]
 Follow = Callable[[Program], Trace]
 
 
@@ -42,7 +43,7 @@ class Proven:
     settled: Settled
 
 
-def proven(program: Program, attempt: Callable[[Reading | None], tuple[Settled, bytes]], follow: Follow) -> Proven:
+def proven(program: Program, attempt: Attempt, follow: Follow) -> Proven:
     """Write, read what was written, and write again with what the reading taught, until both agree.
 
     attempt  settles and writes, given what a control made of the last attempt
@@ -60,7 +61,7 @@ def proven(program: Program, attempt: Callable[[Reading | None], tuple[Settled, 
         assert wrong is not None, "the numbers of motions have been compared"
         if not wrong.any():
             return Proven(text, settled)
-        reading = Reading.of(again, settled.plan.pieces)
+        reading = SecondReading.of(again, settled.plan.pieces)
     assert wrong is not None
     piece = int(np.argmax(wrong))
     move = int(settled.plan.pieces.move[piece])

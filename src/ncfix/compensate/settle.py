@@ -27,10 +27,11 @@ from ncfix.compensate.rows import picked
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
 from ncfix.program.dialect import Dialect
-from ncfix.program.emit import Emission, Reading, emit
+from ncfix.program.emit import Emission, emit
 from ncfix.program.language import language_of
 from ncfix.program.moves import Kind, Moves, Rule
 from ncfix.program.pinning import LED, PINNED, closure_of_refusals
+from ncfix.program.second_reading import SecondReading
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
@@ -107,7 +108,7 @@ def settle(
     moves: Moves,
     machine: Machine,
     options: FixOptions,
-    reading: Reading | None = None,
+    reading: SecondReading | None = None,
     before: Before | None = None,
     first: Agreed | None = None,
 ) -> Settled:

@@ -18,9 +18,10 @@ from ncfix.program.bulk import Bulk
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.levels import LevelBook
-from ncfix.program.moves import FeedMode, Frame, Kind, Kinematics, Moves, Rule
+from ncfix.program.moves import FeedMode, Kind, Kinematics, Moves, Rule
 from ncfix.program.pieces import Pieces
 from ncfix.program.render import STRAIGHT_AND_ARCS
+from ncfix.program.second_reading import SecondReading
 from ncfix.program.standstill import jumps, passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target, plane_across
 from ncfix.program.tree import Program, view
@@ -60,35 +61,12 @@ class Emission:
         return tuple(self.splices.edits())
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """What a control made of an earlier attempt, one row per motion of the original.
-
-    A program may set its frames where the machine stands (G92, G10 L20): then they move with the corrections.
-
-    frame, frames  (n,) index into `frames`: the frame in which each motion is really read
-    start, end     (n, n_axes) where motions that are kept really start and end; None before any attempt
-    """
-
-    frame: NDArray[np.int32]
-    frames: tuple[Frame, ...]
-    start: FloatArray | None = None
-    end: FloatArray | None = None
-
-    @classmethod
-    def of(cls, moves: Moves, pieces: Pieces) -> Reading:
-        """From the motions that were read where `pieces` were written (same rows)."""
-        last = np.flatnonzero(np.append(pieces.move[1:] != pieces.move[:-1], True))
-        first = np.append(0, last[:-1] + 1)
-        return cls(moves.frame[last], moves.frames, moves.start[first], moves.end[last])
-
-
 def emit(
     program: Program,
     moves: Moves,
     pieces: Pieces,
     least_increment: FloatArray,
-    reading: Reading | None = None,
+    reading: SecondReading | None = None,
     done: FloatArray | None = None,
     kinematics: Kinematics | None = None,
     bulk: Bulk | None = None,
@@ -101,7 +79,7 @@ def emit(
     kinematics       what the machine's own say where tool-centre-point control goes on or off; else an attempt shows it
     bulk             the stretches of motions that all go on from each other, if known; then `done` is where they begin
     """
-    reading = reading or Reading(moves.frame, moves.frames)
+    reading = reading or SecondReading(moves.frame, moves.frames)
     emitter = _Emitter(program, moves, pieces, least_increment, reading, kinematics, bulk)
     return emitter.run(done, 0 if done is None or bulk is not None else 1)
 
@@ -132,7 +110,7 @@ class _Emitter:
         moves: Moves,
         pieces: Pieces,
         least_increment: FloatArray,
-        reading: Reading,
+        reading: SecondReading,
         kinematics: Kinematics | None,
         bulk: Bulk | None,
     ) -> None:

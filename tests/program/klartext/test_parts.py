@@ -69,11 +69,6 @@ def program(seed: int, lines: int, odd: float, *, comma: bool = False) -> bytes:
     return (rng.choice((text, text.replace("\n", "\r\n"))) + "\n").encode()
 
 
-def unnumbered(source: bytes) -> list[str]:
-    """The blocks of a program without their numbers."""
-    return [line.lstrip("0123456789 ") for line in source.decode().splitlines()]
-
-
 @pytest.fixture(scope="module")
 def machine(root: Path) -> Machine:
     return load(root / "benchmarks" / "five_axis.toml")
