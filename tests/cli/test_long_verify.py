@@ -137,6 +137,24 @@ def test_play_is_taken_up_in_any_parts(root: Path, ncfix: Any, monkeypatch: pyte
                 assert found[figure]["rms"] == pytest.approx(whole[figure]["rms"], rel=1e-7)
 
 
+def test_play_that_is_half_taken_up_is_so_in_any_parts(
+    root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """X turns round by less than its play of 1.5 um, and then rests for a long way."""
+    original = tmp_path / "a.ngc"
+    text = ["G1 X30", "X29.9996", *[f"Y{5 + 0.2 * k:.1f}" for k in range(1, 500)]]
+    original.write_text("\n".join(["G21 G90 G94 G17 F900", "G0 X20 Y5 Z5", *text, "M2", ""]))
+    given = ("-m", root / "examples/machines/wCBXFZYSt.toml", "--assume-zero", "--dialect", "linuxcnc", "--json")
+    whole = ncfix("verify", original, original, *given).json()
+    monkeypatch.setattr(Pair, "_as_wholes", never)
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    monkeypatch.setenv("NCFIX_PART_BYTES", "1000")
+    found = ncfix("verify", original, original, *given).json()
+    assert same(found, whole)
+    for figure in ("error_before_um", "error_after_um", "left_out_um"):
+        assert found[figure]["rms"] == pytest.approx(whole[figure]["rms"], rel=1e-7)
+
+
 @pytest.mark.parametrize("part", [1 << 20, 3000])
 def test_a_rapid_in_the_middle_of_a_cut_is_found_however_short_it_is(
     root: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, part: int

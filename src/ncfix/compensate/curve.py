@@ -11,11 +11,14 @@ import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import owners, places, slices
-from ncfix.compensate.rows import finite, picked, some
+from ncfix.compensate.rows import finite, picked
 from ncfix.compensate.simulation import BATCH
 from ncfix.compensate.stretches import Stretches
 
 Tip = Callable[[Index, Array], Array]
+
+ROUNDING = 1e-9
+"""mm: what begins no farther from where the one before ends begins there."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Curve:
         begin[fresh] = points[2 * len(rows) :]
         there, opens = finite(begin) & finite(middle) & finite(end), stretches.opens.copy()
         later = fresh[fresh > 0]
-        opens[later] = some(begin[later] != end[later - 1])
+        opens[later] = distance(begin[later], end[later - 1]) > ROUNDING
         opens[1:] |= ~there[:-1]
         curve = cls(rows, start, stop, begin, middle, end, opens, arc_lengths(begin, middle, end))
         return curve if there.all() else curve.taken(there)
@@ -136,7 +139,7 @@ class Curve:
         both = {name: np.concatenate([getattr(each, name) for each in (self, other)]) for name in COLUMNS}
         curve: Curve = replace(self, **cast(Any, both))
         if len(self) and len(other):
-            curve.opens[len(self)] = (self.end[-1] != other.begin[0]).any()
+            curve.opens[len(self)] = distance(self.end[-1:], other.begin[:1])[0] > ROUNDING
         return curve
 
     def taken(self, which: Mask | slice) -> Curve:

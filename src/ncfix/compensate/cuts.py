@@ -8,10 +8,11 @@ from functools import partial
 
 import numpy as np
 
+from ncfix.compensate.bodies import Bodies
 from ncfix.compensate.crew import Read
 from ncfix.compensate.curve import Curve
 from ncfix.compensate.direction import Signs, matters
-from ncfix.compensate.findings import Index
+from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import actual_tip, unseen
@@ -47,13 +48,14 @@ class Cut:
     unseen: Index
     left: dict[str, Index]
     last: bool
-    sides: Signs | None = None
+    bodies: Bodies | None = None
 
     @classmethod
-    def of(cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool) -> Cut:
+    def of(cls, intent: Intent, lines: Index, rows: slice, last: bool, meant: bool, first: Array | None = None) -> Cut:
         """Of motions, of which some `rows` count and others stand before and behind them; `meant`: with what they mean.
 
         lines  (n,) those of the motions
+        first  (n_axes,) where the bodies of axes are before them, see `Bodies`
         """
 
         def counted(curve: Curve) -> slice:
@@ -69,12 +71,13 @@ class Cut:
             return lines[found[(found >= first) & (found < stop)]]
 
         stretches = Stretches.of(intent)
-        actual = Curve.through(stretches, partial(actual_tip, intent))
+        bodies = Bodies.of(intent, stretches, first) if matters(intent.machine) else None
+        stretches = bodies.divided() if bodies else stretches
+        actual = Curve.through(stretches, bodies.tip if bodies else partial(actual_tip, intent))
         intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
-        flank, sides = Flank.of(intent, actual) or (None, None)
-        flank = flank and flank.taken(counted(actual))
+        flank = Flank.of(bodies, actual).taken(counted(actual)) if bodies else None
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
-        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, sides)
+        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, bodies)
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:
@@ -84,23 +87,24 @@ def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False)
 
 @dataclass(frozen=True, slots=True)
 class Around:
-    """The last motions of a part, where it matters on which side of their play axes are, and from which they turn next.
+    """The last motions of a part, where it matters which way axes go next.
 
     moves      up to twice `BESIDE`; the last `BESIDE` count when the next part is known
     lines      (n,) those in which they are
-    direction  the way in which the axes came to the first of them, far enough to take up their play
+    direction  the way in which the axes came to the first of them
+    sides      (n_axes,) where their bodies are there
     """
 
     moves: Moves
     lines: Index
     direction: Signs
+    sides: Array
 
     @classmethod
-    def behind(cls, intent: Intent, lines: Index, sides: Signs) -> Around:
-        """Those at the end of motions; `sides` (n, n_axes) of the play on which the axes are after each."""
-        start = max(len(lines) - 2 * BESIDE, 0)
-        direction = sides[start - 1] if start else np.asarray(intent.state.direction, dtype=np.int8)
-        return cls(taken(intent.moves, np.arange(start, len(lines))), lines[start:], direction)
+    def behind(cls, bodies: Bodies, lines: Index) -> Around:
+        """Those at the end of motions in lines (n,)."""
+        start, moves = max(len(lines) - 2 * BESIDE, 0), bodies.intent.moves
+        return cls(taken(moves, np.arange(start, len(lines))), lines[start:], bodies.came(start), bodies.before(start))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,10 +132,10 @@ class Cuts:
                 continue
             intent, lines, counted = _with(around, machine, moves, lines)
             rows = slice(counted, None if unit.part.last else -BESIDE)
-            cut = Cut.of(intent, lines, rows, unit.part.last, self.meant)
+            cut = Cut.of(intent, lines, rows, unit.part.last, self.meant, around.sides if around else None)
             yield cut
-            assert cut.sides is not None
-            around = Around.behind(intent, lines, cut.sides)
+            assert cut.bodies is not None
+            around = Around.behind(cut.bodies, lines)
 
 
 def _with(around: Around | None, machine: Machine, moves: Moves, lines: Index) -> tuple[Intent, Index, int]:

@@ -44,7 +44,7 @@ class Track:
     dropped   parabolas before it
     complete  nothing comes behind it
     cut       the length of all that was cut, mm
-    flank     where the tip is besides, with the play of axes, if there is any
+    flank     where the tip may be besides, as axes turn round, if that matters
     """
 
     curve: Curve
@@ -139,11 +139,8 @@ class Match:
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
         before = np.append(found.piece[0] if self.last is None else self.last - other.dropped, found.piece[:-1])
         self.ahead, self.last = search.ahead, int(found.piece[-1]) + other.dropped
-        if flank is None:
-            samples, found = over_holes(search, part, samples, before, found)
-            gap = found.gap
-        else:
-            gap = flank.taken(slice(start, stop)).there(search, samples, found)
+        samples, found = over_holes(search, part, samples, before, found)
+        gap = found.gap if flank is None else flank.taken(slice(start, stop)).there(search, part, samples, found)
         if other.flank is not None:
             gap = other.flank.back(search, samples.points, found)
         self.along.add(part.rows[samples.piece], gap, samples.weight)

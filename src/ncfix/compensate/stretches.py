@@ -46,7 +46,7 @@ class Stretches:
         hole = moves.kind == Kind.CYCLE
         along = np.flatnonzero(known & ~hole & finite(moves.start))
         counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)
-        turning = reversals(intent, along, counts, between)
+        turning = reversals(intent, along, *_with_ends(counts, between))
         if turning[0].size:
             sides = [(turning[0], np.clip(turning[1] + side, 0.0, 1.0)) for side in (-JUMP, JUMP)]
             counts, between = merged(len(along), (owners(counts), between), *sides)
@@ -62,6 +62,28 @@ class Stretches:
         ones = np.ones(len(at_end))
         rows, start = rows[order], np.concatenate([starts, ones])[order]
         return cls(rows, start, np.concatenate([ends, ones])[order], _opening(intent, rows, start))
+
+    def taken(self, which: Index) -> Stretches:
+        """Some of them."""
+        return Stretches(self.rows[which], self.start[which], self.stop[which], self.opens[which])
+
+    def divided(self, which: Index, fraction: Array) -> Stretches:
+        """These, some of them (m,) divided at fractions (m,) of their motions."""
+        inside = np.flatnonzero((fraction > self.start[which]) & (fraction < self.stop[which]))
+        owner = np.concatenate([np.arange(len(self.rows)), which[inside]])
+        start = np.concatenate([self.start, fraction[inside]])
+        order = np.lexsort((start, owner))
+        owner, start = owner[order], start[order]
+        again = np.diff(owner, prepend=-1) == 0
+        stop = self.stop[owner]
+        stop[:-1] = np.where(again[1:], start[1:], stop[:-1])
+        return Stretches(self.rows[owner], start, stop, self.opens[owner] & ~again)
+
+
+def _with_ends(counts: Index, between: Array) -> tuple[Index, Array]:
+    """Fractions inside of motions and those of both ends: counts (k,), and flat."""
+    each = np.arange(len(counts))
+    return merged(len(counts), (owners(counts), between), (each, np.zeros(len(counts))), (each, np.ones(len(counts))))
 
 
 def _evenly(intent: Intent, rows: Index) -> tuple[Index, Array]:

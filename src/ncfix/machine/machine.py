@@ -16,7 +16,7 @@ from ncfix.machine.aim import Aim, aimed, aimed_ahead, taken
 from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
 from ncfix.machine.bow import Bow, bow_of
 from ncfix.machine.effect import Effect
-from ncfix.machine.error_model import ErrorModel, compile_effects
+from ncfix.machine.error_model import ErrorModel, compile_effects, direction_axis
 from ncfix.machine.forward import Chain, build_chain, carry
 from ncfix.machine.gap import gaps
 from ncfix.machine.jacobian import Jacobians
@@ -158,9 +158,15 @@ class Machine:
         return bending.kinks(self.axes, self.effects, self._breakpoints)
 
     @cached_property
+    def directed(self) -> tuple[int, ...]:
+        """The axes (columns) of which it matters to some error in which way they came to their position."""
+        found = {direction_axis(self.axes, effect) for effect in self.effects if effect.active}
+        return tuple(sorted(found - {-1}))
+
+    @property
     def depends_on_direction(self) -> bool:
         """Whether any error depends on the way in which an axis came to its position."""
-        return any(effect.active and effect.basis.needs_direction for effect in self.effects)
+        return bool(self.directed)
 
     @cached_property
     def bow(self) -> Bow | None:
