@@ -85,3 +85,16 @@ def test_a_control_that_nobody_knows_is_remarked_on(shop: Any, ncfix: Any) -> No
     assert result.code == 0
     (remark,) = result.json()["remarks"]
     assert (remark["code"], "siemens" in remark["hint"]) == ("NCF318", True)
+
+
+@pytest.mark.parametrize(("effect", "remarked"), [("EYY", [0.006]), ("EXX", [-0.006])])
+def test_play_with_the_sign_of_too_much_compensation_is_remarked_on(
+    root: Path, ncfix: Any, tmp_path: Path, effect: str, remarked: list[float]
+) -> None:
+    """Y moves the tool towards plus as its number grows, X the workpiece towards minus."""
+    file = tmp_path / "machine.toml"
+    text = (root / "examples/stories/worn_table/machine.toml").read_text()
+    for size in (0.006, -0.006):
+        file.write_text(f'{text}\n[[effect]]\nname = "{effect}"\nbasis = "backlash"\ncoefficients = [{size}]\n')
+        said = [remark["code"] for remark in ncfix("machine", "check", file, "--json").json()["remarks"]]
+        assert said == ["NCF319"] * (size in remarked)

@@ -20,8 +20,8 @@ def seen() -> View:
     return view([simulate(plan(known, "tcp", 40), known, Faults(2.0), 1)], known)
 
 
-def play(lost: float) -> tuple[Effect, ...]:
-    return (Effect("EXX", (lost,), Backlash()),)
+def play(lost: float, name: str = "EXX") -> tuple[Effect, ...]:
+    return (Effect(name, (lost,), Backlash()),)
 
 
 BACKLASH = Candidate("backlash X", "lost motion", "X", "X reversal", (), ())
@@ -38,6 +38,14 @@ def test_too_large_and_negative_play_is_not(seen: View) -> None:
     judged = plausible.judged(seen, BACKLASH, play(-0.5))
     assert judged is not None
     assert len(judged.remarks) == 2
+
+
+@pytest.mark.parametrize(("name", "lost"), [("EXX", 0.006), ("EYY", -0.006), ("ECC", 30e-6), ("EBB", 30e-6)])
+def test_a_body_that_lags_is_plausible_on_either_side_of_the_chain(seen: View, name: str, lost: float) -> None:
+    """X, B and C of this machine move the workpiece towards minus as their numbers grow, Y the tool towards plus."""
+    candidate = Candidate(f"backlash {name[2]}", "lost motion", name[2], f"{name[2]} reversal", (), ())
+    found = [plausible.judged(seen, candidate, play(size, name)) for size in (lost, -lost)]
+    assert [judged is not None and judged.plausible for judged in found] == [True, False]
 
 
 def test_every_row_of_the_catalogue_has_bounds(seen: View) -> None:

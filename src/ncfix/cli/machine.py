@@ -42,12 +42,19 @@ def check(file: str, as_json: bool) -> None:
 
 
 def _remarks(machine: Machine, path: str) -> list[Message]:
-    """What is possible and odd: a control that nobody here knows. Its plugin may be installed elsewhere."""
+    """What is possible and odd: a control that nobody here knows (a plugin may), play with the other sign."""
+    from ncfix.machine.library import runs_ahead
+
+    said = []
     known = {*registry("dialects"), *registry("controls")}
-    if not machine.control or machine.control in known:
-        return []
-    text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
-    return [Message("NCF318", text, Place(path), nearest(machine.control, known))]
+    if machine.control and machine.control not in known:
+        text = f"control: {machine.control!r} has neither a dialect nor tables here, and is passed over"
+        said.append(Message("NCF318", text, Place(path), nearest(machine.control, known)))
+    ahead = {effect.name for axis in machine.axes for effect in machine.effects if runs_ahead(axis, effect)}
+    for name in sorted(ahead):
+        text = f"{name}: the body is ahead of its axis on both ways; lost motion has the other sign here"
+        said.append(Message("NCF319", text, Place(path), "it stays if the control takes out more play than there is"))
+    return said
 
 
 @machine.command()

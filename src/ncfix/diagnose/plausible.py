@@ -14,8 +14,8 @@ import numpy as np
 
 from ncfix.diagnose.catalogue import Candidate
 from ncfix.diagnose.view import View
-from ncfix.machine import Effect
-from ncfix.machine.smooth import Backlash
+from ncfix.machine import Effect, Machine
+from ncfix.machine.library import runs_ahead
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "curve": (100.0, 100.0),
@@ -88,7 +88,7 @@ def judged(view: View, candidate: Candidate, effects: Sequence[Effect]) -> Judge
     errors = np.concatenate([machine.joint_errors(each.q, each.state) for each in view.problem.observations])
     shifts, tilts = 1e3 * np.abs(errors[..., :3]).max(), 1e6 * np.abs(errors[..., 3:]).max()
     largest, bounds = (float(shifts), float(tilts)), BOUNDS.get(kind(candidate))
-    return Judgement(largest, bounds, (*_size(largest, bounds), *_sign(effects)))
+    return Judgement(largest, bounds, (*_size(largest, bounds), *_sign(machine, effects)))
 
 
 def _size(largest: tuple[float, float], bounds: tuple[float, float] | None) -> list[str]:
@@ -98,11 +98,8 @@ def _size(largest: tuple[float, float], bounds: tuple[float, float] | None) -> l
     return [f"{size:.0f} {unit} is more than {bound:g} {unit}" for size, bound, unit in named if 0 < bound < size]
 
 
-def _sign(effects: Sequence[Effect]) -> list[str]:
+def _sign(machine: Machine, effects: Sequence[Effect]) -> list[str]:
     """Play that is negative: the control takes out more than there is."""
-    first = effects[0]
-    if isinstance(first.basis, Backlash) and 0 in first.basis.degree and first.name[1] == first.joint:
-        lost = first.coefficients[first.basis.degree.index(0)]
-        if lost < 0:
-            return ["negative lost motion: the control's own backlash compensation takes out more than there is"]
+    if any(runs_ahead(axis, effects[0]) for axis in machine.axes):
+        return ["negative lost motion: the control's own backlash compensation takes out more than there is"]
     return []

@@ -90,8 +90,17 @@ CODES = {
     "NCF317": Code("another schema of machine files", "The file says that it is of another version.", FORMATS),
     "NCF318": Code(
         "a control that is not known",
-        "`control` is the default of `--dialect` and of `ncfix export`; nothing that is installed has this name.",
+        "`control` is the default of `--dialect`; nothing that is installed has this name.",
         "`ncfix dialects` lists the dialects, `ncfix plugins` what else there is.",
+    ),
+    "NCF319": Code(
+        "play with the sign of too much compensation",
+        "An error is where the body really is, along the base axes: one that lags behind its axis, as lost motion has "
+        "it, is too far towards minus while it moves towards plus. So the coefficient is negative where the body goes "
+        "towards plus as the number grows, and positive of a table axis X', whose body goes towards minus. With the "
+        "other sign the body is ahead, as a control makes it that takes out more play than there is; if that is not "
+        "meant, every correction of this play doubles it.",
+        "Measure one point from both sides: `ncfix calibrate` finds size and sign.",
     ),
     "NCF340": Code(
         "an input of the error model is not given",

@@ -167,6 +167,16 @@ def _carried(machine: Machine) -> Iterator[tuple[Axis, Axis]]:
             yield from ((own, other) for other in outward[index + 1 :])
 
 
+def runs_ahead(axis: Axis, effect: Effect) -> bool:
+    """Whether a body is ahead of its axis on both ways. Lost motion leaves it behind, on either side of the chain."""
+    component = _along(axis)
+    if component is None or effect.name != f"E{component}{axis.name}" or not isinstance(effect.basis, Backlash):
+        return False
+    play = sum(size for size, power in zip(effect.coefficients, effect.basis.degree, strict=True) if power == 0)
+    sense = np.asarray(axis.error_axes)["XYZABC".index(component) % 3] @ np.asarray(axis.direction)
+    return bool(play * sense > 0)
+
+
 def _along(axis: Axis) -> str | None:
     """The component along or about the axis itself; None if it is none of its error axes."""
     shares = np.abs(np.asarray(axis.error_axes) @ np.asarray(axis.direction))
