@@ -22,6 +22,7 @@ from ncfix.program.sinumerik.bypass import bypassed
 from ncfix.program.sinumerik.calling import call_word, ran_elsewhere
 from ncfix.program.sinumerik.course import AtRuntimeError, Course
 from ncfix.program.sinumerik.destination import Words
+from ncfix.program.sinumerik.heading import note_stretch
 from ncfix.program.sinumerik.increments import stand
 from ncfix.program.sinumerik.lettings import BY_THEMSELVES, let_axis_go, note_letting
 from ncfix.program.sinumerik.orientation import leads_along
@@ -136,7 +137,7 @@ class Interpreter:
                 if done:
                     self.stand(done)
                     course.block += done
-                    control.head_on()
+                    note_stretch(control)
                     control.budget.spend(done)
                     continue
             unit, block = course.unit, course.block

@@ -15,7 +15,6 @@ import numpy as np
 
 from ncfix.program.dialect import Dialect
 from ncfix.program.follow import rollover, tcp
-from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
 from ncfix.program.follow.modal import Modal
@@ -23,6 +22,7 @@ from ncfix.program.follow.motion import AT_START, Motion, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule
+from ncfix.program.sinumerik import heading
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
 from ncfix.program.sinumerik.modes import Frames, Modes, Named
@@ -37,16 +37,6 @@ GEOMETRY = (X, Y, Z)
 TURNED = "where the axis {} stands in the turned coordinates is not known"
 RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
 
-
-def departing(arc: Arc, end: Vector, step: Vector) -> Vector:
-    """The direction in which an arc or helix that makes `step` ends, in commands; of any length."""
-    nx, ny, nz = arc.normal
-    x, y, z = (end[i] - arc.centre[i] for i in range(3))
-    rise = nx * step[0] + ny * step[1] + nz * step[2]
-    round_ = ny * z - nz * y, nz * x - nx * z, nx * y - ny * x
-    return [arc.sweep * part + rise * across for part, across in zip(round_, arc.normal, strict=True)]
-
-
 RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
 """Machine data: which of `DIAMETERS` is in force at the start."""
 
@@ -56,20 +46,21 @@ DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
 class Sinumerik(Control):
     """Everything that the steps of a block read and change.
 
-    lost  letter index -> why that coordinate of the program's frame is not known
-    over  rotary axes that the last motion took past a full turn
-    edge  cutting edge in force (D), 0 for none
-    at_start  the tool is still that with which the program began, with its edge D1
-    whole  the motion must not be split
-    cornered  the last motion ended at a corner that the control rounds or breaks
-    pattern  the places to which the last pattern of holes has led
-    solitary  blocks after which no line may be put, since REPEAT would leave it out
+    lost        letter index -> why that coordinate of the program's frame is not known
+    over        rotary axes that the last motion took past a full turn
+    edge        cutting edge in force (D), 0 for none
+    at_start    the tool is still that with which the program began, with its edge D1
+    whole       the motion must not be split
+    cornered    the last motion ended at a corner that the control rounds or breaks
+    pattern     the places to which the last pattern of holes has led
+    solitary    blocks after which no line may be put, since REPEAT would leave it out
     fresh_tool  a tool has been called since the last motion
     changed_by_cycle  a name that is not known has followed a call of a tool at once, or a number (L6) one at any time:
-                      it may be what changes it
-    counted  for each letter what its numbers counted from as the axis was last brought somewhere; `footing` is now's
-    stated   the motion code is what the program has said itself, not what something that is not followed may have left
-    heading  in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
+                it may be what changes the tool
+    counted     for each letter what its numbers counted from when the axis was last brought somewhere
+    footing     the same of the frames that are in force now
+    stated      the motion code is what the program itself has said, not what something that is not followed may leave
+    heading     in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
     """
 
     def __init__(self, run: Run, dialect: Dialect) -> None:
@@ -266,7 +257,7 @@ class Sinumerik(Control):
         follows = not leg.passing and not refusal
         if follows:
             self.ask_for_length()
-        self._note_heading(leg, follows=follows)
+        heading.note(self, leg, follows=follows)
         self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, settles))
         self.whole = False
         stand(self, axes, by_machine=leg.by_machine)
@@ -289,35 +280,6 @@ class Sinumerik(Control):
         """The axes whose words count from where they stand."""
         forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
         return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
-
-    def _note_heading(self, leg: Leg, *, follows: bool) -> None:
-        """Keep the direction in which a motion ends: CT goes on in it."""
-        end, arc = leg.end, leg.arc
-        if leg.kind == Kind.DWELL:
-            return
-        gone = {index for index in GEOMETRY if index in self.unknown or index in end.unknown}
-        step = [b - a for a, b in zip(self.position, end.target, strict=True)]
-        if gone or not follows:
-            self.heading = None
-        elif arc is not None:
-            self.heading = self.in_frame(departing(arc, end.target, step))[:3]
-        elif any(step[:3]):
-            self.heading = self.in_frame(step)[:3]
-        elif any(step):
-            self.heading = None
-
-    def head_on(self) -> None:
-        """Keep the direction in which the last of many motions of the fast lane ended, as `go` does of single ones."""
-        stretch = self.builder.latest
-        if stretch is None:
-            return
-        steps, (turned, arc) = stretch.end - stretch.start, self.builder.latest_arc() or (-1, None)
-        rows = range(len(steps) - 1, -1, -1)
-        last = next((row for row in rows if row == turned or steps[row].any()), -1)
-        if arc is not None and last == turned:
-            self.heading = departing(arc, stretch.end[last].tolist(), steps[last].tolist())[:3]
-        elif last >= 0:
-            self.heading = steps[last, :3].tolist() if steps[last, :3].any() else None
 
     def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
         index = super()._style(kind, rule, reason, code)
