@@ -68,3 +68,62 @@ def _arc(rng: np.random.Generator, place: dict[str, float], plane: str, sinumeri
     if rng.random() < 0.1:
         words.append("F800.")
     return _joined(rng, [code, *words])
+
+
+def full_of_klartext_arcs(seed: int, blocks: int, *, comma: bool = False) -> list[str]:
+    """Lines and arcs of Klartext: CR, C about poles that serve once or several times, CP with and without a height.
+
+    Between them stand remarks, arcs of other kinds, and words that count from where the tool stands.
+    """
+    rng = np.random.default_rng(seed)
+    place, pole, lines = dict.fromkeys("XYZ", 0.0), None, list[str]()
+    while len(lines) < blocks:
+        kind = rng.choice(["L", "CR", "C", "CP", "odd"], p=[0.35, 0.25, 0.25, 0.1, 0.05])
+        if kind in ("C", "CP") and (pole is None or rng.random() < 0.7):
+            angle, size = rng.uniform(0, 2 * math.pi), rng.uniform(1, 9)
+            pole = round(place["X"] + size * math.cos(angle), 4), round(place["Y"] + size * math.sin(angle), 4)
+            lines.append(f"CC X{pole[0]:+.4f} Y{pole[1]:+.4f}" + str(rng.choice(["", " ; 2.5"])))
+            lines += [str(rng.choice(["; remark 3.5", "* - part", "L M8"]))] * (rng.random() < 0.1)
+        if kind == "odd":
+            lines.append(str(rng.choice(["CT X+1 Y+2", "L IX+1", "; remark", "RND R0.1", "L M9"])))
+            place["X"], pole = 1.0, None
+            lines.append("L X+1 Y+2")
+            place["Y"] = 2.0
+            continue
+        lines.append(_klartext_arc(rng, place, kind, pole) if kind != "L" else _klartext_line(rng, place))
+    numbered = [f"{number} {line}" if seed % 2 else line for number, line in enumerate(lines)]
+    return [line.replace(".", ",") if comma else line for line in numbered]
+
+
+def _klartext_line(rng: np.random.Generator, place: dict[str, float]) -> str:
+    named = [letter for letter in "XYZ" if rng.random() < 0.8] or ["X"]
+    for letter in named:
+        place[letter] = round(place[letter] + float(rng.normal()), 4)
+    return " ".join(
+        ["L", *(f"{each}{place[each]:+.4f}" for each in named), str(rng.choice(["", "F800", "M8"]))]
+    ).rstrip()
+
+
+def _klartext_arc(
+    rng: np.random.Generator, place: dict[str, float], kind: str, pole: tuple[float, float] | None
+) -> str:
+    """An arc from `place` on, which it is taken to."""
+    turn, size = float(rng.choice([rng.uniform(0.1, 6.0), math.pi, math.pi / 2])), float(rng.uniform(1, 9))
+    begin, sense = float(rng.uniform(0, 2 * math.pi)), int(rng.choice([-1, 1]))
+    x, y = place["X"], place["Y"]
+    centre = (x - size * math.cos(begin), y - size * math.sin(begin)) if kind == "CR" or pole is None else pole
+    begin, size = math.atan2(y - centre[1], x - centre[0]), math.hypot(x - centre[0], y - centre[1])
+    angle = round(math.degrees(turn), 4) * sense
+    end = begin + math.radians(angle)
+    place["X"], place["Y"] = (centre[0] + size * math.cos(end), centre[1] + size * math.sin(end))
+    rises = rng.random() < (0.5 if kind == "CP" else 0.15)
+    place["Z"] = round(place["Z"] + 0.25 * rises, 4)
+    words = [f"Z{place['Z']:+.4f}"] * rises
+    if kind == "CP":
+        words = [f"IPA{angle:+.4f}", *words]
+    else:
+        place["X"], place["Y"] = round(place["X"], 4), round(place["Y"], 4)
+        words = [f"X{place['X']:+.4f}", f"Y{place['Y']:+.4f}", *words]
+    if kind == "CR":
+        words.append(f"R{size if turn <= math.pi else -size:+.{int(rng.integers(4, 7))}f}")
+    return " ".join([kind, *words, "DR+" if sense > 0 else "DR-", str(rng.choice(["", "F500", "R0", "M9"]))]).rstrip()

@@ -12,11 +12,13 @@ import pytest
 
 from ncfix import fast
 from ncfix.diagnostics import NcfixError
+from ncfix.program.follow.builder import Circles
 from ncfix.program.klartext import lane
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.units import Unit
 from ncfix.program.moves import Moves
 from ncfix.program.setup import Setup
+from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, follow
 
 ALWAYS, NEVER, COMPILED = 1, 10**9, -1
@@ -146,13 +148,27 @@ def test_nothing_is_known_at_the_start() -> None:
         assert_same(body(seed, 0.1), Setup())
 
 
+@pytest.mark.parametrize("odd", [0.0, 0.1])
+def test_arcs_of_both_ways_are_the_same(odd: float) -> None:
+    for seed in range(MANY):
+        random, blocks = Random(seed), full_of_klartext_arcs(seed, 40)
+        blocks = [random.choice(OTHERS) if random.random() < odd else block for block in blocks]
+        begin = "TOOL CALL 1 Z S1000\nL X+0 Y+0 Z+0 B+0 C+0 R0 F1000"
+        setup = KNOWN if seed % 3 else replace(KNOWN, tcp=True)
+        assert_same("\n".join([begin, *blocks]), setup, "INCH" if seed % 5 == 0 else "MM")
+
+
 def test_stretches_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     taken, take = [], lane.take
 
-    def noting(control: Control, stage: lane.Stage, unit: Unit, block: int) -> None:
+    def noting(control: Control, stage: lane.Stage, unit: Unit, block: int, circles: Circles) -> None:
         taken.append(len(stage.feed))
-        take(control, stage, unit, block)
+        take(control, stage, unit, block, circles)
 
     monkeypatch.setattr(lane, "take", noting)
     columns(body(1, 0.0), ALWAYS, KNOWN, "MM")
     assert sum(taken) >= 35
+    taken.clear()
+    blocks = full_of_klartext_arcs(1, 60)
+    columns("\n".join(["TOOL CALL 1 Z S1000", "L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *blocks]), ALWAYS, KNOWN, "MM")
+    assert sum(taken) >= 0.8 * len(blocks)

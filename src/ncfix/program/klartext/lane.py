@@ -1,4 +1,4 @@
-"""The fast lane of Klartext: stretches of straight motions with plain numbers, taken all at once.
+"""The fast lane of Klartext: stretches of straight motions, arcs and poles with plain numbers, taken all at once.
 
 It does what the interpreter would do block by block, with the same operations in the same order, so that the results
 are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
@@ -13,10 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix import fast
+from ncfix.program.follow.arcs import CLOCKWISE, COUNTER
+from ncfix.program.follow.builder import Arc, Circles
 from ncfix.program.follow.contour import plane_of, resting_of_many
 from ncfix.program.follow.lane import SHORTEST, before_placing
 from ncfix.program.follow.stage import LONGEST, filled, followed, followed_compiled
 from ncfix.program.follow.stretch import Stretch
+from ncfix.program.klartext.arc_lane import keep_pole, turned
+from ncfix.program.klartext.arcs import direction_at_end
 from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.lane_tables import FEED, RAPID
 from ncfix.program.klartext.layout import CORNERS
@@ -26,6 +30,9 @@ from ncfix.program.moves import FeedMode, Kind
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+KINDS = {RAPID: Kind.RAPID, FEED: Kind.FEED, CLOCKWISE: Kind.ARC, COUNTER: Kind.ARC}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +41,7 @@ class Stage:
 
     path    (n + 1, 9) the command before the first block, and at the end of each
     feed    (n,) feed in force, mm/min
-    motion  (n,) `RAPID` or `FEED`
+    motion  (n,) `RAPID`, `FEED`, or the code of an arc
     side    (n,) radius compensation in force
     mask    (n,) axis words, as bits; 0: the block moves nothing
     """
@@ -67,10 +74,11 @@ def run_lane(control: Control, unit: Unit, block: int) -> tuple[int, int]:
     if stop - block < SHORTEST:
         return 0, min(stop, end) + 1
     stage = stage_of(control, unit, block, stop)
-    count = min(count_on_one_turn(control, stage), count_beside(control, stage))
+    stage = stage.head(min(count_on_one_turn(control, stage), count_beside(control, stage)))
+    circles, count = turned(control, unit, block, stage.path, stage.motion)
     if count < SHORTEST:
         return 0, block + count + 1
-    take(control, stage.head(count), unit, block)
+    take(control, stage.head(count), unit, block, circles)
     return count, block + count
 
 
@@ -79,7 +87,8 @@ def before_corner(unit: Unit, block: int, stop: int) -> int:
     following = unit.next_plan(stop)
     if following is None or following.name not in CORNERS:
         return stop
-    busy = np.flatnonzero(~unit.lanes.empty[unit.program.template[block:stop]])
+    shapes = unit.program.template[block:stop]
+    busy = np.flatnonzero(~unit.lanes.empty[shapes] & (unit.lanes.pole[shapes, 0] < 0))
     return block + int(busy[-1]) if len(busy) else stop
 
 
@@ -116,14 +125,18 @@ def count_on_one_turn(control: Control, stage: Stage) -> int:
 
 
 def count_beside(control: Control, stage: Stage) -> int:
-    """How many blocks run before one that ends radius compensation (R0): from there on it matters what is named."""
+    """How many blocks run before one that ends radius compensation (R0), or an arc with it.
+
+    From there on it matters what is named.
+    """
     before = np.append(control.modal.compensated, stage.side[:-1])
-    ends = (before != 0) & (stage.side == 0)
+    ends = (before != 0) & ((stage.side == 0) | (stage.motion > FEED))
     return int(np.argmax(ends)) if ends.any() else len(ends)
 
 
-def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
-    """Add the motions of a stretch, and leave the control as they leave it."""
+def take(control: Control, stage: Stage, unit: Unit, block: int, circles: Circles) -> None:
+    """Add the motions of a stretch, `circles` those of its arcs, and leave the control as they leave it."""
+    shapes = unit.program.template[block : block + len(stage.feed)]
     control.suspended.pop("M130", None)
     control.external, control.tilted = unit.name, False
     last = block + len(stage.feed) - 1
@@ -132,38 +145,47 @@ def take(control: Control, stage: Stage, unit: Unit, block: int) -> None:
     if len(moving):
         blocks = np.full(len(moving), control.row_block) if unit.name else block + moving
         mask, starts, ends = stage.mask[moving], stage.path[:-1][moving], stage.path[1:][moving]
-        styles = styles_of(control, stage.motion[moving], stage.side[moving])
+        styles = styles_of(control, stage.motion[moving], stage.side[moving], (unit.lanes.arc == "cp")[shapes[moving]])
         control.places.begun = True
         sided = stage.side[moving] != 0
         if sided.any():
             control.builder.many_rest(np.where(sided, resting_of_many(control, mask, starts, ends), 0))
         plane = plane_of(control)
         adrift = control.places.adrift | np.where(sided & (mask & plane == 0), plane, 0)
+        control.builder.circles(circles._replace(row=np.searchsorted(moving, circles.row)))
         control.builder.extend(Stretch(blocks, mask, styles, stage.feed[moving], starts, ends, adrift))
         control.position = ends[-1].tolist()
-        keep_tangent(control, stage.path)
+        keep_tangent(control, stage.path, circles)
+    keep_pole(control, unit, block, shapes)
     control.modal.feed = float(stage.feed[-1])
     control.modal.compensated = int(stage.side[-1])
 
 
-def styles_of(control: Control, motion: IntArray, side: IntArray) -> IntArray:
-    """The styles of motions whose start and end are known."""
+def styles_of(control: Control, motion: IntArray, side: IntArray, relative: Mask) -> IntArray:
+    """The styles of motions whose start and end are known; `relative`: they count from where they start."""
     styles = np.empty(len(motion), dtype=np.int64)
-    for sided in np.unique(side).tolist():
-        control.modal.compensated = sided
-        for code, kind in ((RAPID, Kind.RAPID), (FEED, Kind.FEED)):
-            rows = (motion == code) & (side == sided)
-            if rows.any():
-                styles[rows] = control.style_of(kind, code)
+    keys = (side << 6 | motion) << 1 | relative
+    for key in np.flatnonzero(np.bincount(keys)).tolist():
+        code = key >> 1 & 63
+        control.modal.compensated, control.modal.incremental = key >> 7, bool(key & 1)
+        styles[keys == key] = control.style_of(KINDS[code], code)
+    control.modal.incremental = False
     return styles
 
 
-def keep_tangent(control: Control, path: FloatArray) -> None:
+def keep_tangent(control: Control, path: FloatArray, circles: Circles) -> None:
     """Note in which direction the last motion went that had a way."""
     ways = np.diff(path[:, :3], axis=0)
+    arc = int(circles.row[-1]) if len(circles.row) else -1
     for row in np.flatnonzero(np.abs(ways).max(axis=1) > FLAT / 2)[::-1].tolist():
+        if row <= arc:
+            break
         x, y, z = ways[row].tolist()
         length = math.hypot(x, y, z)
         if length > FLAT:
             control.path.tangent = (x / length, y / length, z / length)
             return
+    if arc >= 0:
+        x, y, z = circles.centre[-1].tolist()
+        last = Arc((x, y, z), circles.normal, float(circles.sweep[-1]))
+        control.path.tangent = direction_at_end(path[arc + 1].tolist(), last)
