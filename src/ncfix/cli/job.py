@@ -14,7 +14,7 @@ from ncfix.batch.journal import Find, Noted, digest_of, text_digest
 from ncfix.cli import console
 from ncfix.cli.faults import owned
 from ncfix.cli.options import dialect_of, subprograms
-from ncfix.cli.parts import Fixed, Outlet, Source, compiled_from, outlet_for, part_bytes, source_of
+from ncfix.cli.parts import Fixed, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
 from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place
 
@@ -110,7 +110,7 @@ class Job:
         from ncfix.compensate.stream import Stream
         from ncfix.compensate.task import Task
 
-        if source.size is None or source.size >= compiled_from():
+        if source.size is None or source.size >= part_bytes():
             fast.engage(console.forewarn)
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:

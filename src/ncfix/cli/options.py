@@ -12,7 +12,7 @@ import click
 
 from ncfix import fast
 from ncfix.cli import console
-from ncfix.cli.parts import compiled_from
+from ncfix.cli.parts import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None,
     from ncfix.program.reader import read as read_source
 
     source = read(path) if text is None else text
-    if len(source) >= compiled_from():
+    if len(source) >= part_bytes():
         fast.engage(console.forewarn)
     return read_source(source, shown(path), dialect_of(source, shown(path), dialect, machine))
 

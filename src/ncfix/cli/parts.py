@@ -20,30 +20,18 @@ if TYPE_CHECKING:
     from ncfix.compensate.crew import Ground
     from ncfix.compensate.stream import Stamp
 
-LONG = 2
-"""Parts from which on a program is long; a shorter one is read as a whole."""
-COMPILED = 2
-"""Parts from which on compiled kernels save more time than it takes to load them."""
-
 
 def part_bytes() -> int:
-    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it."""
+    """Bytes of a part: `NCFIX_PART_BYTES` if that is set; the output does not depend on it.
+
+    A program of so many is long: a shorter one is read as a whole, and to load compiled kernels for it does not pay.
+    """
     from ncfix.compensate.task import PART_BYTES
 
     said = os.environ.get("NCFIX_PART_BYTES") or str(PART_BYTES)
     if not said.isdecimal() or int(said) < 1:
         raise UsageError.of("NCF001", f"NCFIX_PART_BYTES is {said!r}, and not a number of bytes", hint="unset it")
     return int(said)
-
-
-def long_from() -> int:
-    """Bytes from which on a program is long."""
-    return LONG * part_bytes()
-
-
-def compiled_from() -> int:
-    """Bytes from which on compiled kernels pay: loading them takes a tenth of a second."""
-    return COMPILED * part_bytes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +98,7 @@ class Source:
         """
         from ncfix.program.content import PROBE_BYTES
 
-        many = long_from()
+        many = part_bytes()
         self.head = self._read(many if named else max(many, PROBE_BYTES))
         return len(self.head) >= many
 

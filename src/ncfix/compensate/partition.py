@@ -142,7 +142,7 @@ class Parts:
     @property
     def _wanted(self) -> int:
         """How much text the next part shall be: under TCP, which takes more memory, and at first, it is less."""
-        return self.size // 4 if self.led else self.size
+        return self.size // 8 if self.led else self.size
 
     def _texts(self) -> Iterator[tuple[Program, bool, Passage | None]]:
         """The text in parts that end between two blocks of plain words; True with the last one.
@@ -151,7 +151,7 @@ class Parts:
         """
         wanted = self._wanted
         while True:
-            new = self.read(max(wanted - len(self.rest), self.size // 4))
+            new = self.read(max(wanted - len(self.rest), self.size // 8))
             text = self.rest + new
             if not new:
                 self.rest = b""

@@ -13,7 +13,7 @@ from ncfix.program.language import Run, language_of
 from ncfix.program.parts import Follower, NotInPartsError
 from ncfix.program.setup import Setup
 
-PART_BYTES = 3 << 19
+PART_BYTES = 3 << 20
 """How much text is a part: the columns of a part take about thirty times as much memory."""
 
 

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix import fast
 from ncfix.diagnostics import Place, SourceError
 from ncfix.program import dialects
 from ncfix.program.build import Parsed
@@ -29,11 +28,8 @@ from ncfix.program.templates import parse_block, shapes_of, texts_of
 from ncfix.program.tree import END, START, Anchor, Opaque, Program, Span, Template
 from ncfix.program.writer import line_end
 
-PART_BYTES = 1 << 21
-"""How much text is scanned at once."""
-
-COMPILED_PART_BYTES = 1 << 22
-"""The same, compiled: the columns take no more than the result."""
+PART_BYTES = 1 << 22
+"""How much text is scanned at once: more than a part of a long program."""
 
 WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
 
@@ -139,9 +135,8 @@ class Reading:
     def parts(self) -> Iterator[tuple[int, int]]:
         """First block and the one after the last of each part; a very long line is a part of its own."""
         first, end = 0, min(self.tape_end + 1, len(self.blocks))
-        size = COMPILED_PART_BYTES if fast.engaged() else PART_BYTES
         while first < end:
-            limit = self.blocks[first, 0] + size
+            limit = self.blocks[first, 0] + PART_BYTES
             stop = max(int(np.searchsorted(self.blocks[:end, 1], limit, side="right")), first + 1)
             yield first, stop
             first = stop
