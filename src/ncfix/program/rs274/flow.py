@@ -8,9 +8,8 @@ Source: LinuxCNC documentation, "O codes"; what it leaves open was tried out on 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from ncfix.program.follow.faults import Fault
 from ncfix.program.rs274.arithmetic import whole
@@ -50,51 +49,14 @@ class Call:
     remaining: int = 0
 
 
-class Course(Protocol):
-    """Where execution stands: what the walk through a program asks of any flow control.
-
-    unit, block    what is executed next
-    skipping       the label that execution waits for; None while it does not skip
-    skipping_from  where that began
-    calls          calls that have not returned
-    """
-
-    unit: Unit
-    block: int
-    skipping: str | None
-    skipping_from: tuple[Unit, int]
-
-    @property
-    def calls(self) -> Sequence[object]:
-        """Calls that have not returned."""
-
-    def under_way(self) -> tuple[object, ...]:
-        """The calls that have not returned, and how often each is still to be made."""
-
-    def next_flow(self) -> bool:
-        """While skipping: go to the next flow-control line of this text; False if there is none."""
-
-    def follow(self, flow: FlowLine) -> None:
-        """Do what a flow-control line says; `block` is already that of the next line."""
-
-    def unfinished(self) -> Fault | None:
-        """What is wrong if the text ends here."""
-
-    def missing_end(self) -> Fault:
-        """The fault of a text that ends while something is still looked for."""
-
-    def call_by_code(self, label: str, times: int) -> None:
-        """M98."""
-
-    def finish(self) -> None:
-        """Return from a subprogram, or run it again if M98 asked for it several times."""
-
-
 class FlowControl:
-    """Where execution stands, and where o-words take it.
+    """Where execution stands, and where o-words take it: a `Course`.
 
-    unit, block    what is executed next
-    skipping       the label that execution waits for; None while it does not skip
+    skipping_to_sub  what is waited for is the begin of a subprogram that has been called
+    defining         the subprogram that is being defined and passed over; None outside of one
+    executed_if      a branch of the `if` that was met last has been executed
+    breaking         a `break` has been executed, and the end of its loop is waited for
+    continuing       the same of a `continue`
     """
 
     def __init__(self, control: Control, main: Unit, find: Callable[[str], Unit | None]) -> None:

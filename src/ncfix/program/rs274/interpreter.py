@@ -19,7 +19,8 @@ from ncfix.program.rs274 import predefined, systems
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.choice import motion_of
 from ncfix.program.rs274.control import RUNTIME_BRANCH, Block, Control
-from ncfix.program.rs274.flow import Course, FlowControl
+from ncfix.program.rs274.course import Course
+from ncfix.program.rs274.flow import FlowControl
 from ncfix.program.rs274.motion import BAD_MOTION, in_machine_coordinates
 from ncfix.program.rs274.order import MACHINE, MOTIONS
 from ncfix.program.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
