@@ -99,6 +99,7 @@ FRAMES = [
     case("polar in diameters", "DIAMON\nG111 X5 Y5\nG1 AP=30 RP=10 F100\nX9 Y9", L5=N, L6=R),
     case("TRAORI", "TRAORI\nG1 X5 Y6 Z7 F100\nTRAFOOF\nG0 X1 Y1 Z50", L4=R, L6=R),
     case("turning, X not said", "G96 S100 M4\nG1 X6 F0.1\nDIAMOF\nX7\nG961\nX8", L4=N, L6=R, L8=R),
+    case("turning at any feed, X not said", "F100\nG962 S100 M4\nG1 X6\nDIAMOF\nX7", L5=N, L7=R),
     case("diameters by axis", "DIAMONA[X]\nG1 X5 F100", L4=N),
     case("a tool carrier", "TCARR=1\nG1 X5 F100", L4=N),
     case("a program from elsewhere", 'EXTCALL("PART")\nG1 X5 F100', L4=N),

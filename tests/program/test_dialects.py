@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import shutil
+import time
 from pathlib import Path
 
 import pytest
 
 from ncfix.program import dialects
+from ncfix.program.content import check_content
 from ncfix.program.dialect import Dialect
 from ncfix.program.grammar import find_grammar, parser
 from ncfix.program.reader import read
@@ -62,6 +64,13 @@ def test_what_a_family_has_is_read_as_the_control_of_the_machine_has_it(
 )
 def test_what_milling_machines_do_is_no_sign_of_a_lathe(text: str, dialect: str) -> None:
     assert read(f"{text}\n".encode(), dialect=dialect).dialect.name == dialect
+
+
+def test_a_long_line_of_cycles_is_searched_for_signs_of_a_lathe_in_no_time() -> None:
+    """Not for every cycle to the end of the line: that takes ten seconds and more."""
+    begun = time.process_time()
+    check_content(b"G73 P1 Q2 " * 6000, "part.nc", dialects.get("fanuc"))
+    assert time.process_time() - begun < 3.0
 
 
 def test_a_plugin_may_bring_a_grammar_of_its_own(tmp_path: Path) -> None:

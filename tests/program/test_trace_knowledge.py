@@ -113,6 +113,14 @@ def test_axes_that_the_machine_lacks_are_named_once() -> None:
     ]
 
 
+@pytest.mark.parametrize(("dialect", "also"), [("iso", " If U V W are increments"), ("linuxcnc", "")])
+def test_u_v_w_may_be_increments_to_controls_of_lathes(dialect: str, also: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        follow("G0 X1 U2", dialect=dialect)
+    assert caught.value.messages[0].hint.startswith("is it the right machine file?" + also)
+    assert bool(also) == ("increments" in caught.value.messages[0].hint)
+
+
 # -- assume_zero ------------------------------------------------------------------------------------------------------
 
 

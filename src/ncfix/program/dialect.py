@@ -23,7 +23,7 @@ With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets.
 LATHE = "lathe code (X a diameter, U and W increments)"
 TURNING: tuple[tuple[str, bytes], ...] = (
     (LATHE, rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?(G[ \t]*50[ \t]*S[ \t]*\d)"),
-    (LATHE, rb"(?im)^[^(;\n]*(?<![A-Z])(G[ \t]*7(?:[0-2]|3(?=[^(;\n]*[UW]))[ \t]*P[ \t]*\d+[ \t]*Q[ \t]*\d)"),
+    (LATHE, rb"(?im)^[^(;\n]*(?<![A-Z])(G[ \t]*7(?:[0-2]|3(?=[^(;\n]{0,80}[UW]))[ \t]*P[ \t]*\d+[ \t]*Q[ \t]*\d)"),
     (
         LATHE,
         rb"(?im)\A(?!(?s:.*)^[^(;\n]*(?<![A-Z])Y[ \t]*[-+.\d#\[])(?s:.*?)^[^(;\n]*(?<![A-Z])(G[ \t]*96(?![\d.]))",

@@ -42,7 +42,7 @@ POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
 SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
-INCREMENTS = ". If U V W are increments of X Y Z, as on lathes: these are not followed"
+INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
 
 def may_increment(control: Control, letter: str) -> bool:

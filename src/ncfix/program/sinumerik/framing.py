@@ -180,12 +180,13 @@ def mind_carried(control: Sinumerik) -> None:
 
 
 def feed_mode(control: Sinumerik, code: int) -> None:
-    """G93, G94, G95, and G96, G961, G97, G971, which go with feeds per turn or minute."""
-    mode = {960: 95, 970: 95, 961: 94, 9610: 94, 9710: 94}.get(code, code // 10)
-    if mode != control.modal.feed_mode:
+    """G93, G94, G95, and G96, G961, G97, G971, which go with feeds per turn or minute; G962 goes with either."""
+    now = control.modal.feed_mode
+    mode = {960: 95, 970: 95, 9610: 94, 9620: now, 9710: 94}.get(code, code // 10)
+    if mode != now:
         control.modal.feed, control.modal.feed_given = float("nan"), False
     control.modal.feed_mode = mode
-    if code in (960, 9610) and not control.modes.said:
+    if code in (960, 9610, 9620) and not control.modes.said:
         control.suspended["diameter"] = UNSAID
 
 

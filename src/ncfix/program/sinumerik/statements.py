@@ -45,7 +45,7 @@ SWITCHED_ON = (
 AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
 _PASSED = """
     G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
-    G962 G972 G973 G290 G471 G472
+    G972 G973 G290 G471 G472
 """
 PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
 """G codes that change nothing of where axes go."""
@@ -54,7 +54,7 @@ Handler = Callable[[Sinumerik, int], None]
 SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((170, 180, 190), framing.plane),
     **dict.fromkeys((700, 710, 7000, 7100), framing.units),
-    **dict.fromkeys((930, 940, 950, 960, 9610, 970, 9710), framing.feed_mode),
+    **dict.fromkeys((930, 940, 950, 960, 9610, 9620, 970, 9710), framing.feed_mode),
     **dict.fromkeys((400, 410, 420), framing.compensation),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
