@@ -13,7 +13,7 @@ from ncfix.compensate.assembly import untouched
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
-from ncfix.compensate.verify import path_error
+from ncfix.compensate.verify import FigureTally, Samples, path_error
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Polynomial
 from ncfix.program.moves import Kind, Rule
@@ -174,3 +174,12 @@ def test_a_cut_that_begins_where_a_rapid_has_left_axes(root: Path, first: str, l
     assert report.error_after_um["max"] == pytest.approx(left_um, abs=0.01)
     assert report.error_after_um["where"] == 3
     assert {"NCF416", "NCF439"} <= {message.code for message in report.warnings}
+
+
+def test_of_equal_errors_the_first_on_the_path_is_named() -> None:
+    """In whatever order they come: of a part of plain motions those at ends come before those along the way."""
+    tally, one = FigureTally(), np.ones(1)
+    for move in (3, 2, 4):
+        tally.add(Samples(np.array([move]), one, one, one, one, 0.0, 0.0))
+    found = tally.result()
+    assert (found.before.move, found.after.move) == (2, 2)

@@ -251,6 +251,12 @@ def _kept_motions(written: Written) -> Mask:
     return kept
 
 
+def _early(at: tuple[float, int, float]) -> tuple[float, int, float]:
+    """Orders errors (mm) in motions and at fractions of these: of equal ones the first on the path is the largest."""
+    error, move, fraction = at
+    return error, -move, -fraction
+
+
 class FigureTally:
     """Figures gathered batch by batch."""
 
@@ -270,14 +276,15 @@ class FigureTally:
             self.squares[side] += float((part.weight * known**2).sum())
             self.tilts[side] = max(self.tilts[side], (part.tilt_before, part.tilt_after)[side])
             best = int(known.argmax())
-            self.at[side] = max(self.at[side], (float(known[best]), int(part.move[best]), float(part.fraction[best])))
+            there = float(known[best]), int(part.move[best]), float(part.fraction[best])
+            self.at[side] = max(self.at[side], there, key=_early)
 
     def take(self, way: float, samples: int, squares: list[float], most: list[tuple[float, int, float]]) -> None:
         """Take in what was added up elsewhere; of both sides way times squares and the most: mm, motion, fraction."""
         self.way += way
         self.samples += samples
         self.squares = [own + more for own, more in zip(self.squares, squares, strict=True)]
-        self.at = [max(own, other) for own, other in zip(self.at, most, strict=True)]
+        self.at = [max(own, other, key=_early) for own, other in zip(self.at, most, strict=True)]
 
     def result(self) -> PathError:
         """The figures of all batches."""
