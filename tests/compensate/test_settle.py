@@ -12,7 +12,7 @@ from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
 from ncfix.machine import Machine, load
 from ncfix.program.moves import Kind
-from ncfix.program.pinning import LED
+from ncfix.program.pinning import LED, PINNED
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup
 
@@ -49,3 +49,13 @@ def test_but_never_beyond_the_travel(machine: Machine, side: int) -> None:
     assert refused[3] == f"{LED} (line 5)"
     assert 5 in refused
     assert ends[:, 0].tolist()[1:] == [side * x for x in (-290.0, -60.0, 170.0, 400.0)]
+
+
+def test_what_leads_to_an_arc_that_cannot_be_written_is_left_as_it_was(root: Path) -> None:
+    """The circle would have to be split, and has no time of its own; begun a micrometre aside it would be none."""
+    text = b"G90 G94 F500.\nG0 X10. Y10. Z5.\nG1 X20. Y10.\nG93\nG2 X20. Y10. I105. J0.\nG94\nM30\n"
+    setup = Setup(assume_zero=True, no_point="calculator")
+    machine = load(root / "examples" / "machines" / "three_axis.toml")
+    fixed = fix_program(read(text, "circle", "fanuc"), machine, setup, FixOptions(tolerance_um=1.0))
+    assert [(each.line, PINNED in each.reason) for each in fixed.report.refused] == [(3, True), (5, False)]
+    assert b"G1 X20. Y10.\nG93\nG2 X20. Y10. I105. J0.\n" in fixed.text

@@ -152,12 +152,7 @@ def agree(
         state = State(direction=before.direction)
     bound = np.zeros(len(moves), dtype=bool)
     while True:
-        closure = closure_of_refusals(moves, kept, bound)
-        kept = closure.kept
-        for row, cause in closure.added.items():
-            why = LED if bound[cause] else PINNED
-            reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
-        kept |= np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS)
+        kept, unmoored = _with_what_they_need(moves, kept, bound, reasons)
         planned = _planned(dialect, moves, machine, options, kept, state, before)
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
@@ -166,10 +161,28 @@ def agree(
             refused[finding.moves] = True
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
         if not (refused.any() or (~bound[astray]).any()):
-            return Agreed(planned, kept, reasons, closure.unmoored)
+            return Agreed(planned, kept, reasons, unmoored)
         _explain_findings(reasons, (*against, *planned.findings), moves, refused)
         kept |= refused
         bound[astray] = True
+
+
+def _with_what_they_need(moves: Moves, kept: Mask, bound: Mask, reasons: dict[int, Reason]) -> tuple[Mask, bool]:
+    """All motions (n,) that have to be left as they were: those of refused blocks, and those that such ones begin from.
+
+    bound  (n,) other motions that must begin where they began
+
+    Also whether something before the first motion would have to be left, too. What is added goes into `reasons`.
+    """
+    while True:
+        kept = kept | (np.isin(moves.block, list(reasons)) & (moves.rule != Rule.PASS))
+        closure, count = closure_of_refusals(moves, kept, bound), len(reasons)
+        for row, cause in closure.added.items():
+            why = LED if bound[cause] else PINNED
+            reasons.setdefault(int(moves.block[row]), Reason(CODE_OF_TEXT, why, int(moves.block[cause])))
+        kept = closure.kept
+        if len(reasons) == count:
+            return kept, closure.unmoored
 
 
 def increments(machine: Machine) -> Array:

@@ -13,6 +13,7 @@ from ncfix.machine import loads
 from ncfix.program.klartext.arc_text import PieceOfArc, arc_text
 from ncfix.program.klartext.number_text import Style
 from ncfix.program.klartext.poles import pole_in_force
+from ncfix.program.klartext.render import NOT_CLOSED
 from ncfix.program.reader import read
 from ncfix.program.writer import apply
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
@@ -84,7 +85,9 @@ def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytes
 
 def test_an_arc_is_refused_where_nobody_knows_which_pole_comes_back() -> None:
     report = fixed(AFTER_CR.replace("CC X+110,0 Y+10\n", "CC X+110,0 Y+10\nLBL 2\n")).report
-    assert "which one was in force" in report.refused[0].reason
+    reasons = {each.line: each.reason for each in report.refused}
+    assert "which one was in force" in reasons[5]
+    assert "(line 5)" in reasons[2], "the arc begins at its end"
 
 
 def test_a_pole_that_nobody_relies_on_does_not_come_back() -> None:
@@ -115,6 +118,17 @@ def test_the_end_of_an_arc_with_more_digits_than_the_control_takes() -> None:
 
 
 DRILL = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL X+120 Y+90 Z+50 FMAX\n"
+
+
+@pytest.mark.parametrize(("end", "refused"), [("X+100.0000 Y+20.0000", 0), ("X+100 Y+20", 1)])
+def test_a_full_circle_ends_where_it_begins_to_the_last_digit_or_is_refused(end: str, refused: int) -> None:
+    """The control resolves a micrometre, and the motion before the circle names ten times as many places."""
+    machine = THREE.replace(least_increment=(0.001, 1e-5))
+    body = f"L X+100.0000 Y+20.0000 Z+0 FMAX\nCC X+110 Y+20\nC {end} DR+ F500\nL X+90"
+    found = fix_program(read(program(body), "t.h"), machine, KNOWN, FixOptions(tolerance_um=20.0))
+    assert [each.reason for each in found.report.refused][1:] == [NOT_CLOSED] * refused
+    begin, *_, circle, _, _ = found.text.decode().splitlines()[2:]
+    assert [float(word[1:]) for word in circle.split()[1:3]] == [float(word[1:]) for word in begin.split()[1:3]]
 
 
 def test_a_hole_gets_a_surface_of_its_own_which_is_taken_back() -> None:

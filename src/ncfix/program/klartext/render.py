@@ -29,7 +29,11 @@ SAID_BY_WORDS = ("", "l", "ln", "ct", "ctp")
 """Functions that are always gone through: by their words alone, or by the direction that they come from."""
 
 WHICH_POLE = "the arc needs a pole of its own, and which one was in force before it the text does not tell"
-EXACT = 1e-9
+NEAR = 3.0
+"""Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
+NOT_CLOSED = "the full circle begins at a place that its own words have too few digits to name"
+CLOSED, EXACT = 1e-6, 1e-9
+"""Program units: an arc whose ends are nearer is a full circle, and positions that are nearer are the same."""
 
 
 def render(program: Program, block: int, layout: Layout, target: Target) -> Rendered:
@@ -154,10 +158,15 @@ class Renderer(HoleWriter):
     def _own_arc(self, centre: FloatArray) -> FloatArray:
         """The block itself as an arc."""
         target, layout = self.target, self.layout
-        found = arc_text(self._piece_of_arc(target.start, 0, centre), self.style)
+        arc, closed = self._piece_of_arc(target.start, 0, centre), self._should_close()
+        if closed:
+            arc.end[arc.columns] = target.start[arc.columns]
+        found = arc_text(arc, self.style)
         columns = tuple(target.spatial[index] for index in target.plane[:2])
         named = columns if layout.polar or found.function == "C" else ()
         position = self._words(found.end, named, columns if found.function == "CP" else ())
+        if closed and (np.abs(position - target.start)[arc.columns] > EXACT).any():
+            self.out.conflict = NOT_CLOSED
         self._function(" ".join([found.function, *found.words]) if found.function == "CP" else found.function)
         self._drop(*layout.polar)
         self._radius(found)
@@ -169,6 +178,16 @@ class Renderer(HoleWriter):
             self.own_pole = True
         self.out.centre = found.centre
         return position
+
+    def _should_close(self) -> bool:
+        """Whether the block is a full circle, and stays one: it has to end where it begins to the last digit."""
+        target, plane = self.target, list(self.target.plane[:2])
+        columns = [target.spatial[index] for index in plane]
+        if len(target.ends) > 1 or -1 in columns:
+            return False
+        meant = np.abs(target.nominal[columns] - target.origin[plane]) < CLOSED
+        near = np.abs(target.ends[0] - target.start)[columns] < NEAR * self.half[columns]
+        return bool(meant.all() and near.all())
 
     def _radius(self, found: ArcText) -> None:
         """The R word of CR."""
