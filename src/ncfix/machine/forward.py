@@ -12,11 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ncfix.machine.axis import Axis
+from ncfix.machine.axis import Axis, Tool, Vector
 from ncfix.machine.error_model import ErrorModel, Slot, Sort
 from ncfix.machine.se3 import Array
 from ncfix.machine.state import Poses
 from ncfix.machine.transport import SmallMotion, Weight, advance, columns, composed, cross, dot
+
+BASE_AXES = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+OF_FRAME = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
+"""Weights of the columns of a frame: three directions, which translations leave alone, and a point."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +149,21 @@ def carry(joints: tuple[JointPose, ...], moved: Array, weight: Weight = 1.0) -> 
         if joint.axis is not None and joint.axis.workpiece_side:
             moved = joint.back(moved, weight)
     return moved
+
+
+def carried_tips(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+    """The tip of a tool of `lengths` (n,) or (1,), (3, 1, n) mm, in the frame at `offset` on the workpiece branch."""
+    start = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
+    tip: Array = carry(joints, start) - columns(offset)
+    return tip
+
+
+def carried_frames(joints: tuple[JointPose, ...], tool: Tool, lengths: Array, offset: Vector) -> Array:
+    """The frame at the tip, as `carried_tips`: the directions of its axes, and where it is, (3, 4, n)."""
+    tip = np.moveaxis(tool.tip(lengths), -1, 0)[:, None, :]
+    axes = np.broadcast_to(BASE_AXES, (3, 3, tip.shape[-1]))
+    frame: Array = carry(joints, np.concatenate([axes, tip], axis=1), OF_FRAME) - columns(offset) * OF_FRAME
+    return frame
 
 
 def build_chain(axes: tuple[Axis, ...], model: ErrorModel) -> Chain:

@@ -17,7 +17,7 @@ from ncfix.machine.axis import ORIGIN, Axis, Tool, Vector
 from ncfix.machine.bow import Bow, bow_of
 from ncfix.machine.effect import Effect
 from ncfix.machine.error_model import ErrorModel, compile_effects, direction_axis
-from ncfix.machine.forward import Chain, build_chain, carry
+from ncfix.machine.forward import Chain, build_chain, carried_frames, carried_tips
 from ncfix.machine.gap import gaps
 from ncfix.machine.jacobian import Jacobians
 from ncfix.machine.route import Approach, Route, Turns, approach_of, route_of
@@ -25,12 +25,11 @@ from ncfix.machine.se3 import Array
 from ncfix.machine.signals import Signal, inputs_of, with_lags
 from ncfix.machine.state import Poses, State, flatten, poses_first
 from ncfix.machine.steps import SMALL
-from ncfix.machine.transport import columns
 
-POSE_COLUMNS = columns((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-POSE_WEIGHTS = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
 DEFAULT_INCREMENT = (0.001, 0.001 * np.pi / 180)
+"""What controls resolve, linear and rotary axes: 1 um, in mm, and 0.001 degree, in rad."""
 DEFAULT_CORRECTION = (0.5, 0.05 * np.pi / 180)
+"""Corrections that are refused are larger: 0.5 mm, and 0.05 degree, in rad."""
 
 
 @dataclass(frozen=True)
@@ -375,20 +374,13 @@ class Machine:
 
     def _carried_tips(self, part: Poses, model: ErrorModel | None) -> Array:
         """The tip by any chain, with small motions of any size, (3, 1, n)."""
-        start = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
-        tip: Array = carry(self._chain.at(part, model), start) - columns(self.workpiece_offset)
-        return tip
+        return carried_tips(self._chain.at(part, model), self.tool, part.tool_length, self.workpiece_offset)
 
     def _pose(self, q: ArrayLike, state: State, model: ErrorModel | None) -> Array:
-        def poses(part: Poses) -> Array:
-            tip = np.moveaxis(self.tool.tip(part.tool_length), -1, 0)[:, None, :]
-            axes = np.broadcast_to(POSE_COLUMNS, (3, 3, tip.shape[-1]))
-            start = np.concatenate([axes, tip], axis=1)
-            offset = columns(self.workpiece_offset) * POSE_WEIGHTS
-            pose: Array = carry(self._chain.at(part, model), start, POSE_WEIGHTS) - offset
-            return pose
+        def frames(part: Poses) -> Array:
+            return carried_frames(self._chain.at(part, model), self.tool, part.tool_length, self.workpiece_offset)
 
-        rows = self._evaluated(poses, q, state, model, 4)
+        rows = self._evaluated(frames, q, state, model, 4)
         bottom = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*rows.shape[:-2], 1, 4))
         return np.concatenate([rows, bottom], axis=-2)
 
