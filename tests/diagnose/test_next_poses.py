@@ -7,17 +7,15 @@ import pytest
 
 from measure.poses import machine, plan
 from ncfix.diagnose.contest import COUNT, Contest, chance, climbed, exchanged, worst
-from ncfix.diagnose.next_poses import (
-    SURE,
-    SURELY,
-    Proposal,
-    _beyond,
-    _marked,
-    _new_tools,
-    _offered,
-    _one_more,
-    _travels,
-    _where_it_was,
+from ncfix.diagnose.next_poses import SURE, SURELY, Proposal
+from ncfix.diagnose.offer import (
+    axes_beyond,
+    marked,
+    new_tools,
+    one_tool_more,
+    poses_on_offer,
+    stays_where_it_was,
+    travels_of,
 )
 from ncfix.diagnose.rounds import TOLD
 from ncfix.diagnose.view import view
@@ -84,33 +82,33 @@ def test_poses_beyond_the_travels_measured_are_marked_in_the_file() -> None:
     known = machine("three_axis")
     poses = plan(known, "tcp", 20)
     measured = {"X": (100.0, 120.0), "Y": (-500.0, 500.0), "Z": (-500.0, 500.0)}
-    travels = _travels(known, measured)
+    travels = travels_of(known, measured)
     low, high = known.axes[known.axis_names.index("X")].range
     assert travels["X"] == (low, high)
-    assert _travels(known, measured, {"X"})["X"] == (100.0, 120.0)
-    beyond = _beyond(poses, measured)
+    assert travels_of(known, measured, {"X"})["X"] == (100.0, 120.0)
+    beyond = axes_beyond(poses, measured)
     assert beyond == ("X",)
-    text = dumps(_marked(poses, beyond), ("dx",))
+    text = dumps(marked(poses, beyond), ("dx",))
     assert "# note: X beyond the travels measured so far" in text
     assert reads(text.replace(",\n", ",0\n").encode(), known).headers[-1][0] == "note"
-    assert "(X BEYOND THE TRAVELS MEASURED SO FAR" in skeleton(_marked(poses, beyond), known)
-    assert _marked(poses, ()) is poses
+    assert "(X BEYOND THE TRAVELS MEASURED SO FAR" in skeleton(marked(poses, beyond), known)
+    assert marked(poses, ()) is poses
 
 
 def test_one_tool_more_differs_as_much_as_tools_do() -> None:
-    assert _one_more((114.0,)) == (114.0, 300.0)
-    assert _one_more((275.0,)) == (275.0, 100.0)
-    assert _one_more((114.0, 180.0)) == (114.0, 180.0, 300.0)
-    assert _one_more((90.0, 280.0)) == (90.0, 280.0)  # neither a short nor a long one would tell more
-    assert _one_more((0.0,)) == (0.0, 100.0)  # nobody said how long it is
+    assert one_tool_more((114.0,)) == (114.0, 300.0)
+    assert one_tool_more((275.0,)) == (275.0, 100.0)
+    assert one_tool_more((114.0, 180.0)) == (114.0, 180.0, 300.0)
+    assert one_tool_more((90.0, 280.0)) == (90.0, 280.0)  # neither a short nor a long one would tell more
+    assert one_tool_more((0.0,)) == (0.0, 100.0)  # nobody said how long it is
 
 
 def test_a_tool_that_was_not_used_is_marked_in_the_file() -> None:
     poses = plan(machine("three_axis"), "tcp", 20)
     used = np.unique(poses.column("tool_length"))
-    assert _new_tools(poses, used) == ()
-    assert _new_tools(poses, used[:1]) == tuple(used[1:])
-    text = dumps(_marked(poses, ("X",), (300.0,)), ("dx",))
+    assert new_tools(poses, used) == ()
+    assert new_tools(poses, used[:1]) == tuple(used[1:])
+    text = dumps(marked(poses, ("X",), (300.0,)), ("dx",))
     assert "mind the clearance; tool of 300 mm: or one that differs as much" in text
 
 
@@ -134,13 +132,13 @@ def test_the_tip_stays_where_it_was_whatever_the_tool() -> None:
     short = plan(known, "tcp", 60)
     short = short.with_columns({"tool_length": np.full(60, 100.0)})
     seen = view([simulate(short, known, Faults(1.0), 1)], known)
-    offered = _offered(seen, seen.reach.spans, (100.0, 300.0))
+    offered = poses_on_offer(seen, seen.reach.spans, (100.0, 300.0))
     assert set(offered.column("tool_length")) == {100.0, 300.0}
-    assert _where_it_was(seen, offered).all()
+    assert stays_where_it_was(seen, offered).all()
     tips = known.tip(offered.positions(known), offered.column("tool_length"))
     been = known.tip(short.positions(known), short.column("tool_length"))
     assert (tips.min(axis=0) >= been.min(axis=0) - 0.05).all()  # what the file's errors make of a pose, and more
-    assert "the tool tip beyond the travels" in dumps(_marked(short, (), (), True), ("dx",))
+    assert "the tool tip beyond the travels" in dumps(marked(short, (), (), True), ("dx",))
 
 
 def test_the_tip_of_a_shorter_tool_may_go_wherever_these_travels_lead() -> None:
@@ -149,8 +147,8 @@ def test_the_tip_of_a_shorter_tool_may_go_wherever_these_travels_lead() -> None:
     long = plan(known, "tcp", 60).with_columns({"tool_length": np.full(60, 250.0)})
     seen = view([simulate(long, known, Faults(1.0), 1)], known)
     low, high = seen.reach.spans["Z"]
-    offered = _offered(seen, seen.reach.spans, (100.0, 250.0), roaming=True)
+    offered = poses_on_offer(seen, seen.reach.spans, (100.0, 250.0), roaming=True)
     short = offered.column("tool_length") == 100.0
     assert np.ptp(offered.column("Z")[short]) > 0.95 * (high - low)
-    assert _where_it_was(seen, offered.rows(np.flatnonzero(~short))).all()
-    assert not _where_it_was(seen, offered).all()
+    assert stays_where_it_was(seen, offered.rows(np.flatnonzero(~short))).all()
+    assert not stays_where_it_was(seen, offered).all()

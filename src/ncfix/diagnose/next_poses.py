@@ -8,36 +8,34 @@ on offer, no measurement of this kind tells it from that name, and that is said.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ncfix.diagnose.addition import Mask
 from ncfix.diagnose.contest import chance, exchanged, worst
 from ncfix.diagnose.evidence import Court
 from ncfix.diagnose.groups import Group
+from ncfix.diagnose.offer import (
+    axes_beyond,
+    marked,
+    new_tools,
+    one_tool_more,
+    poses_on_offer,
+    stays_where_it_was,
+    travels_of,
+)
 from ncfix.diagnose.rounds import Rounds, Side
 from ncfix.diagnose.selection import Selected, aliases
 from ncfix.diagnose.view import View
 from ncfix.diagnose.weighing import Members, Scale
-from ncfix.machine import Machine
-from ncfix.measure.candidates import Room, candidates
-from ncfix.measure.kinds import STATES
-from ncfix.measure.measurement import Array, Measurement
+from ncfix.measure.measurement import Measurement
 
-OFFERED = 320
-DRAWN, FEW = 10, 60
-"""Times as many are drawn to find those whose tip stays where it was; if these are fewer than so many, others, too."""
 NEAR = 10.0
 """Log odds within which another name is near enough to ask for poses that tell them apart."""
 RIVALS_MOST = 3
 FORMS = 3
 """Forms of a name that may imitate."""
-LENGTHS = (100.0, 300.0)
-"""mm: a short tool, and one as long as a test mandrel; of these one more is used, that which differs most from any."""
-OTHER = 50.0
-"""mm: a tool that differs by less from one that is there is none more."""
 SURELY = 21.0
 """Squared noise units from which on a rival is told apart in nineteen of twenty measurements."""
 SURE = 0.95
@@ -46,9 +44,6 @@ FEWER = 0.8
 """Poses that ask for more must leave so much fewer cases open, as a share."""
 HELPS = 0.05
 """And any must raise the chance that one name stands alone by so much."""
-ROUNDED = 1e-3
-"""mm, degree: by which a pose may be rounded beyond a travel."""
-Span = tuple[float, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,12 +120,12 @@ def propose(court: Court, sides: Sequence[Side], sigma: float) -> Proposal:
     """
     view = court.background.view
     spans, tools = view.reach.spans, tuple(sorted(set(np.round(view.column("tool_length"), 4).tolist())))
-    more, travels = _one_more(tools), _travels(view.machine, spans, _signals(sides))
+    more, travels = one_tool_more(tools), travels_of(view.machine, spans, _signals(sides))
     easy = (False, False, tools if len(tools) > 1 else more)
     ways = dict.fromkeys([easy, (False, False, more), (False, True, more), (travels != spans, True, more)])
     best: Proposal | None = None
     for far, roaming, lengths in ways:
-        offered = _offered(view, travels if far else spans, lengths, roaming)
+        offered = poses_on_offer(view, travels if far else spans, lengths, roaming)
         found = _best_of(court, sides, sigma, offered)
         if best is None or 1 - found.chance < FEWER * (1 - best.chance):
             best = found
@@ -138,15 +133,6 @@ def propose(court: Court, sides: Sequence[Side], sigma: float) -> Proposal:
             break
     assert best is not None
     return best
-
-
-def _one_more(tools: tuple[float, ...]) -> tuple[float, ...]:
-    """The lengths of the tools, mm, and of one that differs as much as tools do."""
-    if tools == (0.0,):
-        return (0.0, LENGTHS[0])
-    other = max(LENGTHS, key=lambda length: min(abs(length - own) for own in tools))
-    apart = min(abs(other - own) for own in tools)
-    return (*tools, other) if apart >= OTHER else tools
 
 
 def _best_of(court: Court, sides: Sequence[Side], sigma: float, offered: Measurement) -> Proposal:
@@ -166,78 +152,15 @@ def _best_of(court: Court, sides: Sequence[Side], sigma: float, offered: Measure
 
 def _with_plan(found: Proposal, plan: Measurement, view: View) -> Proposal:
     """A proposal with its poses, and with what is new about them."""
-    beyond, tools = _beyond(plan, view.reach.spans), _new_tools(plan, view.column("tool_length"))
-    strays = not _where_it_was(view, plan).all()
-    return replace(found, plan=_marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
+    beyond, tools = axes_beyond(plan, view.reach.spans), new_tools(plan, view.column("tool_length"))
+    strays = not stays_where_it_was(view, plan).all()
+    return replace(found, plan=marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:
     """What the effects go with."""
     effects = [effect for side in sides for group, _ in side.forms for effect in group.owner.effects]
     return frozenset(name for effect in effects for name in (effect.signal, effect.times) if name is not None)
-
-
-def _travels(machine: Machine, spans: Mapping[str, Span], kept: Collection[str] = ()) -> dict[str, Span]:
-    """The ranges of the machine where it has them, else what was measured; the latter also of axes that are kept."""
-    found = {}
-    for axis in machine.axes:
-        low, high = (limit / axis.unit for limit in axis.range)
-        first, last = spans[axis.name]
-        bounded = np.isfinite([low, high]).all() and axis.name not in kept
-        found[axis.name] = (min(low, first), max(high, last)) if bounded else (first, last)
-    return found
-
-
-def _beyond(plan: Measurement, spans: Mapping[str, Span]) -> tuple[str, ...]:
-    """The axes of which poses lie beyond what was measured."""
-    return tuple(
-        name
-        for name, (low, high) in spans.items()
-        if plan.column(name).min() < low - ROUNDED or plan.column(name).max() > high + ROUNDED
-    )
-
-
-def _new_tools(plan: Measurement, used: Array) -> tuple[float, ...]:
-    """Lengths of tools that were not used so far, mm."""
-    lengths = set(plan.column("tool_length").tolist())
-    return tuple(sorted(each for each in lengths if np.abs(used - each).min() > ROUNDED))
-
-
-def _where_it_was(view: View, plan: Measurement) -> Mask:
-    """The rows whose tool tip is within the block that it has been in so far, seen from the workpiece."""
-    been = view.machine.tip(view.q, view.column("tool_length"))
-    tip = view.machine.tip(plan.positions(view.machine), plan.column("tool_length"))
-    inside: Mask = ((tip >= been.min(axis=0) - ROUNDED) & (tip <= been.max(axis=0) + ROUNDED)).all(axis=1)
-    return inside
-
-
-def _marked(plan: Measurement, beyond: Sequence[str], tools: Sequence[float] = (), strays: bool = False) -> Measurement:
-    """With lines that say what goes further than before, and which tools are new."""
-    far = [*beyond, *(["the tool tip"] if strays else [])]
-    said = [f"{', '.join(far)} beyond the travels measured so far, mind the clearance"] if far else []
-    lengths = " and ".join(f"{each:g} mm" for each in tools)
-    said += [f"tool of {lengths}: or one that differs as much, with its own length in the file"] if tools else []
-    return plan.with_header("note", "; ".join(said)) if said else plan
-
-
-def _offered(view: View, ranges: Mapping[str, Span], lengths: Sequence[float], roaming: bool = False) -> Measurement:
-    """Poses within these ranges, with these tools, whose tip stays where it has been if there are such.
-
-    Of tools that are shorter than one that was used it may also be elsewhere where they are `roaming`.
-    """
-    loads = view.column("load_kg")
-    inputs = {"load_kg": (float(loads.min()), float(loads.max()))} if "load_kg" in view.reach.columns else {}
-    room = Room(ranges=ranges, tool_lengths=lengths, inputs=inputs)
-    drawn = candidates(view.machine, "tcp", DRAWN * OFFERED, room)
-    inside = _where_it_was(view, drawn)
-    if roaming:
-        inside |= drawn.column("tool_length") < view.column("tool_length").max() - ROUNDED
-    kept = drawn.rows(inside) if inside.sum() >= FEW else drawn
-    plan = kept.rows(range(min(OFFERED, len(kept))))
-    known = {name for each in view.measurements for name in each.columns if STATES.fullmatch(name)}
-    held = {name: np.full(len(plan), view.column(name)[-1]) for name in known if name not in plan.columns}
-    sets = tuple(f"tool {length:g}" for length in plan.column("tool_length"))
-    return replace(plan, columns={**plan.columns, **held}, labels={"set": sets})
 
 
 def _reason(court: Court, groups: Sequence[Group]) -> str:
