@@ -119,15 +119,8 @@ class Interpreter:
                 return
             plan = flow.unit.plan(flow.block)
             self.control.external = "" if flow.unit is self.main else flow.unit.name
-            if plan.lane is not None and self.takes_stretches():
-                circles = partial(turned, self.control, flow.unit)
-                done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
-                if done:
-                    if self.recorder:
-                        self.recorder.stretch(flow.unit, flow.block, done)
-                    flow.block += done
-                    self.control.budget.spend(done)
-                    continue
+            if plan.lane is not None and self.takes_stretches() and self.take_stretch():
+                continue
             unit, block = flow.unit, flow.block
             flow.block += 1
             self.span = None
@@ -136,6 +129,17 @@ class Interpreter:
                 return
             if flow.unit is unit and flow.block <= block:
                 self.look_round(block)
+
+    def take_stretch(self) -> bool:
+        """Follow the plain motions that begin here many at once; whether there are any."""
+        flow = self.flow
+        circles = partial(turned, self.control, flow.unit)
+        done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
+        if done and self.recorder:
+            self.recorder.stretch(flow.unit, flow.block, done)
+        flow.block += done
+        self.control.budget.spend(done)
+        return done > 0
 
     def look_round(self, block: int) -> None:
         """A block has led back: raises `Fault` if the program goes round for ever."""

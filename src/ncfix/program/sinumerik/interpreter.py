@@ -127,19 +127,9 @@ class Interpreter:
                     return False
                 course.finish()
                 continue
-            main = not course.unit.external
             plan, control.external = course.unit.plan(course.block), course.unit.external
-            if plan.lane is not None and self.lane_is_open():
-                if plan.vector is None:
-                    done = run_lane(control, course.unit, course.block, main, partial(turned, control, course.unit))
-                else:
-                    done = run_vectors(control, course.unit, course.block, main)
-                if done:
-                    self.stand(done)
-                    course.block += done
-                    note_stretch(control)
-                    control.budget.spend(done)
-                    continue
+            if plan.lane is not None and self.lane_is_open() and self.take_stretch(plan):
+                continue
             unit, block = course.unit, course.block
             course.block += 1
             control.budget.spend(1)
@@ -147,6 +137,21 @@ class Interpreter:
                 return True
             if course.unit is unit and course.block <= block:
                 self.look_round(block)
+
+    def take_stretch(self, plan: Plan) -> bool:
+        """Follow the plain motions that begin with a block of this plan many at once; whether there are any."""
+        control, course = self.control, self.course
+        unit, main = course.unit, not course.unit.external
+        if plan.vector is None:
+            done = run_lane(control, unit, course.block, main, partial(turned, control, unit))
+        else:
+            done = run_vectors(control, unit, course.block, main)
+        if done:
+            self.stand(done)
+            course.block += done
+            note_stretch(control)
+            control.budget.spend(done)
+        return done > 0
 
     def look_round(self, block: int) -> None:
         """A block has led back: raises `Fault` if the program goes round for ever."""
