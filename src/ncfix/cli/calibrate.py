@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -104,7 +105,7 @@ def _as_dict(found: Calibration, over: Prediction) -> dict[str, Any]:
     sigma, covariance = found.sigma, found.covariance
     return {
         "parameters": [
-            {"name": label, "value": value, "sigma": deviation, "held": bool(deviation != deviation)}
+            {"name": label, "value": value, "sigma": deviation, "held": math.isnan(deviation)}
             for label, value, deviation in zip(
                 found.labels, found.estimate.coefficients.tolist(), sigma.tolist(), strict=True
             )

@@ -14,6 +14,7 @@ from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown,
 if TYPE_CHECKING:
     from ncfix.machine import Machine
     from ncfix.measure.candidates import Room
+    from ncfix.measure.plan import Planned
 
 KINDS = ("tcp", "tcp6", "probe", "length")
 ROUNDING = 1e-9
@@ -87,9 +88,14 @@ def plan(
         console.put_json(kind=kind, count=count, **figures, **listed, output=output)
     if not as_json or output != STREAM:
         target.write(text.encode())
+    _say(found, separated=bool(separate))
+
+
+def _say(found: Planned, *, separated: bool) -> None:
+    """What the poses do not tell, and how well the tip error will be known where that was sought."""
     if found.unseen:
         console.say(f"no pose of this kind tells {', '.join(found.unseen)} from the rest")
-    if not separate:
+    if not separated:
         console.say(f"tip error known to {found.worst_um:.2f} um at worst per um of noise, {found.mean_um:.2f} um rms")
     if found.open:
         console.say(f"nearly open is a combination of {', '.join(found.open)}")

@@ -17,7 +17,7 @@ from ncfix.cli.following import Following, figures
 from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.parts import Keep, Source, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
+from ncfix.cli.targets import JSON, STREAM, Outputs, Target, check_streams, read, shown, targets
 from ncfix.cli.through import dialect_in, task_of, through
 
 if TYPE_CHECKING:
@@ -72,12 +72,15 @@ def simulate(
 
         faults = Faults(noise_um, None, drift_um, quantum_um, setup_error)
         _simulate_plan(machine_path, plan, faults, seed, output, force, as_json)
-        return
-    assert program is not None
-    inputs = (machine_path, *given.files)
-    target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
-    check_streams(JSON if as_json else None, table=target)
-    following = Following.of(machine_path, dialect, given)
+    elif program is not None:
+        inputs = (machine_path, *given.files)
+        target = targets([program], Outputs(output, force=force), inputs)[0] if output else None
+        check_streams(JSON if as_json else None, table=target)
+        _simulate_program(Following.of(machine_path, dialect, given), program, target, as_json)
+
+
+def _simulate_program(following: Following, program: str, target: Target | None, as_json: bool) -> None:
+    """Say how large the errors along a program are, and write them to a table if there is to be one."""
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
         with console.busy(f"simulating {shown(program)}"):
@@ -87,7 +90,7 @@ def simulate(
     found = figures(along)
     if as_json:
         console.put_json(path=shown(program), error_um=found, output=target.path if target else None)
-    elif not target or target.path != "-":
+    elif not target or target.path != STREAM:
         console.put(f"tip error: {console.error_figures(found)}\n")
 
 
