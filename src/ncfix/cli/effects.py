@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import click
@@ -62,7 +63,8 @@ def _components(machine: Machine, with_all: bool) -> list[Row]:
         title = catalogue.title(name, axes.get(name[-1]))
         unit = "rad" if effect.rotational else "mm"
         square = catalogue.squareness(name)
-        rows.append(_row(name, unit, title, catalogue.usual_basis(name), catalogue.much(name), seen, "", square))
+        basis, much = catalogue.usual_basis(name), catalogue.much(name)
+        rows.append(_row(name, title, unit=unit, basis=basis, much=much, seen=seen, squareness=square))
     return rows
 
 
@@ -73,9 +75,9 @@ def _physical(machine: Machine) -> list[Row]:
     for named in library(machine).values():
         parts = dict.fromkeys(f"{each.name} {each.basis.name}" for each in named.effects)
         unit = " ".join(dict.fromkeys("rad" if each.rotational else "mm" for each in named.effects))
-        much = "" if named.largest != named.largest else f"{named.largest:g}"
-        needs = " ".join(named.needs)
-        rows.append(_row(named.name, unit, named.title, ", ".join(parts), much, " ".join(named.instruments), needs, ""))
+        much = "" if math.isnan(named.largest) else f"{named.largest:g}"
+        seen, needs = " ".join(named.instruments), " ".join(named.needs)
+        rows.append(_row(named.name, named.title, unit=unit, basis=", ".join(parts), much=much, seen=seen, needs=needs))
     return rows
 
 
@@ -85,14 +87,22 @@ def _nameless(machine: Machine) -> list[Row]:
     from ncfix.plugins import registry
 
     there = library(machine)
-    return [
-        _row(name, "", getattr(each, "title", ""), "", "", "", "", "")
-        for name, each in registry("effects").items()
-        if name not in there
-    ]
+    absent = ((name, each) for name, each in registry("effects").items() if name not in there)
+    return [_row(name, getattr(each, "title", "")) for name, each in absent]
 
 
-def _row(name: str, unit: str, title: str, basis: str, much: str, seen: str, needs: str, squareness: str) -> Row:
+def _row(
+    name: str,
+    title: str,
+    *,
+    unit: str = "",
+    basis: str = "",
+    much: str = "",
+    seen: str = "",
+    needs: str = "",
+    squareness: str = "",
+) -> Row:
+    """A row of the table; the order is that of its columns."""
     return {
         "name": name,
         "unit": unit,

@@ -6,6 +6,8 @@ least rms error of all that such a table can say; forward and reverse are filled
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ncfix.machine import Machine, State
@@ -30,41 +32,62 @@ def positioning(machine: Machine, space: Array, tool_length: float, most: int, t
     terms: list[Term] = []
     for axis in sorted(range(len(space)), key=lambda index: not machine.rotary[index]):
         limit = target / 200 if machine.rotary[axis] else target
-        done = Compensation(tuple(terms))
-        nodes = _nodes(machine, space, tool_length, axis, most, limit, done)
+        own = Own(machine, space, tool_length, axis, Compensation(tuple(terms)))
+        nodes = own.nodes(most, limit)
         for way in (1, -1):
-            grid = _table(machine, space, tool_length, axis, way, nodes, limit, done)
-            terms.append(Term((grid,), (machine.axis_names[axis], way)))
+            terms.append(Term((own.grid(way, nodes, limit),), (machine.axis_names[axis], way)))
         if not any(term.factors[0].values.any() for term in terms[-2:]):
             del terms[-2:]
     return Compensation(tuple(terms))
 
 
-def _nodes(
-    machine: Machine, space: Array, tool_length: float, axis: int, most: int, limit: float, done: Compensation
-) -> Array:
-    """Where a table has its nodes: as many as the mean of both ways needs."""
-    low, high = space[axis].tolist()
-    fine = np.linspace(low, high, FINE)
-    count = nodes_needed(fine, _mean(machine, space, tool_length, axis, 0, fine, done), most, limit)
-    return np.linspace(low, high, count)
+@dataclass(frozen=True, slots=True)
+class Own:
+    """What the tables of an axis over itself are made of.
 
+    space        (n_axes, 2) the positions that are covered, mm and rad
+    tool_length  mm
+    axis         its column
+    done         tables that are made already: rotary axes turn themselves right first
+    """
 
-def _table(
-    machine: Machine,
-    space: Array,
-    tool_length: float,
-    axis: int,
-    way: int,
-    nodes: Array,
-    limit: float,
-    done: Compensation,
-) -> Grid:
-    """One column."""
-    values = _mean(machine, space, tool_length, axis, way, nodes, done)
-    values[np.abs(values) < 1e-3 * limit] = 0.0
-    name = machine.axis_names[axis]
-    return Grid((name,), (nodes,), (name,), values[:, None])
+    machine: Machine
+    space: Array
+    tool_length: float
+    axis: int
+    done: Compensation
+
+    def nodes(self, most: int, limit: float) -> Array:
+        """Where a table has its nodes: as many as the mean of both ways needs."""
+        low, high = self.space[self.axis].tolist()
+        fine = np.linspace(low, high, FINE)
+        return np.linspace(low, high, nodes_needed(fine, self.mean(0, fine), most, limit))
+
+    def grid(self, way: int, nodes: Array, limit: float) -> Grid:
+        """The table while the axis moves one way; values of less than a thousandth of the limit are none."""
+        values = self.mean(way, nodes)
+        values[np.abs(values) < 1e-3 * limit] = 0.0
+        name = self.machine.axis_names[self.axis]
+        return Grid((name,), (nodes,), (name,), values[:, None])
+
+    def mean(self, way: int, nodes: Array) -> Array:
+        """The mean correction of the axis at its positions `nodes` while it moves one way, (n,) mm or rad."""
+        machine, axis = self.machine, self.axis
+        half = random_poses(self.space, REST // 2, seed=11)
+        rest = np.concatenate([half, self.space.sum(axis=1) - half])
+        q = np.repeat(rest[None], len(nodes), axis=0)
+        q[:, :, axis] = nodes[:, None]
+        direction = np.zeros(len(self.space))
+        direction[axis] = way
+        state = State(self.tool_length, direction)
+        flat = q.reshape(-1, len(self.space))
+        if machine.rotary[axis]:
+            correction = -own_rotary_error(machine, flat, state, axis)
+        else:
+            turned = self.done.at(machine.axis_names, flat) * machine.rotary
+            correction = exact_correction(machine, flat, state, turned)[:, axis]
+        mean: Array = correction.reshape(len(nodes), REST).mean(axis=1)
+        return mean
 
 
 def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
@@ -74,24 +97,3 @@ def nodes_needed(fine: Array, curve: Array, most: int, limit: float) -> int:
         if np.abs(np.interp(fine, nodes, np.interp(nodes, fine, curve)) - curve).max() <= limit:
             return count
     return most
-
-
-def _mean(
-    machine: Machine, space: Array, tool_length: float, axis: int, way: int, nodes: Array, done: Compensation
-) -> Array:
-    """The mean correction of an axis at its positions `nodes` while it moves one way, (n,) mm or rad."""
-    half = random_poses(space, REST // 2, seed=11)
-    rest = np.concatenate([half, space.sum(axis=1) - half])
-    q = np.repeat(rest[None], len(nodes), axis=0)
-    q[:, :, axis] = nodes[:, None]
-    direction = np.zeros(len(space))
-    direction[axis] = way
-    state = State(tool_length, direction)
-    flat = q.reshape(-1, len(space))
-    if machine.rotary[axis]:
-        correction = -own_rotary_error(machine, flat, state, axis)
-    else:
-        turned = done.at(machine.axis_names, flat) * machine.rotary
-        correction = exact_correction(machine, flat, state, turned)[:, axis]
-    mean: Array = correction.reshape(len(nodes), REST).mean(axis=1)
-    return mean
