@@ -134,6 +134,23 @@ def test_what_cannot_be_done_in_parts_is_done_as_a_whole(long_program: Path, fix
     assert (tmp_path / "out.ngc").read_bytes() == fix(1 << 20, "-", stdin=source).out
 
 
+@pytest.mark.parametrize(("late", "code"), [(b"ROT Z5", "NCF103"), (b"G96 S200", "")])
+def test_what_a_text_is_does_not_depend_on_parts(
+    late: bytes, code: str, long_program: Path, fix: Any, tmp_path: Path
+) -> None:
+    """A word that shows another control stands behind the first part; G96 in one that names no Y yet shows no lathe."""
+    lines = long_program.read_bytes().replace(b"G0 X10. Y20. Z5.", b"G0 X10. Z5.").split(b"\n")
+    early = b"\n".join([*lines[:3], b"G96 S200", *(b"G1 X%d." % (k % 9) for k in range(300)), *lines[3:]])
+    text = early if not code else b"\n".join([*lines[:200], late, *lines[200:]])
+    long_program.write_bytes(text)
+    for part in (1 << 20, PART):
+        result = fix(
+            part, long_program, "-o", tmp_path / f"{part}.ngc", "--dialect", "fanuc", "--allow-refused", "--assume-zero"
+        )
+        assert (code or "-> ") in result.err, result.err
+        assert (tmp_path / f"{part}.ngc").exists() == (not code)
+
+
 def test_a_refusal_writes_nothing(long_program: Path, fix: Any, tmp_path: Path) -> None:
     long_program.write_bytes(long_program.read_bytes().replace(b"N200 G1 X", b"N200 G1 X9"))
     result = fix(PART, long_program, "-o", tmp_path / "out.ngc", "--json")

@@ -114,7 +114,7 @@ class Job:
             fast.engage(console.forewarn)
         path = shown(source.path)
         with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
-            task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes())
+            task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes(), source.head)
             stream = Stream(task, source.read, outlet.put, jobs, source.ground(outlet.kept.fileno()))
             yield stream, outlet
 

@@ -94,12 +94,13 @@ class Source:
     def looked_into(self, named: bool = False) -> bool:
         """Read the first bytes, which `read` gives once more; whether there are so many that the program is long.
 
-        named  its dialect was said; else there are enough of them to tell it, whatever the size of a part
+        named  its dialect was said: of a pipe no more than a part is waited for; else, and of a file, there are enough
+               of them to tell what the text is, whatever the size of a part
         """
         from ncfix.program.content import PROBE_BYTES
 
         many = part_bytes()
-        self.head = self._read(many if named else max(many, PROBE_BYTES))
+        self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))
         return len(self.head) >= many
 
     @property

@@ -54,8 +54,8 @@ def task_of(following: Following, source: Source, dialect: Dialect, *beside: str
     from ncfix.compensate.task import Task
 
     assert following.machine is not None
-    find = subprograms(following.setup, source.path, *beside)
-    return Task(following.machine, following.setup, OPTIONS, find, shown(source.path), dialect, part_bytes())
+    find, path = subprograms(following.setup, source.path, *beside), shown(source.path)
+    return Task(following.machine, following.setup, OPTIONS, find, path, dialect, part_bytes(), source.head)
 
 
 def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
@@ -69,12 +69,12 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
     from ncfix.program.language import Run
     from ncfix.program.parts import NotInPartsError, PartReader
 
-    reader = PartReader(shown(source.path), dialect)
+    reader = PartReader(shown(source.path), dialect, source.head)
     axes: tuple[str, ...] | None = None
     if following.machine is not None:
         follower = task_of(following, source, dialect).follower()
     else:
-        axes = axes_of(PartReader(reader.path, dialect).read(source.first_lines).templates)
+        axes = axes_of(PartReader(reader.path, dialect, source.head).read(source.first_lines).templates)
         find = subprograms(following.setup, source.path)
         follower = follower_of(dialect, Run(following.setup, axes, frozenset(ROTARY), find))
     parts = Parts(OPTIONS, reader, follower, source.read, part_bytes())

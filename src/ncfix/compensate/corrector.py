@@ -67,7 +67,7 @@ class Corrector:
         self.task = task
         self.units = Units.of(task, read)
         self.machine, reader = self.units.placed, self.units.reader
-        self.again, self.proof = PartReader(task.path, task.dialect), task.follower()
+        self.again, self.proof = PartReader(task.path, task.dialect, task.head), task.follower()
         self.again.templates, self.again.index = reader.templates, reader.index
         self.planner, self.language = Planner.of(self.machine, task.options), language_of(task.dialect)
         self.head: Program | None = None

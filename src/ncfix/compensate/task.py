@@ -23,6 +23,7 @@ class Task:
 
     resolve  gives the text of a subprogram file by its name
     size     bytes of a part
+    head     the first bytes of the text, by which it is told what it is; those of the first part, if not given
     """
 
     machine: Machine
@@ -32,6 +33,7 @@ class Task:
     path: str
     dialect: Dialect
     size: int = PART_BYTES
+    head: bytes = b""
 
     def __post_init__(self) -> None:
         numbered = replace(self.dialect, block_numbers=self.options.block_numbers)

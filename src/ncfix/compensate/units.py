@@ -78,7 +78,7 @@ class Units(Parts):
         """The parts of a program that is read."""
         return cls(
             task.options,
-            PartReader(task.path, task.dialect),
+            PartReader(task.path, task.dialect, task.head),
             task.follower(),
             read,
             task.size,

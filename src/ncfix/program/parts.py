@@ -91,6 +91,7 @@ class Follower(Protocol):
 class PartReader:
     """Reads parts of one program.
 
+    head        the first bytes of the text, by which it is told what it is; those of the first part, if not given
     first_line  the line on which the next part begins
     line_end    the first line end of the first part
     plain       shape -> whether a part may end before or after a block of it
@@ -98,6 +99,7 @@ class PartReader:
 
     path: str
     dialect: Dialect
+    head: bytes = b""
     first_line: int = 1
     line_end: bytes = b""
     language: Language = field(init=False)
@@ -111,10 +113,9 @@ class PartReader:
     def read(self, source: bytes) -> Program:
         """The part that begins on `first_line`; raises what `reader.read` raises, `NotInPartsError` for o-words."""
         begun = self.first_line > 1
-        if begun:
-            check_zeros(source, self.path, self.first_line)
-        else:
-            check_content(source, self.path, self.dialect)
+        check_zeros(source, self.path, self.first_line)
+        if not begun:
+            check_content(self.head or source, self.path, self.dialect)
         blocks = self.language.split(source)
         if not begun:
             blocks[0, 0] = header_length(source)
