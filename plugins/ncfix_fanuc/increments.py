@@ -30,28 +30,24 @@ def at_zero(tables: tuple[Grid, ...]) -> float:
     return float(np.mean([table.at(np.zeros((1, 1)))[0, 0] for table in tables]))
 
 
-def pitch_of(
-    request: Request, axis: str, tables: tuple[Grid, ...], sense: int, units: tuple[float, float], number: int
-) -> Pitch | None:
-    """The increments of an axis; twice as many points as the curve needs, and twice again, while that rounds less."""
+def pitch_of(request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int) -> Pitch | None:
+    """The increments of an axis; twice as many points as the curve needs, and twice again, while that rounds less.
+
+    step    what a detection unit adds to a correction, mm or rad: below zero where increments are errors
+    number  the first point that is free
+    """
     if not tables:
         return None
     cells = len(tables[0].nodes[0]) - 1
-    best = _with_cells(request, axis, tables, sense, units, number, cells)
+    best = _with_cells(request, axis, tables, step, number, cells)
     while best is not None and best.magnification > 1 and 2 * cells < MOST - 1:
         cells *= 2
-        best = _with_cells(request, axis, tables, sense, units, number, cells)
+        best = _with_cells(request, axis, tables, step, number, cells)
     return best
 
 
 def _with_cells(
-    request: Request,
-    axis: str,
-    tables: tuple[Grid, ...],
-    sense: int,
-    units: tuple[float, float],
-    number: int,
-    cells: int,
+    request: Request, axis: str, tables: tuple[Grid, ...], step: float, number: int, cells: int
 ) -> Pitch | None:
     """The increments with about so many intervals, if they make the axis better: the value at zero cannot be said.
 
@@ -74,7 +70,7 @@ def _with_cells(
     curve: Array = mean - at_zero(tables)
     if turn:
         curve[-1] = curve[0]
-    increments, magnification = diffused(sense * curve / units[int(described.rotary)])
+    increments, magnification = diffused(curve / step)
     if not increments.any() or np.mean((mean - curve) ** 2) > np.mean(mean**2):
         return None
     if turn:

@@ -79,15 +79,13 @@ class FanucPitch(Control):
     def write(self, request: Request) -> Written:
         """The increments of every axis that has something to correct, and the parameters."""
         settings = self.settings(request.settings)
-        sense = sense_of(settings["sign"])
-        units = units_of(settings)
-        axes = in_order(request.machine)
+        sense, units = sense_of(settings["sign"]), units_of(settings)
+        axes, turning = in_order(request.machine), {axis.name for axis in request.machine.axes if axis.rotary}
         tables, notes = curves(request), []
         found: list[Pitch] = []
         for axis in axes:
-            made = pitch_of(
-                request, axis, tables.get(axis, ()), sense, units, found[-1].last + 1 if found else FIRST_NUMBER
-            )
+            number = found[-1].last + 1 if found else FIRST_NUMBER
+            made = pitch_of(request, axis, tables.get(axis, ()), sense * units[int(axis in turning)], number)
             if made is not None:
                 found.append(made)
                 notes.append(_said(made, units))

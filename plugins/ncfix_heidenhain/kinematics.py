@@ -159,7 +159,9 @@ class KinematicsComp(Control):
             com, found = read_com(name, files[name])
             remarks.append(found)
             if com is not None:
-                _take(axis, com, axes, sense, components, own, found)
+                grids, terms = _grids(axis, com, axes, sense, found)
+                components |= grids
+                own += terms
         _check_names(chain, components, table)
         return Kinematics(chain, sense, angle, components, tuple(own)), remarks
 
@@ -184,15 +186,12 @@ def _com(errors: Component, axes: tuple[str, ...], sense: float, angle: float) -
     return Com(errors.nodes / unit_of(errors.axis), columns, back)
 
 
-def _take(
-    axis: str,
-    com: Com,
-    axes: tuple[str, ...],
-    sense: float,
-    components: dict[tuple[str, str], Grid],
-    own: list[Term],
-    remarks: Remarks,
-) -> None:
+def _grids(
+    axis: str, com: Com, axes: tuple[str, ...], sense: float, remarks: Remarks
+) -> tuple[dict[tuple[str, str], Grid], list[Term]]:
+    """The columns C1 to C6 of an axis as they stand in the file, and the table of the axis over itself."""
+    components: dict[tuple[str, str], Grid] = {}
+    own: list[Term] = []
     nodes = com.nodes * unit_of(axis)
     for name, values in com.columns.items():
         if name.startswith("C") and name != "C":
@@ -201,6 +200,7 @@ def _take(
             own += _own(axis, nodes, -sense * unit_of(axis) * values, com, -sense * unit_of(axis))
         else:
             remarks.refuse(0, f"the column {name} is not that of the axis itself, nor C1 to C6")
+    return components, own
 
 
 def _own(axis: str, nodes: Array, values: Array, com: Com, factor: float) -> tuple[Term, ...]:
