@@ -307,3 +307,13 @@ def test_what_was_written_elsewhere_is_verified_with_the_subprograms_of_the_orig
     ncfix("fix", program, *given, "-o", out, "--allow-refused")
     result = ncfix("verify", program, out, *given, "--tolerance-um", "1000")
     assert result.code == ExitCode.DONE, result.err
+
+
+def test_simulate_and_verify_say_that_what_they_take_for_meant_has_been_corrected(shop: Any, ncfix: Any) -> None:
+    fixed, given = shop.folder / "fixed.ngc", ("-m", shop.machine, "--assume-zero")
+    assert ncfix("fix", shop.program, "-o", fixed, *given).code == ExitCode.DONE
+    line = 1 + next(k for k, text in enumerate(fixed.read_text().splitlines()) if "ncfix" in text.lower())
+    for arguments in (("simulate", "--program", fixed), ("verify", fixed, shop.program)):
+        assert f"{fixed}:{line}: NCF430" in ncfix(*arguments, *given).err
+    for arguments in (("simulate", "--program", shop.program), ("verify", shop.program, fixed)):
+        assert "NCF430" not in ncfix(*arguments, *given).err

@@ -9,7 +9,7 @@ from ncfix.cli.following import Following, figures
 from ncfix.cli.options import read_program
 from ncfix.cli.parts import Source, source_of
 from ncfix.cli.targets import STREAM
-from ncfix.cli.through import dialect_in, task_of, through
+from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
 from ncfix.diagnostics import SourceError
 
 if TYPE_CHECKING:
@@ -111,4 +111,6 @@ class Pair:
 def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
     """What this machine does with two programs, measured against what the first one means."""
     with source_of(original) as first, source_of(fixed) as second:
-        return Compared.of(Pair(following, first, second, tolerance_um).compared())
+        found = Compared.of(Pair(following, first, second, tolerance_um).compared())
+        tell_of_stamp(first)
+        return found

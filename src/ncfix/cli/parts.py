@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
@@ -68,6 +68,7 @@ class Source:
     """A text that can be read part by part, and again as a whole: what is read of a pipe is kept in a file.
 
     began  what the system said of a file at first
+    stamp  where the mark of a corrected program stands, if one of the first lines has it
     """
 
     path: str
@@ -76,6 +77,7 @@ class Source:
     began: os.stat_result | None = None
     head: bytes = b""
     taken: int = 0
+    stamp: Place | None = None
 
     def ground(self, out: int) -> Ground:
         """What other processes need to read the text, too, and to write into the file `out`."""
@@ -101,7 +103,14 @@ class Source:
 
         many = part_bytes()
         self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))
+        self.stamp = self._stamp(self.head[:PROBE_BYTES].splitlines())
         return len(self.head) >= many
+
+    def _stamp(self, first: Sequence[bytes]) -> Place | None:
+        from ncfix.program.stamp import SIGN
+
+        lines = enumerate((line.decode("latin-1") for line in first), start=1)
+        return next((Place(shown(self.path), number, 0, line) for number, line in lines if SIGN.search(line)), None)
 
     @property
     def first_lines(self) -> bytes:

@@ -18,7 +18,7 @@ from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_op
 from ncfix.cli.parts import Keep, Source, source_of
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, STREAM, Outputs, Target, check_streams, read, shown, targets
-from ncfix.cli.through import dialect_in, task_of, through
+from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
 
 if TYPE_CHECKING:
     from ncfix.cli.table import Columns
@@ -85,6 +85,7 @@ def _simulate_program(following: Following, program: str, target: Target | None,
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
         with console.busy(f"simulating {shown(program)}"):
             table, along = through([source], errors.in_parts, errors.whole)
+        tell_of_stamp(source)
         if target:
             target.write(table)
     found = figures(along)

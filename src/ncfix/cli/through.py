@@ -11,7 +11,7 @@ from ncfix.cli.following import ROTARY, Following, axes_of
 from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Source, part_bytes
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import DifferenceError, NcfixError, UsageError
+from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
 
 if TYPE_CHECKING:
     from ncfix.compensate.partition import Part, Parts
@@ -41,6 +41,13 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
         except (NcfixError, NotInPartsError):
             pass  # as wholes then; what is wrong with one of them is said there
     return as_wholes()
+
+
+def tell_of_stamp(source: Source) -> None:
+    """Say of a program whose numbers are to be what is meant that they have been corrected."""
+    if source.stamp:
+        text = "the program has been corrected already, and its corrected numbers are taken for what is meant"
+        console.tell(Message("NCF430", text, source.stamp, "give the original program"))
 
 
 def dialect_in(following: Following, source: Source) -> Dialect:
