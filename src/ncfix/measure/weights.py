@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtri, stdtrit
 
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import Solution
@@ -21,6 +21,7 @@ FALSE_ALARM = 0.001
 """How often one value of a clean measurement may be taken for an outlier."""
 HEAVY = 1.6
 """Noise has longer tails than the normal distribution: how much further out a value may be."""
+ROUNDING, TINY = 1e-12, 1e-300
 
 
 def spread(residual: Array) -> float:
@@ -54,7 +55,32 @@ def outliers(solution: Solution) -> NDArray[np.bool_]:
         shift = new
     left = residual - columns @ shift
     m, free = len(residual), max(len(residual) - columns.shape[1], 1)
-    deviation = spread(left) * np.sqrt(m / free)
     limit = -HEAVY * ndtri(FALSE_ALARM / (2 * m))
-    gross: NDArray[np.bool_] = np.abs(left) > limit * deviation
+    size = np.abs(left) / (spread(left) * np.sqrt(m / free))
+    return _confirmed(size > limit, size, columns, residual)
+
+
+def _confirmed(suspected: NDArray[np.bool_], size: Array, columns: Array, residual: Array) -> NDArray[np.bool_]:
+    """Those of the suspected (m,) that least squares of all others do not predict; the rest is no longer suspected.
+
+    With few values for the unknowns a robust fit follows some of them and leaves the others out in the cold; the t
+    distribution of what the others predict allows for how little they know. Residuals are those of least squares, of
+    sizes (m,) about the robust fit; columns are orthonormal.
+    """
+    gross = suspected.copy()
+    while gross.any():
+        aside = np.flatnonzero(gross)
+        free = len(residual) - columns.shape[1] - len(aside)
+        far = np.zeros(len(aside))
+        if free > 0:
+            inverse = np.linalg.inv((1 + ROUNDING) * np.eye(len(aside)) - columns[aside] @ columns[aside].T)
+            missed = inverse @ residual[aside]
+            noise = max(float(residual @ residual - residual[aside] @ missed) / free, 0.0)
+            limit = HEAVY * float(stdtrit(free, 1 - FALSE_ALARM / (2 * len(residual))))
+            far = np.abs(missed) / np.maximum(limit * np.sqrt(noise * np.diag(inverse)), TINY)
+        near = aside[far <= 1]
+        if not len(near):
+            break
+        order = np.lexsort((size[near], far[far <= 1]))
+        gross[near[order[: (len(near) + 1) // 2]]] = False
     return gross
