@@ -317,6 +317,15 @@ def test_the_middle_between_two_outputs_goes_one_by_one() -> None:
     assert number_text.is_plain(values, decimals).tolist() == [False, True, False, False]
 
 
+def test_words_of_more_digits_than_the_control_resolves() -> None:
+    """Axes without words that are half an output step off where such a word leaves them: ties, but for the last bit."""
+    lines = [line for n in range(60) for line in (f"X{n}.5 C{n / 27 + 0.0005:.4f}", f"X{n}.75")]
+    program, moves = followed("\n".join(["G90 G21 G94 G1 X0 Y0 Z0 B0 C0 F1000", *lines, "M2\n"]).encode())
+    rows, end, none = np.arange(len(moves)), moves.end.copy(), np.zeros(len(moves), dtype=bool)
+    end[2::2, 4] = np.radians(np.round(np.degrees(end[1::2, 4]) + 0.0005, 3))
+    assert_same(program, moves, Pieces(rows, np.ones(len(rows)), end, none, moves.centre, none))
+
+
 @EXAMPLES
 @given(st.binary(max_size=40), st.data())
 def test_many_edits_as_single_ones(source: bytes, data: st.DataObject) -> None:

@@ -287,12 +287,13 @@ class Stretch:
         values = np.where(kept, original, rounded(wanted, digits))
         add = np.zeros_like(present)
         if not present.all():
-            start, stays = frame.program(position), ~present & bulk.layouts.nameless(program, block)
+            start, stood = frame.program(position), frame.program(frame.command(values))
+            stays = ~present & bulk.layouts.nameless(program, block)
             for axis in range(len(position)):
                 near = with_those_before(np.flatnonzero(~present[:, axis]), len(block))
                 cells = near, axis
                 add[cells], clear[cells] = missing(
-                    start[axis], values[cells], present[cells], wanted[cells], clear[cells], stays[cells], half[0, axis]
+                    start[axis], stood[cells], present[cells], wanted[cells], clear[cells], stays[cells], half[0, axis]
                 )
             alone = np.flatnonzero(further)
             clear[alone[~add[alone].any(axis=1)]] = False

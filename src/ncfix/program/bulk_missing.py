@@ -31,7 +31,8 @@ def missing(
 ) -> tuple[Mask, Mask]:
     """Where an axis without a word must stand elsewhere by half an output step, (k,), and what is `clear` then.
 
-    start  program number of where the control stands before the stretch
+    start   program number of where the control stands before the stretch
+    values  program numbers of where it stands behind each piece, if that tells it to go there
     rows of pieces that have a word may be left out, unless one that lacks it comes next
     stays  it gets no word; where it must stand elsewhere by more than what rounding does to it, that is not clear
 
