@@ -140,6 +140,16 @@ def test_a_full_circle_behind_a_blank_becomes_lines():
     assert text.splitlines()[2:5:2] == [" G1  X2.000", "G2 X4 Y0 I1 J0"]
 
 
+@pytest.mark.parametrize(("block", "begins"), [("N30 I-1. J0.", "N30 G1 "), ("n30i-1.j0.", "n30g1")])
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc"])
+def test_a_full_circle_without_words_of_axes_keeps_its_number_in_front(block: str, begins: str, dialect: str):
+    text = f"G0 X0. Y0. Z0.\nG2 X2. Y0. I1. J0. F9\n{block}\nM2\n"
+    program = read(text.encode(), "test", dialect)
+    moves = trace(program, GIVEN, AXES, frozenset()).moves
+    emission = emit(program, moves, split(moves, 2, 0.5), STEP)
+    assert apply(program.source, emission.edits).decode().splitlines()[2].startswith(begins)
+
+
 @pytest.mark.parametrize(
     ("dialect", "text"),
     [("linuxcnc", "#1=2\nG0 X0 Y0 Z0\nG93\nG1 X10. F#1\nM2\n"), ("fanuc", "F9.\nG0 X0 Y0 Z0\nG93\nG1 X10.\nM2\n")],

@@ -101,7 +101,8 @@ class BlockWords:
 def layout_of(program: Program, block: int) -> Layout:
     """The layout of a motion block."""
     words = BlockWords(program, block)
-    words_at, code_at, blank = words.beside(list(words.axes.values()) or words.words)
+    numbered = [word for word in words.words if word.address != "N"]
+    words_at, code_at, blank = words.beside(list(words.axes.values()) or numbered or words.words)
     return Layout(
         axes=words.axes,
         centre=words.some(CENTRE_LETTERS),
