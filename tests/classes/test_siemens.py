@@ -27,6 +27,7 @@ WORDS = [
     case("an increment from nobody knows where", "HEAD_CLEAN\nG91 G0 X5\nG90 X7 Y7 Z7", L4=N, L5=R),
     case("inches", "G700\nG1 X1 Y.5 F10\nG91 X.25", L4=R, L5=R),
     case("diameters", "DIAMON\nG1 X5 F100\nDIAMOF\nX7", L4=R, L6=R),
+    case("no X beside diameters", "DIAM90\nG1 X6 F100\nG91 Y1\nG3 I-4 J1\nG90 G1 X7", L4=R, L5=N, L6=N, L7=R),
     case("radii beside diameters", "DIAM90\nG1 X6 F100\nG91 X1", L4=R, L5=N),
     case("expressions of constants", "R1=5\nDEF REAL DEEP=-2\nG1 X=R1*2 Z=DEEP F100", L5=R),
     case("a frame variable", "$P_UIFR[1,X,TR]=5\nG54 G1 X5 F100", L4=N),

@@ -100,10 +100,12 @@ class Leg(NamedTuple):
 
 
 def destination(control: Sinumerik, words: Words) -> End:
-    """The command at which a motion of this block ends."""
+    """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
     program = control.program_position()
     lost = dict(control.lost)
     moved = set()
+    if control.modal.incremental and control.modes.diameter == "DIAM90":
+        words.refusal = words.refusal or RADIUS
     for letter in LETTERS:
         if letter in words.values:
             place(control, words, letter, program, lost)
