@@ -3,7 +3,7 @@
 import gc
 import sys
 
-YOUNG = 50_000
+YOUNG = 100_000
 """New objects after which Python looks for cycles among them; what is imported stays, and is most of a short run."""
 
 
