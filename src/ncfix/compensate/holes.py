@@ -14,18 +14,17 @@ from ncfix.compensate.ragged import owners, places
 
 
 def over_holes(search: Search, path: Curve, samples: Samples, before: Index, found: Nearest) -> tuple[Samples, Nearest]:
-    """Samples of a path and what is nearest to them, and the same for where the path goes over holes of the other one.
+    """More samples of a path, where it goes over holes of the other one, and what is nearest to them.
 
+    samples, found  (n,) those that there are
     before  (n,) the parabola of the other one that is nearest to the place before each sample
     """
     rows, middles = _crossed(search, samples, before, found.piece)
-    if not len(rows):
-        return samples, found
     piece, share = samples.piece[rows], _beside(path, samples, rows, middles)
     points = path.point(piece, share)
     back = (samples.share[rows] - share) * path.ways[piece]
     more = search.around(points, search.curve.way(found.piece, found.share)[rows] - back)
-    return samples.and_more(Samples(piece, share, points, np.zeros(len(rows)))), found.and_more(more)
+    return Samples(piece, share, points, np.zeros(len(rows))), more
 
 
 def _crossed(search: Search, samples: Samples, before: Index, behind: Index) -> tuple[Index, Array]:

@@ -7,7 +7,7 @@ the point, all of it is looked at that could be nearer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,10 @@ class Nearest:
     def taken(self, which: Index) -> Nearest:
         """For some of the points."""
         return Nearest(self.piece[which], self.share[which], self.gap[which])
+
+    def shifted(self, by: int) -> Nearest:
+        """The same, with the parabolas counted from elsewhere."""
+        return replace(self, piece=self.piece + by)
 
     def way(self, curve: Curve) -> Array:
         """The ways along the curve to there, (n,) mm; so far inside of the parabolas that rounding shows no others."""

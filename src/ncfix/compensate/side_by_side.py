@@ -26,7 +26,8 @@ from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.holes import over_holes
-from ncfix.compensate.nearest import Search
+from ncfix.compensate.nearest import Nearest, Search
+from ncfix.compensate.peaks import over_peaks
 from ncfix.diagnostics import DifferenceError
 
 UNLIKE = 0.02
@@ -106,7 +107,7 @@ class Match:
     near   as `Search` has it
     done   parabolas of the path that have been looked at
     ahead  how much farther one is along the other path at the end of these, mm
-    last   the parabola of the other path, counted from its begin, that is nearest to that end
+    last   where the other path, its parabolas counted from its begin, is nearest to that end
     """
 
     path: Track
@@ -115,7 +116,7 @@ class Match:
     along: Along
     done: int = 0
     ahead: float = 0.0
-    last: int | None = None
+    last: Nearest | None = None
 
     def go_on(self) -> None:
         """Look from as much of the path as there is enough of the other for, by whole groups but at its end."""
@@ -137,9 +138,15 @@ class Match:
         search = Search(other.curve, self.near, self.ahead, other.dropped == 0, other.complete)
         groups = np.searchsorted(samples.piece, np.arange(GROUP, len(part), GROUP))
         found = search.all(samples.points, part.way(samples.piece, samples.share), groups)
-        before = np.append(found.piece[0] if self.last is None else self.last - other.dropped, found.piece[:-1])
-        self.ahead, self.last = search.ahead, int(found.piece[-1]) + other.dropped
-        samples, found = over_holes(search, part, samples, before, found)
+        last = found.taken(np.array([0])) if self.last is None else self.last.shifted(-other.dropped)
+        before, at_end = last.and_more(found.taken(np.arange(len(found.gap) - 1))), np.array([len(found.gap) - 1])
+        self.ahead, self.last = search.ahead, found.taken(at_end).shifted(other.dropped)
+        between = [
+            over_holes(search, part, samples, before.piece, found),
+            *over_peaks(search, part, samples, before, found),
+        ]
+        for more in between:
+            samples, found = samples.and_more(more[0]), found.and_more(more[1])
         gap = found.gap if flank is None else flank.taken(slice(start, stop)).there(search, part, samples, found)
         if other.flank is not None:
             gap = other.flank.back(search, samples.points, found)
