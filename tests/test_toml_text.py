@@ -30,7 +30,7 @@ date = 1
 '''
 
 
-def test_lines() -> None:
+def test_the_line_of_every_key() -> None:
     lines = key_lines(TEXT)
     expected = {
         ("name",): 1,

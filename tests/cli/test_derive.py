@@ -45,7 +45,7 @@ def test_python_runs(ncfix: Any, root: Path, tmp_path: Path) -> None:
     assert ncfix("derive", "-m", root / HEAD, "--effects", "EXX", "-o", path, "--force").code == 0
 
 
-def test_letters(ncfix: Any, root: Path) -> None:
+def test_constant_angles_keep_their_letters_if_asked(ncfix: Any, root: Path) -> None:
     arguments = ("derive", "-m", root / HEAD, "--effects", "EXA")
     assert b"cos(5*pi/18)" in ncfix(*arguments).out
     text = ncfix(*arguments, "--letters").out

@@ -31,7 +31,7 @@ def test_the_last_direction_is_kept_at_rest_and_unknown_before_the_first() -> No
     assert carried(signs(motion)).tolist() == [[0, 1], [1, 1], [1, 1], [-1, 1], [-1, 1]]
 
 
-def test_along_lines() -> None:
+def test_the_way_in_which_axes_end_straight_motions() -> None:
     machine = with_play("w F X Y Z t")
     moves = motions(machine, (0, 0, 0), [(5, 0, 0), (5, 5, 0), (2, 5, 0), (2, 5, -1)])
     arrival = Intent(machine, moves, State()).arrival

@@ -101,7 +101,7 @@ def test_the_machine_of_the_benchmarks_is_bounded(root: Path) -> None:
     assert found[0] < bound[0] < 1e-4
 
 
-def test_not_known(root: Path) -> None:
+def test_without_ranges_or_with_products_no_bound_is_known(root: Path) -> None:
     """Without ranges polynomials have no bounds, and neither have products of signals."""
     axes = (Axis("X", False, False, (1.0, 0.0, 0.0)),)
     machine = Machine("one", "w F X t", axes, Tool(), (Effect("EXX", (1e-3,), Polynomial((1,))),))

@@ -97,7 +97,7 @@ def test_curves_that_come_transposed() -> None:
         assert np.array_equal(plain, compiled)
 
 
-def test_not_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_may_forbid_compiled_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NCFIX_NO_FAST", "1")
     assert not fast.engage()
     assert not fast.engaged()

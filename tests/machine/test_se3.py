@@ -23,7 +23,7 @@ def test_rotations(vector: np.ndarray) -> None:
     np.testing.assert_allclose(se3.rotation(vector), expected, atol=1e-14)
 
 
-def test_theory_example_of_the_seed() -> None:
+def test_the_printed_example_of_a_rotation() -> None:
     """Ellingsdalen 2021, section 2: w = (0, .866, .5), 30 degrees, three printed digits, .8995 cut off."""
     turned = se3.rotation(np.deg2rad(30) * np.array([0.0, 0.866, 0.5]))
     expected = [[0.866, -0.250, 0.433], [0.250, 0.967, 0.058], [-0.433, 0.058, 0.899]]

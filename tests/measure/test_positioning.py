@@ -19,7 +19,7 @@ def readings(value: np.ndarray, side: np.ndarray, component: str = "EXX") -> Mea
     return Measurement("axis", (), columns, labels)
 
 
-def test_by_hand():
+def test_figures_of_two_runs_worked_out_by_hand():
     up, down = np.array([[0.0, 4.0], [2.0, 6.0]]), np.array([[-3.0, 1.0], [-1.0, 3.0]])
     value = np.concatenate([up, down]) * 1e-3
     side = np.concatenate([np.ones((2, 2)), -np.ones((2, 2))])

@@ -136,7 +136,7 @@ def test_the_sample_is_read_and_written_again_identically(shared: Callable[[str]
     )
 
 
-def test_limits() -> None:
+def test_a_table_beyond_the_limits_of_the_control_is_told() -> None:
     axis, trans = Row("MachAxis", "X"), Row("Trans", "Y", 1.0, 0.1)
     assert not list(over_limits([axis, *[trans] * 49]))
     assert "51 rows" in next(over_limits([axis, *[trans] * 50]))

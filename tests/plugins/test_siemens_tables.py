@@ -231,11 +231,11 @@ def test_samples_are_read_and_written_again_identically(shared: Callable[[str], 
 def test_what_the_samples_lack_is_named(shared: Callable[[str], Path]) -> None:
     """Two leave values out, one has a value too many and (MAX - MIN) / STEP not whole in the manual itself."""
     folder = shared("tables") / "siemens"
-    seed, manual = (
+    figure, manual = (
         {message.text for message in CONTROL.lint({"a.ini": (folder / f"{name}.ini").read_bytes()})}
         for name in ("cec_fig73_seed001", "cec_802Dsl_manual_example")
     )
-    assert "table 3 has values 0 to 13 by its MIN, MAX and STEP; this one is ignored" in seed
+    assert "table 3 has values 0 to 13 by its MIN, MAX and STEP; this one is ignored" in figure
     assert any("not a whole number: the control would move the end" in text for text in manual)
     eec = CONTROL.lint({"b.ini": (folder / "eec_manual_example.ini").read_bytes()})
     assert any("797 of 801 values of X1 are missing, first $AA_ENC_COMP[0,3,X1]" in each.text for each in eec)

@@ -67,7 +67,7 @@ def assert_same(found: Scan, meant: Scan) -> None:
 @pytest.mark.parametrize("pointless", [False, True])
 @pytest.mark.parametrize("others", [0.0, 0.02, 0.3])
 @pytest.mark.parametrize("line", USUAL)
-def test_as_any_text(line: str, others: float, pointless: bool) -> None:
+def test_lines_by_an_example_are_scanned_as_any_text(line: str, others: float, pointless: bool) -> None:
     random = Random(line + str(others))
     for numbers in (NUMBERS, NUMBERS[:2], NUMBERS[:6], ("5.0625",), ("-17", "4")):
         source = text_of(random, line, numbers, others)
@@ -94,7 +94,7 @@ def test_what_an_example_says() -> None:
     assert example.key(b"\1", b"\3") == b"N\3 G01.1X\1 Y\3 F\1"
 
 
-def test_in_slices(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_text_in_slices_is_scanned_as_in_one(monkeypatch: pytest.MonkeyPatch) -> None:
     source = text_of(Random(1), USUAL[0], NUMBERS, 0.3)
     blocks = split_blocks(source)
     whole = scan_any(source, blocks, pointless=False)

@@ -28,7 +28,7 @@ most_blocks = 20_000_000
 """
 
 
-def test_everything() -> None:
+def test_every_key_is_read() -> None:
     assert loads(FULL) == Setup(
         work_offsets={"G54": {"X": 1, "Y": 2, "Z": 3, "A": 10, "B": 20, "C": 30}, "G59.1": {"X": 7.5}},
         tools={12: Tool(120.0, 5.0), 3: Tool(80.5, None)},
@@ -43,7 +43,7 @@ def test_everything() -> None:
     )
 
 
-def test_nothing() -> None:
+def test_an_empty_file_is_an_empty_setup() -> None:
     assert loads("") == Setup()
 
 
@@ -105,7 +105,7 @@ def test_names_with_dots_are_found() -> None:
     assert [message.place.line for message in caught.value.messages if message.place] == [2, 4]
 
 
-def test_files(tmp_path: Path) -> None:
+def test_files_are_utf_8_with_or_without_its_mark(tmp_path: Path) -> None:
     path = tmp_path / "setup.toml"
     path.write_text(FULL, encoding="utf-8")
     assert load(str(path)) == loads(FULL)

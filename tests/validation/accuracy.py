@@ -2,7 +2,7 @@
 
     python tests/validation/accuracy.py [STUDY...] [--draws N] [--chains N] [-o FILE]
 
-The text is that of accuracy_seeds.md and accuracy_checklists.md, beside this file; in it a study's table replaces its
+The text is that of accuracy_text.md and accuracy_checklists.md, beside this file; in it a study's table replaces its
 mark `<!-- name -->`.
 Studies that are not asked for keep what the page has for them, and so does the hidden-effect benchmark's section, which
 `make hidden` writes.
@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
 from tests.hidden import tally  # noqa: E402
 
-TEMPLATE = Path(__file__).with_name("accuracy_seeds.md")
+TEMPLATE = Path(__file__).with_name("accuracy_text.md")
 CHECKLISTS = Path(__file__).with_name("accuracy_checklists.md")
 PAGE = ROOT / "docs" / "accuracy.md"
 

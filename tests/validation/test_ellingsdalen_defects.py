@@ -1,8 +1,7 @@
 """What the defects of the thesis's machine model cost, each alone, on its own machine.
 
 Left: the model as it is listed (Listings 3.2 to 3.4, appendix D.1), written out here. Right: ncfix's. The numbers are
-residuals after a correction with the listed model of a machine that has the error that ncfix models. The digest of the
-seed calls them bugs 1, 2, 3, 4 and 6 of section 6.2.
+residuals after a correction with the listed model of a machine that has the error that ncfix models.
 """
 
 from __future__ import annotations
