@@ -1,4 +1,4 @@
-"""Which scenarios there are: a family for every line of the acceptance list, and the seeds of both runs.
+"""Which scenarios there are: a family for every line of the table in docs/accuracy.md, and the seeds of both runs.
 
 Development seeds are small numbers, for whoever works on the code under test. Final seeds come out of a fixed hash
 and lie in another range; they are run once and reported as they came.

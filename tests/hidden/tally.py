@@ -1,6 +1,4 @@
-"""Records to the table of the acceptance list: every line with its interval, what is required, and the prototype's
-figure.
-"""
+"""Records to the table of docs/accuracy.md: each line with its interval, what is wanted, and the prototype's figure."""
 
 from __future__ import annotations
 
@@ -178,7 +176,9 @@ ncfix; `ncfix diagnose` gets the machine file and the measurements. Unless a lin
 good design, 3 um of noise a coordinate with tails, outliers and memory, every other effect at once at 1 um in total, 52
 to 73 effects that may be hidden, four machines, kinds tcp, probe and length. Machines, shapes, lags and noise are drawn
 anew for every seed. What is simulated and how an answer is judged is in `tests/hidden/README.md`. Written by `make
-hidden`. "Met" is about the value as it came; the interval says how sure it is with that many scenarios."""
+hidden`. "Met" is about the value as it came; the interval says how sure it is with that many scenarios. "Wanted" was
+set before anything was run; "prototype" is what a first program came to, which is no part of ncfix, on scenarios of its
+own."""
 
 
 def markdown(records: Sequence[Record], run: str, earlier: str = "") -> str:
