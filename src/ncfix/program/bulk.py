@@ -157,6 +157,20 @@ class Bulk:
         self.put(words.splices(self.program, self.layouts, manner))
         return clear, words.centre
 
+    def alone(self, row: int, stop: int) -> list[int]:
+        """The arcs from motion `row` up to `stop` that the renderer writes."""
+        alone = self.layouts.alone
+        if not alone.any():
+            return []
+        found: list[int] = (row + np.flatnonzero(alone[self.program.template[self.moves.block[row:stop]]])).tolist()
+        return found
+
+    def take_out(self, rows: list[int]) -> None:
+        """Nothing stays written of some motions of the stretch that was taken last."""
+        if rows:
+            self.parts[-1] = self.parts[-1].outside(self.program.blocks[self.moves.block[rows]])
+            self.added -= int(np.diff(self.first_piece)[rows].sum()) - len(rows)
+
     def _manner(self, decimals: IntArray) -> Manner:
         return Manner(self.text, decimals, _halves(decimals), self.layouts.manner.signed)
 

@@ -64,6 +64,7 @@ class Layouts:
     fixed      (s, 3) which of these count from the origin
     centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
     radius     (s,) which of them is R, or `NONE`
+    alone      (s,) the renderer writes them
     taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
     manner     how numbers and lines are written
     """
@@ -84,6 +85,7 @@ class Layouts:
     centre_heads: NDArray[np.uint8]
     radius: IntArray
     taken: IntArray
+    alone: NDArray[np.bool_]
     manner: Manner = NOTHING_SPECIAL
 
     @classmethod
@@ -108,6 +110,7 @@ class Layouts:
             np.zeros((n, 3, 2), np.uint8),
             np.full(n, NONE),
             np.zeros((n, 2, 2), np.int64),
+            np.zeros(n, np.bool_),
         )
         if language.bulk is not None and len(moves):
             shapes = program.template.take(moves.block)
@@ -141,7 +144,7 @@ class Layouts:
 
     def _enter_arc(self, shape: int, layout: BulkLayout, arc: ArcLayout) -> None:
         """Fill in what the row of a shape says about arcs."""
-        self.round[shape] = True
+        self.round[shape], self.alone[shape] = True, arc.alone
         self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
         self.fixed[shape] = [letter in arc.fixed for letter in CENTRE_LETTERS]
         letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.program.bulk import Bulk
+from ncfix.program.bulk_alone import write_alone
 from ncfix.program.frames import FrameMap
 from ncfix.program.language import BlockLayout, language_of
 from ncfix.program.levels import LevelBook
@@ -188,9 +189,22 @@ class _Emitter:
         self.start[row] = self.position
         self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
         self.in_stretch[row:stop] = True
-        self.position = ends[-1].copy()
         self.cycle_end = None
+        self._write_alone(row, stop)
+        self.position = self.end[first + len(ends) - 1].copy()
         return stop - row
+
+    def _write_alone(self, row: int, stop: int) -> None:
+        """Write the arcs of a stretch that the renderer has to write."""
+        rows = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
+        self.in_stretch[rows] = False
+        self.bulk.take_out(rows)
+
+    def _written(self, row: int) -> FloatArray:
+        """Write a motion by itself from its start on; the command at its end."""
+        self.position, self.replaced = self.start[row], None
+        (self._keep if self.pieces.kept[self.first_piece[row]] else self._write)(row)
+        return np.asarray(self.position)
 
     def _write_centres(self) -> None:
         """Write the centres of the arcs in stretches; where these are not clear, the arc by itself."""
@@ -204,8 +218,7 @@ class _Emitter:
             clear, centre = self.bulk.turn(own, ends, self.frames[frame], self.decimals[frame])
             self.centre[at[clear]] = centre
             for row in own[~clear].tolist():
-                self.position, self.replaced = self.start[row], None
-                self._write(row)
+                self._written(row)
 
     # -- the control's book -------------------------------------------------------------------------------------------
 
@@ -325,7 +338,7 @@ class _Emitter:
             arc=arc,
             centre=frame.program_point(pieces.centre[rows.start]) if arc else NOWHERE,
             original_centre=as_programmed.program_point(moves.centre[row]) if kind == Kind.ARC else NOWHERE,
-            origin=_spatial(nominal_start, moves.axes, as_programmed),
+            origin=as_programmed.point_of(nominal_start),
             plane=plane_across(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
             spatial=self.spatial,
             diameter=frame.frame.diameter,
@@ -385,11 +398,3 @@ class _Emitter:
                 self.added += len(rendered.lines)
         self.latest = []
         return edits
-
-
-def _spatial(program: FloatArray, axes: tuple[str, ...], frame: FrameMap) -> FloatArray:
-    """X Y Z of a start position in the numbers in which centres are given (no diameters)."""
-    values = np.array([program[axes.index(c)] if c in axes else 0.0 for c in "XYZ"])
-    if frame.frame.diameter:
-        values[0] /= 2
-    return values

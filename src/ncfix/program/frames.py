@@ -20,8 +20,8 @@ class FrameMap:
         if frame.diameter and "X" in axes:
             self.scale[axes.index("X")] /= 2
         self.spatial = [axes.index(letter) for letter in "XYZ" if letter in axes]
-        keep = ["XYZ".index(letter) for letter in "XYZ" if letter in axes]
-        self.rotation = frame.rotation[np.ix_(keep, keep)]
+        self.axes = ["XYZ".index(letter) for letter in "XYZ" if letter in axes]
+        self.rotation = frame.rotation[np.ix_(self.axes, self.axes)]
         self.rotated = not np.array_equal(frame.rotation, np.eye(3))
         self.unit = frame.unit
         self.origin = np.array([frame.offset[axes.index(letter)] if letter in axes else 0.0 for letter in "XYZ"])
@@ -58,6 +58,14 @@ class FrameMap:
     def program_point(self, point: FloatArray) -> FloatArray:
         """A point X Y Z (mm, command coordinates) in program numbers; diameters do not apply to centres."""
         return np.asarray((point - self.origin) @ self.frame.rotation / self.unit)
+
+    def point_of(self, program: FloatArray) -> FloatArray:
+        """X Y Z (3,) of a position (n_axes,) in the numbers in which centres are given: no diameters."""
+        point = np.zeros(3)
+        point[self.axes] = program[self.spatial]
+        if self.frame.diameter:
+            point[0] /= 2
+        return point
 
     def command_point(self, point: FloatArray) -> FloatArray:
         """The inverse of `program_point`, (..., 3)."""

@@ -48,11 +48,13 @@ class ArcLayout:
     centre  I J K -> which of the block's numbers each has
     fixed   which of them count from the origin, whatever else is in force
     radius  which of them R has, and where that word stands, with the blank before it; None without
+    alone   none of this is known: the renderer writes the arc, once the motions around it are written
     """
 
     centre: Mapping[str, int]
     radius: tuple[int, Span] | None = None
     fixed: frozenset[str] = frozenset()
+    alone: bool = False
 
 
 @dataclass(frozen=True, slots=True)

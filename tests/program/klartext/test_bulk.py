@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from random import Random
+from unittest import mock
 
 import numpy as np
 import pytest
 
-from ncfix.program import bulk
+from ncfix.program import bulk, emit
 from ncfix.program.dialects import get
 from ncfix.program.klartext.bulk import in_bulk
-from ncfix.program.moves import Moves
+from ncfix.program.moves import Kind, Moves
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
+from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, program
-from program.test_bulk import AXES, ROTARY, assert_same, moved
+from program.test_bulk import AXES, ROTARY, STEPS, assert_same, moved
 
 OTHERS = (
     "; remark 12",
@@ -38,6 +40,7 @@ OTHERS = (
     "/ L X+3",
 )
 ODD_NUMBERS = ("0", "+0.0", "-.25", ".5", "007.5", "-012", "+5.00000", "+ 2.5", "359.9999", "+360", "-0.0")
+DWELL = "CYCL DEF 9.0\nCYCL DEF 9.1 V.ZEIT 0.5"
 MANY = 24
 """Programs of each kind."""
 
@@ -89,6 +92,27 @@ def test_many_at_a_time_as_one_by_one(comma: bool, odd: float) -> None:
         assert_same(found, moves, moved(moves, seed, (0.0, 0.0003, 0.01, 0.7)[seed % 4]))
 
 
+@pytest.mark.parametrize("size", [0.0, 0.0003, 0.01, 0.7])
+@pytest.mark.parametrize("comma", [False, True])
+def test_arcs_among_many_at_a_time_as_one_by_one(comma: bool, size: float) -> None:
+    for seed in range(MANY):
+        random, blocks = Random(seed), full_of_klartext_arcs(seed, 40, comma=comma)
+        for place, block in enumerate(blocks):
+            if "CC" not in block and random.random() < 0.1 * (seed % 3):
+                blocks[place] = random.choice([motion(random, comma), DWELL, *OTHERS[:-1]])
+        source = program("\n".join(["TOOL CALL 1 Z S1000", "L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *blocks]))
+        found, moves = followed(source, ("same", "none")[seed % 2])
+        assert_same(found, moves, moved(moves, seed, size))
+
+
+def test_motions_between_arcs_are_written_at_once() -> None:
+    arcs = (f"L X{n} Y0 Z{n % 3}\nCR X{n + 3} Y4 R+9 DR-\nCC X{n} Y0\nC X{n} Y5 DR+" for n in range(1, 60))
+    found, moves = followed(program("\n".join(["L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *arcs])), "same")
+    with mock.patch.object(emit._Emitter, "_write", autospec=True, side_effect=emit._Emitter._write) as one_by_one:
+        emit.emit(found, moves, moved(moves, 3, 0.0003), STEPS)
+    assert {Kind(moves.kind[call.args[1]]) for call in one_by_one.call_args_list[1:]} == {Kind.ARC}
+
+
 def test_most_are_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     taken, take = [], bulk.Bulk.take
 
@@ -111,7 +135,9 @@ def test_most_are_written_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         "L IX+1",
         "LP PR+1 PA+2",
         "L X+Q1",
-        "CR X+1 Y+1 R+5 DR+",
+        "CR X+1 R+5 DR+",
+        "CP IPA+5 DR+",
+        "CT X+1 Y+1",
         "/ L X+1",
         "L X+1  Y+1",
         "LN X+1 TX+0 TY+0 TZ+1",

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ncfix.program.klartext.layout import CORNERS, Layout, is_between, layout_of
 from ncfix.program.klartext.turns import FULL
-from ncfix.program.language import BulkLayout
+from ncfix.program.language import ArcLayout, BulkLayout
 from ncfix.program.moves import Moves
 from ncfix.program.pieces import Pieces
 from ncfix.program.tree import (
@@ -28,6 +28,7 @@ from ncfix.program.tree import (
 Mask = NDArray[np.bool_]
 
 STRAIGHT = frozenset({"", "l", "ln"})
+ARCS = frozenset({"c", "cr"})
 FEW = 1e-6
 """Degrees from zero or a full turn at which a corrected angle is looked at by the renderer."""
 
@@ -38,9 +39,9 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
     if any(isinstance(item, Skip | Opaque | Flow | Assignment) for item in items):
         return None
     layout = layout_of(program, block)
-    if layout is None or layout.name not in STRAIGHT or not layout.axes or len(layout.blank) != 1:
+    if layout is None or layout.polar or layout.vector or len(layout.blank) != 1:
         return None
-    if layout.polar or layout.vector or layout.radius or layout.sense:
+    if not (layout.axes if layout.name in STRAIGHT else layout.name in ARCS and layout.axes.keys() >= {"X", "Y"}):
         return None
     slots = {letter: w.value.slot for letter, w in layout.axes.items() if isinstance(w.value, Literal)}
     if len(slots) < len(layout.axes) or any(word.address[0] == "I" for word in layout.axes.values()):
@@ -50,13 +51,14 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         layout.words_at,
         layout.blank,
         lower=False,
-        further=not layout.late,
+        further=layout.name in STRAIGHT and not layout.late,
         lead=lead_of(program, block, layout),
         opening="L",
         closing=f"{layout.blank}FMAX" if layout.rapid else "",
         signed=True,
         comma=layout.comma,
         turns_named=True,
+        arc=ArcLayout({}, alone=True) if layout.name in ARCS else None,
     )
 
 

@@ -181,13 +181,13 @@ class Renderer(HoleWriter):
 
     def _should_close(self) -> bool:
         """Whether the block is a full circle, and stays one: it has to end where it begins to the last digit."""
-        target, plane = self.target, list(self.target.plane[:2])
-        columns = [target.spatial[index] for index in plane]
-        if len(target.ends) > 1 or -1 in columns:
+        target = self.target
+        pairs = [(target.spatial[index], index) for index in target.plane[:2]]
+        if len(target.ends) > 1 or any(column < 0 for column, _ in pairs):
             return False
-        meant = np.abs(target.nominal[columns] - target.origin[plane]) < CLOSED
-        near = np.abs(target.ends[0] - target.start)[columns] < NEAR * self.half[columns]
-        return bool(meant.all() and near.all())
+        if any(abs(target.nominal[column] - target.origin[index]) >= CLOSED for column, index in pairs):
+            return False
+        return all(abs(target.ends[0, c] - target.start[c]) < NEAR * self.half[c] for c, _ in pairs)
 
     def _radius(self, found: ArcText) -> None:
         """The R word of CR."""
