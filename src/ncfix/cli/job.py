@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import gc
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from ncfix import __version__, fast
@@ -144,7 +146,7 @@ def _let_stay() -> None:
 
 def _written(fixed: Fixed, target: Target, options: FixOptions) -> Outcome:
     entry: dict[str, Any] = fixed.report.as_dict()
-    console.tell_some([*fixed.report.warnings, *_refusals(target.source, entry["refused"])])
+    console.tell_some(_with_lines([*fixed.report.warnings, *_refusals(target.source, entry["refused"])], target.source))
     refused = bool(entry["refused"]) and not options.allow_refused
     if not refused:
         _write(fixed, target)
@@ -164,6 +166,27 @@ def _write(fixed: Fixed, target: Target) -> None:
 
 def _refusals(source: str, refused: Sequence[dict[str, Any]]) -> list[Message]:
     return [Message(each["code"], each["reason"], Place(shown(source), each["line"])) for each in refused]
+
+
+def _with_lines(messages: Sequence[Message], source: str) -> list[Message]:
+    """Messages, those on lines of a program file with these lines."""
+    path = shown(source)
+    wanted = {each.place.line for each in messages if each.place and _is_bare(each.place, path)}
+    if not wanted or not os.path.isfile(source):
+        return list(messages)
+    with open(source, encoding="latin-1") as text:
+        lines = {n: line.rstrip("\n") for n, line in enumerate(islice(text, max(wanted)), start=1) if n in wanted}
+    return [
+        replace(each, place=replace(each.place, text=lines.get(each.place.line, "")))
+        if each.place and _is_bare(each.place, path)
+        else each
+        for each in messages
+    ]
+
+
+def _is_bare(place: Place, path: str) -> bool:
+    """Whether a place is a line of this file, and does not show it."""
+    return place.path == path and place.line > 0 and not place.text
 
 
 def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
