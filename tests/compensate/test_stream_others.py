@@ -204,6 +204,17 @@ def test_blocks_are_written_in_bulk_as_one_by_one(
     assert [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources] == found
 
 
+def test_tools_without_a_length_are_named_in_the_order_of_the_program(machine: Machine) -> None:
+    """In the stamp and in what is said; the second has the lower number."""
+    cut = [f"G1 X{150 + k % 5}. Y{150 + k % 7}. Z{5 + k % 3}.5" for k in range(20)]
+    lines = ["G21 G90 G94 G54 F500.", "T2 M6", "G0 X150. Y150. Z50. B0. C0.", *cut, "T1 M6", *cut, "M30", ""]
+    source = "\n".join(lines).encode()
+    assert compared(source, machine, "fanuc", 200, setup=CALCULATOR) == ""
+    text, report = streamed(source, machine, "fanuc", 200, setup=CALCULATOR)
+    assert b"LENGTH OF TOOL 2, LENGTH OF TOOL 1)" in text
+    assert [each["line"] for each in report["warnings"] if each["code"] == "NCF437"] == [3, 25]
+
+
 @pytest.mark.parametrize("siemens", [True, False], ids=["sinumerik", "fanuc"])
 def test_two_processes_give_the_same_bytes(siemens: bool, machine: Machine) -> None:
     dialect, files = ("siemens", S_FILES) if siemens else ("fanuc", F_FILES)

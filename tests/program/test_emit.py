@@ -133,11 +133,12 @@ def test_an_arc_made_of_lines_states_the_codes_around_it():
     assert text.splitlines()[1:4] == ["G1 X1 Y0 F9", "X2.000", "G2 X4 I1 J0"]
 
 
-def test_a_full_circle_behind_a_blank_becomes_lines():
-    program, moves = traced("G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\n I-1 J0\nX4 Y0 I1 J0\nM2\n")
+@pytest.mark.parametrize("before", [" ", "N20 ", " N20 ", "/N20 "])
+def test_a_full_circle_without_a_word_of_an_axis_becomes_lines(before: str):
+    program, moves = traced(f"G0 X0 Y0 Z0\nG2 X2 Y0 I1 J0 F9\n{before}I-1 J0\nX4 Y0 I1 J0\nM2\n")
     emission = emit(program, moves, split(moves, 2, 0.5), STEP)
     text = apply(program.source, emission.edits).decode()
-    assert text.splitlines()[2:5:2] == [" G1  X2.000", "G2 X4 Y0 I1 J0"]
+    assert text.splitlines()[2:5:2] == [f"{before}G1  X2.000", "G2 X4 Y0 I1 J0"]
 
 
 @pytest.mark.parametrize(("block", "begins"), [("N30 I-1. J0.", "N30 G1 "), ("n30i-1.j0.", "n30g1")])

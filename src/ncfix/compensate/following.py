@@ -109,11 +109,11 @@ def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: S
 
 
 def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:
-    """Tool -> the first of the chosen motions (n,) that is made with it."""
+    """Tool -> the first of the chosen motions (n,) that is made with it, in the order of the program."""
     if not chosen.any():
         return {}
     tools, rows = np.unique(np.where(chosen, moves.tool, -1), return_index=True)
-    return {int(tool): int(row) for tool, row in zip(tools, rows, strict=True) if tool >= 0}
+    return {int(tools[each]): int(rows[each]) for each in np.argsort(rows) if tools[each] >= 0}
 
 
 def _require_lengths(program: Program, moves: Moves) -> None:
