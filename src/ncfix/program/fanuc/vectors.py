@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.follow.coordinates import DEGREE, LETTERS, dot
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, angles_in_words, dot
 from ncfix.program.follow.faults import Fault
 from ncfix.program.pointing import Pointing, within
 
@@ -91,6 +91,5 @@ def note_choice(
     at_pole = pointing.at_pole(pointing.at(*here))
     by_one_axis = any(abs(ways[1][k] - here[k]) < abs(ways[0][k] - here[k]) for k in (0, 1))
     if at_pole or by_one_axis:
-        names = [LETTERS[control.machine[column]] for column in pointing.columns]
-        angles = " ".join(f"{name}{angle / DEGREE:.3f}" for name, angle in zip(names, ways[0], strict=True))
+        angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
         control.warn(TURNED_TO, f"G43.5 is taken to turn to {angles}, the nearest of several ways", CHOICE)

@@ -1,9 +1,9 @@
-"""The axis letters of the language, and how their words become millimetres and radians."""
+"""The axis letters of all languages, how their words become millimetres and radians, and rotations of X Y Z."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 LETTERS = "XYZABCUVW"
@@ -89,3 +89,8 @@ def dot(a: Sequence[float], b: Sequence[float]) -> float:
 def rotated(rotation: Rotation, vector: Vector) -> Vector:
     """A position with its X Y Z rotated."""
     return [dot(row, vector) for row in rotation] + vector[3:]
+
+
+def angles_in_words(indices: Iterable[int], angles: Iterable[float]) -> str:
+    """Angles (rad) of rotary axes as people write them: `B30.000 C120.000`."""
+    return " ".join(f"{LETTERS[index]}{angle / DEGREE:.3f}" for index, angle in zip(indices, angles, strict=True))

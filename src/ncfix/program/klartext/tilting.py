@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ncfix.program.follow import tcp
-from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, product
+from ncfix.program.follow.coordinates import DEGREE, IDENTITY, INDEX, Rotation, angles_in_words, product
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import AT_START, Motion
 from ncfix.program.klartext.control import MOVED_ALONG, TILTED, Control
@@ -160,7 +160,7 @@ def chosen_way(control: Control, tilt: Rotation | None, flags: frozenset[str]) -
         turned = "table rot" in flags and tilt is not None and tilt != IDENTITY
         return None if turned else way_at_pole(control, ways[0])
     if len(ways) > 1:
-        angles = " ".join(f"{'XYZABC'[index]}{angle / DEGREE:.3f}" for index, angle in ways[0].items())
+        angles = angles_in_words(ways[0].keys(), ways[0].values())
         control.warn(WAY, f"the rotary axes are taken to turn to {angles}, the nearest of several ways", WAY_HINT)
     return ways[0] if ways else None
 

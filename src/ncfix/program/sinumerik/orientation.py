@@ -15,7 +15,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.follow.coordinates import DEGREE, LETTERS, product
+from ncfix.program.follow.coordinates import DEGREE, LETTERS, angles_in_words, product
 from ncfix.program.follow.faults import Fault
 from ncfix.program.pointing import Pointing
 from ncfix.program.pointing_angles import Triple, dot
@@ -159,8 +159,7 @@ def note_choice(
     """Say which way was taken where either would have been as near."""
     if not is_choice(pointing, here, ways):
         return
-    names = [LETTERS[control.machine[column]] for column in pointing.columns]
-    angles = " ".join(f"{name}{angle / DEGREE:.3f}" for name, angle in zip(names, ways[0], strict=True))
+    angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
     control.warn(
         WAY,
         f"the tool is taken to turn to {angles}, the nearest of several ways",

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ncfix.program.follow.coordinates import DEGREE, LETTERS, X, Y, Z, as_rotation
+from ncfix.program.follow.coordinates import X, Y, Z, angles_in_words, as_rotation
 from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
@@ -177,6 +177,6 @@ def turn_square(control: Sinumerik, plane: Plane) -> dict[int, float]:
     chosen = max(ways, key=lambda way: plane.direction * way[1]) if len(ways) > 1 else ways[0]
     if pointing.at_pole(normal):
         chosen = ways[0]
-    angles = " ".join(f"{LETTERS[i]}{angle / DEGREE:.3f}" for i, angle in zip(columns, chosen, strict=True))
+    angles = angles_in_words(columns, chosen)
     control.warn(WAY, f"CYCLE800 is taken to turn to {angles}", "check it on the control: its swivel data decide")
     return dict(zip(columns, chosen, strict=True))
