@@ -132,8 +132,8 @@ def _unsaid(axis: str, correction: float) -> str:
     )
 
 
-def _parameters(found: list[Pitch], axes: tuple[str, ...]) -> dict[int, list[float]]:
-    by_axis = {each.axis: each for each in found}
+def _parameters(pitches: list[Pitch], axes: tuple[str, ...]) -> dict[int, list[float]]:
+    by_axis = {each.axis: each for each in pitches}
     rows: dict[int, list[float]] = {number: [] for number in NUMBERS.values()}
     for axis in axes:
         each = by_axis.get(axis)

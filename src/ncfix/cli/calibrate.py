@@ -80,103 +80,109 @@ def calibrate(
     machine = load_machine(machine_path)
     data = [reads(read(path), machine, shown(path)) for path in measured]
     with console.busy("calibrating"):
-        found = calibrated(data, machine, effects, loss, prune, knots, time_constants)
-    over = over_the_travels(found)
-    remarks = (*found.remarks, *guesses(found, over))
+        calibration = calibrated(data, machine, effects, loss, prune, knots, time_constants)
+    over = over_the_travels(calibration)
+    remarks = (*calibration.remarks, *guesses(calibration, over))
     console.tell(*remarks)
-    if not allow_misfit and (message := misfit(found)) is not None:
+    if not allow_misfit and (message := misfit(calibration)) is not None:
         raise RefusedError((message,))
-    target.write(dumps(found.machine).encode())
+    target.write(dumps(calibration.machine).encode())
     if as_json:
         said = [message.as_dict() for message in remarks]
-        console.put_json(**_as_dict(found, over), remarks=said, output=target.path)
+        console.put_json(**_as_dict(calibration, over), remarks=said, output=target.path)
     elif output != STREAM:
-        _print(found, over)
+        _print(calibration, over)
     return ExitCode.DONE
 
 
-def _as_dict(found: Calibration, over: Prediction) -> dict[str, Any]:
+def _as_dict(calibration: Calibration, over: Prediction) -> dict[str, Any]:
     from dataclasses import asdict
 
     from ncfix.measure.residuals import residuals, rms_by_set
 
-    diagnosis = residuals(found.problem, found.estimate)
-    tests = {"ball_bar": _ball_bars(found), "positioning": _positioning(found)}
-    sigma, covariance = found.sigma, found.covariance
+    residual = residuals(calibration.problem, calibration.estimate)
+    tests = {"ball_bar": _ball_bars(calibration), "positioning": _positioning(calibration)}
+    sigma, covariance = calibration.sigma, calibration.covariance
     return {
         "parameters": [
             {"name": label, "value": value, "sigma": deviation, "held": math.isnan(deviation)}
             for label, value, deviation in zip(
-                found.labels, found.estimate.coefficients.tolist(), sigma.tolist(), strict=True
+                calibration.labels, calibration.estimate.coefficients.tolist(), sigma.tolist(), strict=True
             )
         ],
         "covariance": covariance,
-        "set_up": _set_up(found),
-        "chi_square": found.chi_square,
-        "freedom": found.freedom,
-        "condition": found.estimate.solution.condition,
-        "rms_um": {"before": found.before_um, "after": found.after_um, "sets": rms_by_set(found.problem, diagnosis)},
+        "set_up": _set_up(calibration),
+        "chi_square": calibration.chi_square,
+        "freedom": calibration.freedom,
+        "condition": calibration.estimate.solution.condition,
+        "rms_um": {
+            "before": calibration.before_um,
+            "after": calibration.after_um,
+            "sets": rms_by_set(calibration.problem, residual),
+        },
         "prediction": asdict(over),
-        "largest_cook": float(diagnosis.cook.max(initial=0.0)),
+        "largest_cook": float(residual.cook.max(initial=0.0)),
         **{name: rows for name, rows in tests.items() if rows},
     }
 
 
-def _ball_bars(found: Calibration) -> list[dict[str, Any]]:
+def _ball_bars(calibration: Calibration) -> list[dict[str, Any]]:
     """What ball-bar tests say by themselves, um."""
     from dataclasses import asdict
 
     from ncfix.measure.ball_bar import figures
 
-    seen = (each.measurement for each in found.problem.observations)
-    return [asdict(each) for measurement in seen for each in figures(measurement, found.problem.machine)]
+    seen = (each.measurement for each in calibration.problem.observations)
+    return [asdict(each) for measurement in seen for each in figures(measurement, calibration.problem.machine)]
 
 
-def _positioning(found: Calibration) -> list[dict[str, Any]]:
+def _positioning(calibration: Calibration) -> list[dict[str, Any]]:
     """ISO 230-2 of direct readings, um and urad."""
     from dataclasses import asdict
 
     from ncfix.measure.positioning import figures
 
-    return [asdict(each) for seen in found.problem.observations for each in figures(seen.measurement)]
+    return [asdict(each) for seen in calibration.problem.observations for each in figures(seen.measurement)]
 
 
-def _set_up(found: Calibration) -> dict[str, float]:
-    labels = [label for each in found.problem.observations for label in each.unknowns.labels]
-    return dict(zip(labels, found.estimate.unknowns.tolist(), strict=False))
+def _set_up(calibration: Calibration) -> dict[str, float]:
+    labels = [label for each in calibration.problem.observations for label in each.unknowns.labels]
+    return dict(zip(labels, calibration.estimate.unknowns.tolist(), strict=False))
 
 
-def _print(found: Calibration, over: Prediction) -> None:
-    console.table(("coefficient", "value", "sigma", "unit"), list(_rows(found)))
-    for bar in _ball_bars(found):
+def _print(calibration: Calibration, over: Prediction) -> None:
+    console.table(("coefficient", "value", "sigma", "unit"), list(_rows(calibration)))
+    for bar in _ball_bars(calibration):
         _say_bar(bar)
-    for row in _positioning(found):
+    for row in _positioning(calibration):
         _say_positioning(row)
-    held = "; what is held counts as known" if any(sigma != sigma for sigma in found.sigma.tolist()) else ""
+    held = "; what is held counts as known" if any(map(math.isnan, calibration.sigma.tolist())) else ""
     figures = f"{over.worst_um:.2f} um at worst, {over.rms_um:.2f} um rms"
     console.say(f"sigma of the tip error over the travels: {figures}{held}")
-    lengths = found.before_um == found.before_um
-    rms = f"rms {found.before_um:.2f} um before, {found.after_um:.2f} um after" if lengths else "only angles"
-    console.say(f"{rms}; {_noise(found)}")
+    lengths = not math.isnan(calibration.before_um)
+    rms = (
+        f"rms {calibration.before_um:.2f} um before, {calibration.after_um:.2f} um after" if lengths else "only angles"
+    )
+    console.say(f"{rms}; {_noise(calibration)}")
 
 
-def _rows(found: Calibration) -> Iterator[tuple[str, str, str, str]]:
+def _rows(calibration: Calibration) -> Iterator[tuple[str, str, str, str]]:
     from ncfix.machine.units import units
 
-    machine, selection = found.problem.machine, found.problem.selection
+    machine, selection = calibration.problem.machine, calibration.problem.selection
     said = [unit for effect in selection.estimated for unit in units(machine, effect)]
-    values, sigma = found.estimate.coefficients.tolist(), found.sigma.tolist()
-    for label, value, deviation, (factor, unit) in zip(found.labels, values, sigma, said, strict=True):
-        known = "held" if deviation != deviation else f"{factor * deviation:.3g}"
+    values, sigma = calibration.estimate.coefficients.tolist(), calibration.sigma.tolist()
+    for label, value, deviation, (factor, unit) in zip(calibration.labels, values, sigma, said, strict=True):
+        known = "held" if math.isnan(deviation) else f"{factor * deviation:.3g}"
         if value or known != "held":
             yield label, f"{factor * value:.4g}", known, unit
 
 
-def _noise(found: Calibration) -> str:
+def _noise(calibration: Calibration) -> str:
     """How the residuals go with the noise; where nobody knows it, they are all that says how large it is."""
-    freedom = f"{found.freedom} degrees of freedom"
-    if found.problem.noise_known:
-        return f"reduced chi-square {found.chi_square:.3f} with {freedom}"
+    freedom = f"{calibration.freedom} degrees of freedom"
+    if calibration.problem.noise_known:
+        return f"reduced chi-square {calibration.chi_square:.3f} with {freedom}"
     return f"noise neither given nor to be told from repeats: sigmas are those of the residuals ({freedom})"
 
 

@@ -42,17 +42,17 @@ class Compared:
         return not self.beyond and not self.not_reached
 
     @classmethod
-    def of(cls, found: SideBySide) -> Compared:
+    def of(cls, comparison: SideBySide) -> Compared:
         """What was found along both programs."""
-        before, there, back = (match.along for match in found.matches)
+        before, there, back = (match.along for match in comparison.matches)
         return cls(
             before=figures(before),
             after=figures(there),
             left_out=figures(back),
             beyond=there.lines_beyond,
             not_reached=back.lines_beyond,
-            unseen=found.lines_unseen,
-            left=found.lines_left,
+            unseen=comparison.lines_unseen,
+            left=comparison.lines_left,
         )
 
 

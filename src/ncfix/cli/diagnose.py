@@ -60,22 +60,22 @@ def diagnose(
     for each in data:
         console.tell_some(each.remarks)
     with console.busy("diagnosing"):
-        found = diagnosed(data, machine, without)
-    console.tell(*remarks(found.view, found.case.unheard_of))
+        diagnosis = diagnosed(data, machine, without)
+    console.tell(*remarks(diagnosis.view, diagnosis.case.unheard_of))
     written = None
-    if machine_target is not None and found.machine is not None:
-        machine_target.write(dumps(result.with_provenance(found)).encode())
+    if machine_target is not None and diagnosis.machine is not None:
+        machine_target.write(dumps(result.with_provenance(diagnosis)).encode())
         written = machine_target.path
     if next_target is not None:
-        _write_next(found, next_target)
+        _write_next(diagnosis, next_target)
     if page_target is not None and form is not None:
-        page_target.write(form(document(found)))
+        page_target.write(form(document(diagnosis)))
     if as_json:
-        console.put_json(**result.as_dict(found, written))
+        console.put_json(**result.as_dict(diagnosis, written))
     else:
-        console.put(words.text(found))
-        _say_written(found, output, written)
-    return ExitCode.FINDINGS if check and found.verdict != NOTHING else ExitCode.DONE
+        console.put(words.text(diagnosis))
+        _say_written(diagnosis, output, written)
+    return ExitCode.FINDINGS if check and diagnosis.verdict != NOTHING else ExitCode.DONE
 
 
 def _target(path: str | None, force: bool, inputs: Sequence[str]) -> Target | None:
@@ -83,18 +83,18 @@ def _target(path: str | None, force: bool, inputs: Sequence[str]) -> Target | No
     return targets([STREAM], Outputs(path, force=force), inputs)[0] if path is not None else None
 
 
-def _write_next(found: Diagnosis, target: Target) -> None:
+def _write_next(diagnosis: Diagnosis, target: Target) -> None:
     from ncfix.measure.program import skeleton
     from ncfix.measure.writer import dumps
 
-    if found.proposal is None or found.proposal.plan is None:
+    if diagnosis.proposal is None or diagnosis.proposal.plan is None:
         console.say("no further poses are proposed")
         return
-    plan = found.proposal.plan
+    plan = diagnosis.proposal.plan
     table = target.path.endswith(".csv")
-    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, found.view.machine)).encode())
+    target.write((dumps(plan, ("dx", "dy", "dz")) if table else skeleton(plan, diagnosis.view.machine)).encode())
 
 
-def _say_written(found: Diagnosis, output: str | None, written: str | None) -> None:
+def _say_written(diagnosis: Diagnosis, output: str | None, written: str | None) -> None:
     if output and written is None:
         console.say("no machine file was written: there is nothing to add to the model")

@@ -123,11 +123,11 @@ def _pair(text: str, form: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def _tell_of_probe(found: Written, control: str, as_json: bool) -> None:
+def _tell_of_probe(written: Written, control: str, as_json: bool) -> None:
     if as_json:
-        console.put_json(control=control, files=sorted(found.files), notes=found.notes)
+        console.put_json(control=control, files=sorted(written.files), notes=written.notes)
         return
-    console.put("".join(f"{name}\n" for name in sorted(found.files)))
+    console.put("".join(f"{name}\n" for name in sorted(written.files)))
 
 
 def check_folder(folder: str) -> None:

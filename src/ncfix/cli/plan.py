@@ -91,14 +91,16 @@ def plan(
     _say(found, separated=bool(separate))
 
 
-def _say(found: Planned, *, separated: bool) -> None:
+def _say(planned: Planned, *, separated: bool) -> None:
     """What the poses do not tell, and how well the tip error will be known where that was sought."""
-    if found.unseen:
-        console.say(f"no pose of this kind tells {', '.join(found.unseen)} from the rest")
+    if planned.unseen:
+        console.say(f"no pose of this kind tells {', '.join(planned.unseen)} from the rest")
     if not separated:
-        console.say(f"tip error known to {found.worst_um:.2f} um at worst per um of noise, {found.mean_um:.2f} um rms")
-    if found.open:
-        console.say(f"nearly open is a combination of {', '.join(found.open)}")
+        console.say(
+            f"tip error known to {planned.worst_um:.2f} um at worst per um of noise, {planned.mean_um:.2f} um rms"
+        )
+    if planned.open:
+        console.say(f"nearly open is a combination of {', '.join(planned.open)}")
         console.say(
             "more poses may tell it, another kind of measurement or another tool; or seek fewer effects (--effects)"
         )

@@ -26,17 +26,17 @@ NO_ANGLE = 1e-9
 
 
 def with_rotary_held(
-    intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, found: Correction
+    intent: Intent, strategy: Strategy, move: Index, fraction: Array, q: Array, correction: Correction
 ) -> Correction:
-    """The corrections `found` for poses q (k, n_axes) of motions `move`, but for rotary axes that are held."""
+    """The `correction` of poses q (k, n_axes) of motions `move`, but for rotary axes that are held."""
     if not strategy.corrects_orientation:
-        return found
-    there = on_their_side(intent, move, q, np.where(held_axes(intent, move), q, found.q))
-    rows = np.flatnonzero((there != found.q)[:, intent.machine.rotary].any(axis=1))
+        return correction
+    there = on_their_side(intent, move, q, np.where(held_axes(intent, move), q, correction.q))
+    rows = np.flatnonzero((there != correction.q)[:, intent.machine.rotary].any(axis=1))
     if not rows.size:
-        return found
+        return correction
     target = intent.machine.tip(q[rows], intent.lengths(move[rows]))
-    corrected, converged, oriented = found.q.copy(), found.converged.copy(), found.oriented.copy()
+    corrected, converged, oriented = correction.q.copy(), correction.converged.copy(), correction.oriented.copy()
     corrected[rows], arrived = steer(intent.machine, there[rows], target, intent.states(move[rows], fraction[rows]))
     converged[rows] &= arrived
     oriented[rows] = False

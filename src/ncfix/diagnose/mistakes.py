@@ -195,13 +195,13 @@ def _with(machine: Machine, axis: Axis) -> Machine:
     return machine.replace(axes=tuple(axis if each.name == axis.name else each for each in machine.axes))
 
 
-def told(found: Diagnosis, wrong: Mistake) -> Diagnosis:
+def told(diagnosis: Diagnosis, wrong: Mistake) -> Diagnosis:
     """The diagnosis with the mistake as its first finding."""
     from ncfix.diagnose.findings import Finding
 
     candidate = Candidate(wrong.name, wrong.title, wrong.axis, "mistake", (), (), remedy="correct the mistake")
     size = float(np.sqrt(max(wrong.before_um**2 - wrong.after_um**2, 0.0)))
-    first = Finding(candidate, size**2, 0.0, wrong.aliases, size, (), np.zeros(len(found.view.y)))
-    verdict = (AMBIGUOUS if wrong.aliases else FOUND) if found.verdict == NOTHING else found.verdict
-    gap = replace(found.gap, before=wrong.before_um)
-    return replace(found, verdict=verdict, findings=(first, *found.findings), gap=gap, mistake=wrong)
+    first = Finding(candidate, size**2, 0.0, wrong.aliases, size, (), np.zeros(len(diagnosis.view.y)))
+    verdict = (AMBIGUOUS if wrong.aliases else FOUND) if diagnosis.verdict == NOTHING else diagnosis.verdict
+    gap = replace(diagnosis.gap, before=wrong.before_um)
+    return replace(diagnosis, verdict=verdict, findings=(first, *diagnosis.findings), gap=gap, mistake=wrong)

@@ -150,11 +150,11 @@ def _best_of(court: Court, sides: Sequence[Side], sigma: float, offered: Measure
     return _with_plan(found, offered.rows(index), court.background.view)
 
 
-def _with_plan(found: Proposal, plan: Measurement, view: View) -> Proposal:
+def _with_plan(proposal: Proposal, plan: Measurement, view: View) -> Proposal:
     """A proposal with its poses, and with what is new about them."""
     beyond, tools = axes_beyond(plan, view.reach.spans), new_tools(plan, view.column("tool_length"))
     strays = not stays_where_it_was(view, plan).all()
-    return replace(found, plan=marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
+    return replace(proposal, plan=marked(plan, beyond, tools, strays), beyond=beyond, tools=tools, strays=strays)
 
 
 def _signals(sides: Sequence[Side]) -> frozenset[str]:

@@ -14,33 +14,39 @@ from ncfix.diagnose.words import why
 from ncfix.machine import Machine
 
 
-def as_dict(found: Diagnosis, machine: str | None = None) -> dict[str, Any]:
+def as_dict(diagnosis: Diagnosis, machine: str | None = None) -> dict[str, Any]:
     """The fields of docs/formats.md, section 4, and some more."""
     return {
-        "verdict": found.verdict,
-        "effects": [_effect(found, each) for each in found.findings],
-        "unknown": {"share_um": found.unknown_um, "where": found.rest.kind},
-        "gap_um": {name: getattr(found.gap, name) for name in found.gap.__dataclass_fields__},
-        "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in found.patterns],
-        "next_measurements": as_objects(found.proposal.plan) if found.proposal and found.proposal.plan else [],
-        "ambiguity": _ambiguity(found),
+        "verdict": diagnosis.verdict,
+        "effects": [_effect(diagnosis, each) for each in diagnosis.findings],
+        "unknown": {"share_um": diagnosis.unknown_um, "where": diagnosis.rest.kind},
+        "gap_um": {name: getattr(diagnosis.gap, name) for name in diagnosis.gap.__dataclass_fields__},
+        "where": [{"text": p.text, "rms_um": p.rms_um, "p_value": p.p_value} for p in diagnosis.patterns],
+        "next_measurements": as_objects(diagnosis.proposal.plan)
+        if diagnosis.proposal and diagnosis.proposal.plan
+        else [],
+        "ambiguity": _ambiguity(diagnosis),
         "machine": machine,
-        "noise": {"sigma_um": found.floor.sigma_um, "source": found.floor.source, "freedom": found.floor.freedom},
-        "lack_of_fit": {"before": found.p_lack, "after": found.p_left},
-        "invisible": [{"name": c.name, "visible_share": share} for c, share in found.case.gathered.invisible],
-        "findable_um": {name: size if np.isfinite(size) else None for name, size in found.findable.items()},
-        "considered": len(found.case.considered),
-        "outliers": _outliers(found),
-        "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in found.moved],
+        "noise": {
+            "sigma_um": diagnosis.floor.sigma_um,
+            "source": diagnosis.floor.source,
+            "freedom": diagnosis.floor.freedom,
+        },
+        "lack_of_fit": {"before": diagnosis.p_lack, "after": diagnosis.p_left},
+        "invisible": [{"name": c.name, "visible_share": share} for c, share in diagnosis.case.gathered.invisible],
+        "findable_um": {name: size if np.isfinite(size) else None for name, size in diagnosis.findable.items()},
+        "considered": len(diagnosis.case.considered),
+        "outliers": _outliers(diagnosis),
+        "constants": [{"name": m.name, "file": m.file, "data": m.data, "sigma": m.sigma} for m in diagnosis.moved],
     }
 
 
-def _effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
+def _effect(diagnosis: Diagnosis, finding: Finding) -> dict[str, Any]:
     return {
         "name": finding.candidate.name,
         "title": finding.candidate.title,
         "axis": finding.candidate.axis or None,
-        "why": why(found, finding),
+        "why": why(diagnosis, finding),
         "size_um": finding.size_um,
         "coefficients": [
             {"name": each.name, "basis": each.basis.name, "labels": each.basis.labels, "values": each.coefficients}
@@ -55,8 +61,8 @@ def _effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
         "aliases": list(finding.aliases),
         "remedy": finding.candidate.remedy,
         "plausible": _plausible(finding),
-        "targets": list(carriers(found.view.machine, finding.effects)),
-        "conditions": list(conditions(found.view.machine, finding.effects)),
+        "targets": list(carriers(diagnosis.view.machine, finding.effects)),
+        "conditions": list(conditions(diagnosis.view.machine, finding.effects)),
     }
 
 
@@ -73,10 +79,10 @@ def _plausible(finding: Finding) -> dict[str, Any] | None:
     }
 
 
-def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
-    if found.proposal is None:
+def _ambiguity(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    if diagnosis.proposal is None:
         return None
-    p = found.proposal
+    p = diagnosis.proposal
     return {
         "name": p.name,
         "rivals": p.rivals,
@@ -90,26 +96,26 @@ def _ambiguity(found: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _outliers(found: Diagnosis) -> list[dict[str, Any]]:
+def _outliers(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places, first = [], 0
-    for each in found.view.measurements:
-        for row in np.flatnonzero(found.case.outlying[first : first + len(each)]):
+    for each in diagnosis.view.measurements:
+        for row in np.flatnonzero(diagnosis.case.outlying[first : first + len(each)]):
             place = each.place(int(row))
             places.append({"path": place.path, "line": place.line})
         first += len(each)
     return places
 
 
-def with_provenance(found: Diagnosis) -> Machine:
+def with_provenance(diagnosis: Diagnosis) -> Machine:
     """The machine with where its new effects come from."""
-    assert found.machine is not None
+    assert diagnosis.machine is not None
     notes = {
         "date": datetime.date.today(),
-        "source": ", ".join(dict.fromkeys(each.path for each in found.view.measurements)),
-        "diagnosed_from": found.view.machine.hash,
-        "added": ", ".join(each.candidate.name for each in found.findings),
-        "gap_before_um": round(found.gap.before, 3),
-        "gap_after_um": round(found.gap.after, 3),
-        "noise_um": round(found.gap.floor, 3),
+        "source": ", ".join(dict.fromkeys(each.path for each in diagnosis.view.measurements)),
+        "diagnosed_from": diagnosis.view.machine.hash,
+        "added": ", ".join(each.candidate.name for each in diagnosis.findings),
+        "gap_before_um": round(diagnosis.gap.before, 3),
+        "gap_after_um": round(diagnosis.gap.after, 3),
+        "noise_um": round(diagnosis.gap.floor, 3),
     }
-    return found.machine.replace(provenance={**found.machine.provenance, **notes})
+    return diagnosis.machine.replace(provenance={**diagnosis.machine.provenance, **notes})

@@ -37,7 +37,7 @@ def rivals(view: View, named: Sequence[Group]) -> tuple[Group, ...]:
     return tuple(_not_in_catalogue(view, found, named))
 
 
-def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]) -> list[Group]:
+def _not_in_catalogue(view: View, groups: Sequence[Group], named: Sequence[Group]) -> list[Group]:
     """Without the single errors that a name holds already: those are that name with another shape, or course."""
     basis = orthonormal(view.base / view.relative[:, None])
     own: dict[str, list[Array]] = {}
@@ -46,7 +46,7 @@ def _not_in_catalogue(view: View, found: Sequence[Group], named: Sequence[Group]
         span = orthonormal(left)
         for key in _errors(group):
             own.setdefault(key, []).append(span)
-    return [group for group in found if not _held(without(basis, group.columns / view.relative[:, None]), group, own)]
+    return [group for group in groups if not _held(without(basis, group.columns / view.relative[:, None]), group, own)]
 
 
 def _errors(group: Group) -> set[str]:

@@ -28,43 +28,43 @@ NOISE = {
 """Where it comes from."""
 
 
-def text(found: Diagnosis) -> str:
+def text(diagnosis: Diagnosis) -> str:
     """The report for a terminal."""
-    gap = found.gap
+    gap = diagnosis.gap
     lines = [
-        f"verdict: {found.verdict}: {SAID[found.verdict]}",
+        f"verdict: {diagnosis.verdict}: {SAID[diagnosis.verdict]}",
         f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um "
-        f"({NOISE[found.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
+        f"({NOISE[diagnosis.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
-    for finding in found.findings:
-        lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(found, finding)}"]
+    for finding in diagnosis.findings:
+        lines += ["", f"{finding.candidate.name}: {finding.candidate.title}", f"  {why(diagnosis, finding)}"]
         if finding.aliases:
             lines.append(f"  may as well be: {', '.join(finding.aliases)}")
-        lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(found, finding)) if said]
-    if found.unknown_um:
-        lines += ["", rest(found)]
-    if found.patterns:
+        lines += [f"  {said}" for said in (constants(finding), odd(finding), carried(diagnosis, finding)) if said]
+    if diagnosis.unknown_um:
+        lines += ["", rest(diagnosis)]
+    if diagnosis.patterns:
         lines += [
             "",
             "where machine file and data disagree most:",
-            *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in found.patterns),
+            *(f"  {p.text}, {p.rms_um:.1f} um rms" for p in diagnosis.patterns),
         ]
-    if found.moved:
+    if diagnosis.moved:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
-        lines += [f"  {constant(each)}" for each in found.moved]
-    if found.verdict == NOTHING:
-        lines += ["", *silence(found)]
-    lines += _next(found)
-    if found.case.outlying.any():
-        lines += ["", f"{int(found.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
+        lines += [f"  {constant(each)}" for each in diagnosis.moved]
+    if diagnosis.verdict == NOTHING:
+        lines += ["", *silence(diagnosis)]
+    lines += _next(diagnosis)
+    if diagnosis.case.outlying.any():
+        lines += ["", f"{int(diagnosis.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
 
 
-def silence(found: Diagnosis) -> list[str]:
+def silence(diagnosis: Diagnosis) -> list[str]:
     """What it means that nothing was found."""
-    count = len(found.case.considered)
-    lines = ["these data can show hardly anything"] if power.blind(found.findable, count) else []
-    return [*lines, power.said(found.findable, count)]
+    count = len(diagnosis.case.considered)
+    lines = ["these data can show hardly anything"] if power.blind(diagnosis.findable, count) else []
+    return [*lines, power.said(diagnosis.findable, count)]
 
 
 def constant(moved: Moved) -> str:
@@ -95,26 +95,26 @@ def odd(finding: Finding) -> str:
     )
 
 
-def carried(found: Diagnosis, finding: Finding) -> str:
+def carried(diagnosis: Diagnosis, finding: Finding) -> str:
     """Which targets can carry the effect."""
-    machine = found.view.machine
+    machine = diagnosis.view.machine
     named = ", ".join(carriers(machine, finding.effects))
     given = ", ".join(conditions(machine, finding.effects))
     return f"can be carried by {named}" + (f", with {given} stated" if given else "") if named else ""
 
 
-def rest(found: Diagnosis) -> str:
+def rest(diagnosis: Diagnosis) -> str:
     """What has no name; and that it decides nothing, where it does not."""
-    said = f"without a name: {found.unknown_um:.1f} um rms of {found.rest.kind}"
-    if found.verdict == UNKNOWN:
+    said = f"without a name: {diagnosis.unknown_um:.1f} um rms of {diagnosis.rest.kind}"
+    if diagnosis.verdict == UNKNOWN:
         return said
     why = "no more than one value's noise, and without repeats it may be the part's or the instrument's"
-    return f"{said} ({why if found.floor.source == 'neighbours' else 'too little to decide'})"
+    return f"{said} ({why if diagnosis.floor.source == 'neighbours' else 'too little to decide'})"
 
 
-def _next(found: Diagnosis) -> list[str]:
+def _next(diagnosis: Diagnosis) -> list[str]:
     """What to measure next, or that nothing of this kind would help."""
-    p = found.proposal
+    p = diagnosis.proposal
     if p is None:
         return []
     if p.plan is None:
@@ -155,14 +155,14 @@ def hopeless(proposal: Proposal) -> str:
     return f"{', '.join(proposal.alike)}: no measurement of this kind would tell that apart" if proposal.alike else ""
 
 
-def why(found: Diagnosis, finding: Finding) -> str:
+def why(diagnosis: Diagnosis, finding: Finding) -> str:
     """One sentence on why this name."""
     name = finding.candidate.name
     said = f"{finding.size_um:.1f} um rms, log odds {finding.odds:.0f} (p = {finding.p_value:.1g})"
-    runners = found.selected.runners.get(name, {})
+    runners = diagnosis.selected.runners.get(name, {})
     if not runners:
         return said
     best = max(runners, key=lambda each: runners[each])
     less = finding.odds - runners[best]
     beside = f"{abs(less):.0f} {'less' if less >= 0 else 'more'}"
-    return f"{said}; next best of {len(found.case.considered)}: {best}, {beside}"
+    return f"{said}; next best of {len(diagnosis.case.considered)}: {best}, {beside}"

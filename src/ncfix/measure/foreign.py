@@ -78,29 +78,31 @@ def recognised(text: str, machine: Machine, path: str) -> Measurement | None:
     return checks.checked(found, machine)
 
 
-def _of_bodies(found: Measurement, machine: Machine) -> Measurement:
+def _of_bodies(measurement: Measurement, machine: Machine) -> Measurement:
     """Deviations count the way the number of the axis grows, errors along the base axes: a table axis goes against."""
-    factor = np.ones(len(found))
-    for axis in _measured(found, machine):
+    factor = np.ones(len(measurement))
+    for axis in _measured(measurement, machine):
         along = _along(axis)
         if abs(along) < 1 - SLANTED:
             text = f"{axis.name} does not move along its error axis: what it is off is no E{axis.name}{axis.name} alone"
-            raise ConfigError.of("NCF618", text, Place(found.path), "give the errors as kind axis")
-        factor[np.array(found.labels["axis"]) == axis.name] = np.sign(along)
-    return found.with_columns({"value": factor * found.columns["value"]})
+            raise ConfigError.of("NCF618", text, Place(measurement.path), "give the errors as kind axis")
+        factor[np.array(measurement.labels["axis"]) == axis.name] = np.sign(along)
+    return measurement.with_columns({"value": factor * measurement.columns["value"]})
 
 
-def _backwards(found: Measurement, machine: Machine) -> Iterator[Message]:
+def _backwards(measurement: Measurement, machine: Machine) -> Iterator[Message]:
     """A word on axes whose bodies go the other way than their numbers: of them nobody says how a table counts."""
-    for axis in _measured(found, machine):
+    for axis in _measured(measurement, machine):
         if _along(axis) < 0:
             text = f"errors of {axis.name} are taken along the base axes, against which it moves as its number grows"
-            yield Message("NCF618", text, Place(found.path), f"if they count as {axis.name} does, their sign is wrong")
+            yield Message(
+                "NCF618", text, Place(measurement.path), f"if they count as {axis.name} does, their sign is wrong"
+            )
 
 
-def _measured(found: Measurement, machine: Machine) -> list[Axis]:
+def _measured(measurement: Measurement, machine: Machine) -> list[Axis]:
     """The linear axes of which there are readings."""
-    named = set(found.labels.get("axis", ()))
+    named = set(measurement.labels.get("axis", ()))
     return [axis for axis in machine.axes if axis.name in named and axis.name in LINEAR and not axis.rotary]
 
 

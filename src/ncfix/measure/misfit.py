@@ -18,17 +18,19 @@ HINT = (
 )
 
 
-def misfit(found: Calibration) -> Message | None:
+def misfit(calibration: Calibration) -> Message | None:
     """NCF642 if the residuals are more than the machine may be corrected by, or many and `BEYOND` times the noise."""
-    factor = float(np.sqrt(found.chi_square)) if found.problem.noise_known else 0.0
-    most_um = UM * float(found.machine.max_correction[0])
-    beyond = factor > BEYOND and found.after_um > MUCH_UM
-    if not beyond and not found.after_um > most_um:
+    factor = float(np.sqrt(calibration.chi_square)) if calibration.problem.noise_known else 0.0
+    most_um = UM * float(calibration.machine.max_correction[0])
+    beyond = factor > BEYOND and calibration.after_um > MUCH_UM
+    if not beyond and not calibration.after_um > most_um:
         return None
     times = f", {factor:.0f} times the noise" if factor > 1 else ""
-    rms = f" ({found.after_um:.4g} um rms of {found.before_um:.4g} um before)"
+    rms = f" ({calibration.after_um:.4g} um rms of {calibration.before_um:.4g} um before)"
     text = f"the calibrated model does not describe these measurements: what it leaves{rms} is "
     text += f"{factor:.0f} times the noise" if beyond else f"beyond max_correction, {most_um:g} um{times}"
-    rest = residuals(found.problem, found.estimate)
-    worst = int(np.argmax(np.abs(found.estimate.residual / found.problem.sigma) * (found.estimate.weight > 0)))
-    return Message("NCF642", f"{text}; most in {rest.component[worst]}", place(found.problem, rest, worst), HINT)
+    rest = residuals(calibration.problem, calibration.estimate)
+    worst = int(
+        np.argmax(np.abs(calibration.estimate.residual / calibration.problem.sigma) * (calibration.estimate.weight > 0))
+    )
+    return Message("NCF642", f"{text}; most in {rest.component[worst]}", place(calibration.problem, rest, worst), HINT)

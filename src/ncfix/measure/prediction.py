@@ -30,45 +30,45 @@ class Prediction:
     at: Mapping[str, float]
 
 
-def over_the_travels(found: Calibration) -> Prediction:
+def over_the_travels(calibration: Calibration) -> Prediction:
     """At poses all over the travels, with the tools that were measured with."""
-    machine = found.problem.machine
+    machine = calibration.problem.machine
     lengths = {
-        float(length) for each in found.problem.observations for length in each.measurement.column("tool_length")
+        float(length) for each in calibration.problem.observations for length in each.measurement.column("tool_length")
     }
     places = candidates(machine, "tcp", PLACES, Room(tool_lengths=sorted(lengths)))
-    state = State(places.column("tool_length"), places.state(machine).direction, _inputs(found, machine))
-    sigma = UM * deviations(found, places.positions(machine), state).max(axis=1)
+    state = State(places.column("tool_length"), places.state(machine).direction, _inputs(calibration, machine))
+    sigma = UM * deviations(calibration, places.positions(machine), state).max(axis=1)
     row = int(sigma.argmax())
     at = {name: float(places.columns[name][row]) for name in (*machine.axis_names, "tool_length")}
     return Prediction(float(sigma[row]), float(np.sqrt((sigma**2).mean())), at)
 
 
-def guesses(found: Calibration, over: Prediction) -> tuple[Message, ...]:
+def guesses(calibration: Calibration, over: Prediction) -> tuple[Message, ...]:
     """A warning (NCF641) if somewhere in the travels the tip error is known to less than what was to be corrected."""
-    if not over.worst_um > found.before_um:
+    if not over.worst_um > calibration.before_um:
         return ()
     at = ", ".join(f"{name} {value:g}" for name, value in over.at.items() if name != "tool_length")
     text = (
-        f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {found.before_um:.1f} um "
+        f"at {at} the tip error is known to {over.worst_um:.1f} um (1 sigma), and only {calibration.before_um:.1f} um "
         "rms were there before: away from the measured poses the model is a guess"
     )
     hint = "measure where `ncfix plan --existing` says, or estimate fewer effects: --effects, --prune 0.99"
     return (Message("NCF641", text, hint=hint),)
 
 
-def deviations(found: Calibration, q: Array, state: State) -> Array:
+def deviations(calibration: Calibration, q: Array, state: State) -> Array:
     """Standard deviation of the predicted tip error at any poses, (n, 3) mm, directions of the workpiece frame."""
-    design = found.problem.machine.design(q, state, found.problem.selection.estimated)
-    return found.uncertainty(design[:, :3])
+    design = calibration.problem.machine.design(q, state, calibration.problem.selection.estimated)
+    return calibration.uncertainty(design[:, :3])
 
 
-def _inputs(found: Calibration, machine: Machine) -> dict[str, Array]:
+def _inputs(calibration: Calibration, machine: Machine) -> dict[str, Array]:
     """The middle of every signal that the estimated effects need."""
-    signals = (each for effect in found.problem.selection.estimated for each in signals_of(machine.axes, effect))
+    signals = (each for effect in calibration.problem.selection.estimated for each in signals_of(machine.axes, effect))
     names = {name for signal in signals if signal is not None for name in signal.inputs} - {"tool_length"}
     values = {}
     for name in names:
-        columns = [each.measurement.column(name) for each in found.problem.observations]
+        columns = [each.measurement.column(name) for each in calibration.problem.observations]
         values[name] = np.full(PLACES, float(np.median(np.concatenate(columns))))
     return values

@@ -102,10 +102,10 @@ def read(text: str, path: str) -> Rtl:
     return found.checked()
 
 
-def _reading(found: Rtl, words: list[str], line: int) -> Reading:
+def _reading(rtl: Rtl, words: list[str], line: int) -> Reading:
     if len(words) != 3 or not words[0].isdecimal() or not words[1].isdecimal():
-        raise found.odd("not a line of run, target and deviation", line, "three numbers: 1 12 -0.8")
-    return Reading(int(words[0]), int(words[1]), number_of(words[2], found.path, line) * MICROMETRE, line)
+        raise rtl.odd("not a line of run, target and deviation", line, "three numbers: 1 12 -0.8")
+    return Reading(int(words[0]), int(words[1]), number_of(words[2], rtl.path, line) * MICROMETRE, line)
 
 
 def number_of(word: str, path: str, line: int) -> float:

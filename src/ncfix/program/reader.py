@@ -163,16 +163,16 @@ class Reading:
         columns = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
         return columns._replace(spans=columns.spans + self.blocks[first, 0])
 
-    def learned(self, first: int, found: Scan, known: list[int | None]) -> bool:
+    def learned(self, first: int, scan: Scan, known: list[int | None]) -> bool:
         """Learn the shapes that are not known yet from the first block of each; whether that will do."""
-        rows = range(len(known)) if found.group is None else np.unique(found.group, return_index=True)[1].tolist()
-        new = {found.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
+        rows = range(len(known)) if scan.group is None else np.unique(scan.group, return_index=True)[1].tolist()
+        new = {scan.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
         return None not in new and all(
-            self.understood(first, row, found, shape) is not None
+            self.understood(first, row, scan, shape) is not None
             for shape, row in sorted(new.items(), key=itemgetter(1))
         )
 
-    def understood(self, first: int, row: int, found: Scan, shape: bytes | None) -> int | None:
+    def understood(self, first: int, row: int, scan: Scan, shape: bytes | None) -> int | None:
         """The template of a new shape; None where its block cannot be read, or has to be taken as it is."""
         assert shape is not None
         template = shapes_of(self.dialect).recall(shape)
@@ -181,7 +181,7 @@ class Reading:
                 parsed = parse_block(self.dialect, self.source[slice(*self.blocks[first + row])].decode("latin-1"))
             except BlockError:
                 return None
-            if not agrees(found, row, parsed, self.blocks[first + row, 0] - self.blocks[first, 0]):
+            if not agrees(scan, row, parsed, self.blocks[first + row, 0] - self.blocks[first, 0]):
                 return None
             template = parsed.template
             shapes_of(self.dialect).keep(shape, template)
@@ -217,9 +217,9 @@ class Reading:
             found.shapes[row] = None
         return found
 
-    def learn(self, first: int, row: int, found: Scan, exact: dict[int, Parsed]) -> int:
+    def learn(self, first: int, row: int, scan: Scan, exact: dict[int, Parsed]) -> int:
         """The template of a block that is the first of its shape here, or that has to be taken as it is."""
-        shape = found.shapes[row]
+        shape = scan.shapes[row]
         known = shapes_of(self.dialect).recall(shape) if shape is not None else None
         if shape is not None and known is not None:
             return self.number(shape, known)
@@ -229,7 +229,7 @@ class Reading:
         if parsed is NOT_READ:
             exact[row] = parsed
             return self.number(b"\n\n", parsed.template)
-        if shape is not None and agrees(found, row, parsed, start - self.blocks[first, 0]):
+        if shape is not None and agrees(scan, row, parsed, start - self.blocks[first, 0]):
             shapes_of(self.dialect).keep(shape, parsed.template)
             return self.number(shape, parsed.template)
         exact[row] = parsed
@@ -270,21 +270,21 @@ def moved_by(spans: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
     return spans + offset if offset else spans
 
 
-def agrees(found: Scan, row: int, parsed: Parsed, start: int) -> bool:
+def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
     """Whether the scan saw the same numbers, and the same comment at the end of the block, as the grammar."""
-    spans = found.spans[found.first_number[row] : found.first_number[row + 1]] - start
-    comment = max(found.comment[row] - start, -1)
+    spans = scan.spans[scan.first_number[row] : scan.first_number[row + 1]] - start
+    comment = max(scan.comment[row] - start, -1)
     return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
 
 
-def with_exact(found: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
+def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
     """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
     if not exact:
-        return Columns(found.first_number, found.spans, found.values)
-    counts = np.diff(found.first_number)
+        return Columns(scan.first_number, scan.spans, scan.values)
+    counts = np.diff(scan.first_number)
     owner = np.repeat(np.arange(len(counts)), counts)
     keep = ~np.isin(owner, list(exact))
-    parts = [(owner[keep], found.spans[keep], found.values[keep])]
+    parts = [(owner[keep], scan.spans[keep], scan.values[keep])]
     for row, parsed in exact.items():
         spans = np.array(parsed.spans, dtype=np.int64).reshape(-1, 2) + starts[row]
         parts.append((np.full(len(spans), row), spans, np.array(parsed.values)))

@@ -38,39 +38,46 @@ EXTREME = 0.995
 """Share of the residuals that a plot must hold; the others are drawn at its edge."""
 
 
-def document(found: Diagnosis) -> Document:
+def document(diagnosis: Diagnosis) -> Document:
     """The whole report."""
-    sections = [_verdict(found), *(_finding(found, each) for each in found.findings), _where(found), _residuals(found)]
-    sections += [_next(found), _unseen(found)]
-    title = f"Diagnosis of {found.view.machine.name}"
+    sections = [
+        _verdict(diagnosis),
+        *(_finding(diagnosis, each) for each in diagnosis.findings),
+        _where(diagnosis),
+        _residuals(diagnosis),
+    ]
+    sections += [_next(diagnosis), _unseen(diagnosis)]
+    title = f"Diagnosis of {diagnosis.view.machine.name}"
     return Document(title, [section for section in sections if section.parts])
 
 
-def _verdict(found: Diagnosis) -> Section:
-    gap = found.gap
+def _verdict(diagnosis: Diagnosis) -> Section:
+    gap = diagnosis.gap
     rows = [
         ("all rows", f"{gap.before:.2f}", f"{gap.after:.2f}", f"{gap.floor:.2f}"),
         ("poses held out", f"{gap.holdout_before:.2f}", f"{gap.holdout_after:.2f}", f"{gap.floor:.2f}"),
     ]
-    files = ", ".join(dict.fromkeys(each.path for each in found.view.measurements))
-    noise = f"noise {found.floor.sigma_um:.2f} um a value, {NOISE[found.floor.source]}"
+    files = ", ".join(dict.fromkeys(each.path for each in diagnosis.view.measurements))
+    noise = f"noise {diagnosis.floor.sigma_um:.2f} um a value, {NOISE[diagnosis.floor.source]}"
     parts: list[Part] = [
-        Text(f"{found.verdict}: {SAID[found.verdict]}."),
-        Text(f"{found.view.count} rows of {files}; {noise}."),
+        Text(f"{diagnosis.verdict}: {SAID[diagnosis.verdict]}."),
+        Text(f"{diagnosis.view.count} rows of {files}; {noise}."),
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
-    if found.unknown_um:
-        parts.append(Text(f"{rest(found).capitalize()}."))
-    parts += [Text(f"{each[0].upper()}{each[1:]}.") for each in (silence(found) if found.verdict == NOTHING else [])]
-    return Section("Verdict", [*parts, *_chances(found), *_moved(found)])
+    if diagnosis.unknown_um:
+        parts.append(Text(f"{rest(diagnosis).capitalize()}."))
+    parts += [
+        Text(f"{each[0].upper()}{each[1:]}.") for each in (silence(diagnosis) if diagnosis.verdict == NOTHING else [])
+    ]
+    return Section("Verdict", [*parts, *_chances(diagnosis), *_moved(diagnosis)])
 
 
-def _chances(found: Diagnosis) -> Iterator[Part]:
+def _chances(diagnosis: Diagnosis) -> Iterator[Part]:
     """Whether the gap is more than noise."""
-    if found.p_lack is None or found.p_left is None:
+    if diagnosis.p_lack is None or diagnosis.p_left is None:
         yield Text("Whether what is left is more than noise cannot be said: there are no repeats and no stated noise.")
         return
-    before, after = _chance(found.p_lack), _chance(found.p_left)
+    before, after = _chance(diagnosis.p_lack), _chance(diagnosis.p_left)
     yield Text(f"Noise alone would leave a gap as large as before with {before}, after with {after}.")
 
 
@@ -82,48 +89,52 @@ def _p(value: float) -> str:
     return f"{value:.1g}" if value > LEAST else f"less than {LEAST:g}"
 
 
-def _moved(found: Diagnosis) -> Iterator[Part]:
+def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     """What the file says otherwise of where axes lie, and of gains."""
-    if found.moved:
+    if diagnosis.moved:
         yield Text("Constants of the machine file that the data put elsewhere (the gap before is after that):")
-        yield Table((), [(constant(each),) for each in found.moved])
+        yield Table((), [(constant(each),) for each in diagnosis.moved])
 
 
-def _finding(found: Diagnosis, finding: Finding) -> Section:
+def _finding(diagnosis: Diagnosis, finding: Finding) -> Section:
     candidate = finding.candidate
-    parts: list[Part] = [Text(f"{candidate.title}. {why(found, finding)}.")]
+    parts: list[Part] = [Text(f"{candidate.title}. {why(diagnosis, finding)}.")]
     if finding.aliases:
         parts.append(Text(f"With these data it may as well be: {', '.join(finding.aliases)}."))
     if candidate.remedy:
         parts.append(Text(f"Remedy: {candidate.remedy}."))
     parts += [
-        Text(f"{said.capitalize()}.") for said in (constants(finding), odd(finding), carried(found, finding)) if said
+        Text(f"{said.capitalize()}.")
+        for said in (constants(finding), odd(finding), carried(diagnosis, finding))
+        if said
     ]
-    return Section(candidate.name, [*parts, *_curve(found, finding), *_runners(found, finding)])
+    return Section(candidate.name, [*parts, *_curve(diagnosis, finding), *_runners(diagnosis, finding)])
 
 
-def _runners(found: Diagnosis, finding: Finding) -> Iterator[Part]:
+def _runners(diagnosis: Diagnosis, finding: Finding) -> Iterator[Part]:
     """The names that did not win, by their evidence."""
-    runners = found.selected.runners.get(finding.candidate.name, {})
+    runners = diagnosis.selected.runners.get(finding.candidate.name, {})
     if runners:
         best = sorted(runners, key=lambda each: -runners[each])[:RUNNERS]
         rows = [(finding.candidate.name, f"{finding.odds:.1f}"), *((each, f"{runners[each]:.1f}") for each in best)]
-        yield Text(f"Evidence, log odds, best of {len(found.case.considered)} (3 less is 20 times less likely):")
+        yield Text(f"Evidence, log odds, best of {len(diagnosis.case.considered)} (3 less is 20 times less likely):")
         yield Table(("name", "log odds"), rows)
 
 
-def _curve(found: Diagnosis, finding: Finding) -> Iterator[Part]:
+def _curve(diagnosis: Diagnosis, finding: Finding) -> Iterator[Part]:
     """Every component over its axis, with a band of two standard deviations; of what warms, what it shows in time."""
     for effect in finding.effects[:CURVES]:
-        yield from _component(found, effect)
+        yield from _component(diagnosis, effect)
     if any((effect.signal or "").startswith(("temp_", "time_s")) for effect in finding.effects):
-        names = np.array(found.view.names)
-        shown = {each: np.where(names == each, finding.shown, np.nan) for each in dict.fromkeys(names[found.case.kept])}
-        yield from _in_time(found, "what it shows, um", shown)
+        names = np.array(diagnosis.view.names)
+        shown = {
+            each: np.where(names == each, finding.shown, np.nan) for each in dict.fromkeys(names[diagnosis.case.kept])
+        }
+        yield from _in_time(diagnosis, "what it shows, um", shown)
 
 
-def _component(found: Diagnosis, effect: Effect) -> Iterator[Part]:
-    span = found.view.reach.spans.get(effect.signal or "")
+def _component(diagnosis: Diagnosis, effect: Effect) -> Iterator[Part]:
+    span = diagnosis.view.reach.spans.get(effect.signal or "")
     if effect.covariance is None or effect.times is not None or span is None:
         return
     x = np.linspace(*span, 121)
@@ -131,24 +142,24 @@ def _component(found: Diagnosis, effect: Effect) -> Iterator[Part]:
     variance = np.einsum("nk,kl,nl->n", design, np.asarray(effect.covariance), design)
     factor, unit = (1e6, "urad") if effect.rotational else (1e3, "um")
     value = factor * (design @ np.asarray(effect.coefficients))
-    over = with_unit(found.view.machine, effect.signal or "")
+    over = with_unit(diagnosis.view.machine, effect.signal or "")
     caption = f"{effect.name}, {unit} over {over}; band: two standard deviations"
     yield Plot(caption, [Line(x, value, 2 * factor * np.sqrt(np.maximum(variance, 0.0)))])
 
 
-def _where(found: Diagnosis) -> Section:
-    rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{_p(pattern.p_value)}") for pattern in found.patterns]
+def _where(diagnosis: Diagnosis) -> Section:
+    rows = [(pattern.text, f"{pattern.rms_um:.1f}", f"{_p(pattern.p_value)}") for pattern in diagnosis.patterns]
     return Section("Where", [Table(("pattern", "um rms", "p by chance"), rows)] if rows else [])
 
 
-def _residuals(found: Diagnosis) -> Section:
-    return Section("Residuals before and after", list(_maps(found)))
+def _residuals(diagnosis: Diagnosis) -> Section:
+    return Section("Residuals before and after", list(_maps(diagnosis)))
 
 
-def _maps(found: Diagnosis) -> Iterator[Part]:
+def _maps(diagnosis: Diagnosis) -> Iterator[Part]:
     """Residuals of all components over each axis that moved."""
-    view = found.view
-    inside, every = found.case.kept, {"before": found.before, "after": found.after}
+    view = diagnosis.view
+    inside, every = diagnosis.case.kept, {"before": diagnosis.before, "after": diagnosis.after}
     sides = {label: values[inside] for label, values in every.items()}
     if not inside.any():
         return
@@ -158,22 +169,22 @@ def _maps(found: Diagnosis) -> Iterator[Part]:
             x = view.q[view.row[inside], index] / axis.unit
             dots = [Dots(x, np.clip(values, -limit, limit), label) for label, values in sides.items()]
             yield Plot(f"um over {with_unit(view.machine, axis.name)}", dots)
-    yield from _in_time(found, "um", {label: np.clip(each, -limit, limit) for label, each in every.items()})
+    yield from _in_time(diagnosis, "um", {label: np.clip(each, -limit, limit) for label, each in every.items()})
 
 
-def _in_time(found: Diagnosis, what: str, values: Mapping[str, Array]) -> Iterator[Part]:
+def _in_time(diagnosis: Diagnosis, what: str, values: Mapping[str, Array]) -> Iterator[Part]:
     """Values (m,) over the time at which they were measured; nothing without a clock."""
-    time = found.view.column("time_s")
+    time = diagnosis.view.column("time_s")
     if np.ptp(time) > 0:
-        kept = found.case.kept
+        kept = diagnosis.case.kept
         hours = (time - time.min()) / HOUR
         known = {label: kept & np.isfinite(each) for label, each in values.items()}
-        dots = [Dots(hours[found.view.row[at]], values[label][at], label) for label, at in known.items()]
+        dots = [Dots(hours[diagnosis.view.row[at]], values[label][at], label) for label, at in known.items()]
         yield Plot(f"{what}, over time, h", dots)
 
 
-def _next(found: Diagnosis) -> Section:
-    proposal = found.proposal
+def _next(diagnosis: Diagnosis) -> Section:
+    proposal = diagnosis.proposal
     if proposal is None:
         return Section("To tell names apart", [])
     head = Text(f"{', '.join((proposal.name, *proposal.rivals))}: {proposal.reason}.")
@@ -190,9 +201,9 @@ def _next(found: Diagnosis) -> Section:
     return Section("To tell names apart", [head, *said, Table(names, rows)])
 
 
-def _unseen(found: Diagnosis) -> Section:
-    names = ", ".join(candidate.name for candidate, _ in found.case.gathered.invisible)
-    count = int(found.case.outlying.sum())
+def _unseen(diagnosis: Diagnosis) -> Section:
+    names = ", ".join(candidate.name for candidate, _ in diagnosis.case.gathered.invisible)
+    count = int(diagnosis.case.outlying.sum())
     parts = [Text(f"Not visible with these poses: {names}.")] if names else []
     if count:
         parts.append(Text(f"{count} rows were put aside as outliers; --json lists them."))

@@ -169,9 +169,9 @@ def align(control: MacroControl, block: Block, code: int) -> None:
     control.make(Motion(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
 
 
-def note_choice(control: MacroControl, found: Squared, code: int) -> None:
+def note_choice(control: MacroControl, squared: Squared, code: int) -> None:
     """Say to which angles the rotary axes are taken to turn."""
-    angles = " ".join(f"{LETTERS[index]}{found.degrees[index]:.3f}" for index in control.turning)
+    angles = " ".join(f"{LETTERS[index]}{squared.degrees[index]:.3f}" for index in control.turning)
     control.warn(TURNED_TO, f"G{code / 10:g} is taken to turn to {angles}, the nearest of several ways", SQUARED)
 
 

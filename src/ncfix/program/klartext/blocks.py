@@ -71,25 +71,25 @@ def unread_block() -> Parsed:
     return Parsed(Template((Opaque(UNREAD, Span(Anchor(-1, 0), Anchor(END, 0))),), 0), (), (), -1)
 
 
-def remark_block(text: str, found: re.Match[str]) -> Parsed:
+def remark_block(text: str, match: re.Match[str]) -> Parsed:
     """A block of nothing but a comment, `; ...`, or a structuring remark, `* - ...`."""
     spans: tuple[tuple[int, int], ...] = ()
     values: tuple[float, ...] = ()
-    number = re.search(r"\d+", found["number"] or "")
+    number = re.search(r"\d+", match["number"] or "")
     if number is not None:
         spans, values = ((number.span(),), (float(number[0]),))
     builder = Builder(text, identity(text), {}, tuple(stop for _, stop in spans))
     items: tuple[Item, ...] = ()
     comment = -1
-    if found["number"] and "/" in found["number"]:
-        place = found["number"].index("/")
+    if match["number"] and "/" in match["number"]:
+        place = match["number"].index("/")
         items += (Skip(1, builder.between(place, place + 1)),)
     if number is not None:
         items += (Word("N", Literal(0), builder.between(*number.span()), builder.between(*number.span())),)
-    if found["text"]:
-        span = Span(builder.anchor(found.start("text")), Anchor(END, 0))
-        note = found["text"].startswith(";")
-        comment = found.start("text") if note else -1
+    if match["text"]:
+        span = Span(builder.anchor(match.start("text")), Anchor(END, 0))
+        note = match["text"].startswith(";")
+        comment = match.start("text") if note else -1
         items += (Comment(span) if note else Opaque("structure", span),)
     return Parsed(Template(items, len(spans)), spans, values, comment)
 

@@ -189,13 +189,13 @@ class Renderer(HoleWriter):
             return False
         return all(abs(target.ends[0, c] - target.start[c]) < NEAR * self.half[c] for c, _ in pairs)
 
-    def _radius(self, found: ArcText) -> None:
+    def _radius(self, arc: ArcText) -> None:
         """The R word of CR."""
         word = self.layout.radius
-        if found.function != "CR":
+        if arc.function != "CR":
             self._drop(word)
             return
-        (text,) = found.words
+        (text,) = arc.words
         if word is None:
             self.added.append(self.layout.blank + text)
             return
@@ -225,8 +225,8 @@ class Renderer(HoleWriter):
         self.out.centres[piece] = found.centre
         return position
 
-    def _pole(self, found: ArcText) -> str:
-        return "CC" + "".join(self.layout.blank + text for text in found.pole)
+    def _pole(self, arc: ArcText) -> str:
+        return "CC" + "".join(self.layout.blank + text for text in arc.pole)
 
     def _old_pole(self) -> str | None:
         """The pole that was in force, which later blocks may rely on; empty if there was none, None if nobody knows."""

@@ -43,18 +43,18 @@ def statement(control: Control, flow: FlowControl, text: str) -> None:
 # -- other programs ---------------------------------------------------------------------------------------------------
 
 
-def call_program(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def call_program(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """CALL PGM."""
-    flow.call_program(found["name"].strip())
+    flow.call_program(match["name"].strip())
 
 
-def select_program(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def select_program(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """SEL PGM: the program that CALL SELECTED PGM calls; one whose name is in a parameter is known only at run time."""
-    name = found["name"].strip()
+    name = match["name"].strip()
     flow.selected = "" if TARGET.fullmatch(name) else name
 
 
-def call_selected(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def call_selected(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """CALL SELECTED PGM."""
     if flow.selected:
         flow.call_program(flow.selected)
@@ -62,21 +62,21 @@ def call_selected(control: Control, flow: FlowControl, found: re.Match[str]) -> 
         control.refusal = control.refusal or "the program that is called is chosen at run time"
 
 
-def error(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def error(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """FN 14: the program stops with an error of its own."""
-    raise Fault(ERROR, f"the program stops with error {found['number']}", "its own checks refuse its parameters")
+    raise Fault(ERROR, f"the program stops with error {match['number']}", "its own checks refuse its parameters")
 
 
 # -- what is not followed ---------------------------------------------------------------------------------------------
 
 
-def not_followed(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def not_followed(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """What may change coordinates, or what later blocks do."""
-    name = " ".join(found[0].partition(":")[0].split()[:3]).upper()
+    name = " ".join(match[0].partition(":")[0].split()[:3]).upper()
     control.refusal = control.refusal or f"{name} may change coordinates in a way that is not followed"
 
 
-def free_contour(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def free_contour(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """FL, FLT, FC, FCT."""
     follow_free(control, flow.unit, flow.block - 1)
 
@@ -84,20 +84,20 @@ def free_contour(control: Control, flow: FlowControl, found: re.Match[str]) -> N
 # -- what is measured and read ----------------------------------------------------------------------------------------
 
 
-def probe(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def probe(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """TCH PROBE: the control moves on its own, and leaves results in Q parameters, or sets a datum by them."""
-    number = int(found["number"])
+    number = int(match["number"])
     if number in SETTING:
         control.suspended[PRESET] = MEASURED.format(number)
     control.pass_here(PROBING, AFTER_PROBING, "XYZ")
     for each in PROBED:
         control.scope.parameters.assign(f"Q{each}", 0.0, runtime=True)
-    lose_parameters(control, found[0], IN_A_ROW if number < PROBED[0] else 1)
+    lose_parameters(control, match[0], IN_A_ROW if number < PROBED[0] else 1)
 
 
-def read_values(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def read_values(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """FN 18, 28 and their like put what they read into a Q parameter; FN 23 and 24 into three in a row."""
-    lose_parameters(control, found[0].partition("=")[0], 3 if CIRCLE.match(found[0]) else 1)
+    lose_parameters(control, match[0].partition("=")[0], 3 if CIRCLE.match(match[0]) else 1)
 
 
 def lose_parameters(control: Control, text: str, in_a_row: int) -> None:
@@ -110,36 +110,36 @@ def lose_parameters(control: Control, text: str, in_a_row: int) -> None:
 # -- coordinates ------------------------------------------------------------------------------------------------------
 
 
-def holes(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def holes(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """PATTERN DEF; the holes of SEL PATTERN are in a table that is not read."""
-    control.cycle.places = pattern_of(found[0], control.scope.parameters)
+    control.cycle.places = pattern_of(match[0], control.scope.parameters)
 
 
-def change_coordinates(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def change_coordinates(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """TRANS."""
-    transform(control, found[0])
+    transform(control, match[0])
 
 
-def select_preset(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def select_preset(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """PRESET SELECT: a row of the preset table; it ends transformations, unless it is told to keep some."""
     trans = control.transformations
     control.suspended.pop(PRESET, None)
-    if found["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
+    if match["rest"].strip() or trans.tilted or not trans.plain or any(trans.shift) or trans.doubtful:
         control.suspended[PRESET] = SELECTED
         return
-    control.load_preset(f"PRESET{int(found['row'])}")
+    control.load_preset(f"PRESET{int(match['row'])}")
 
 
-def tcpm(control: Control, flow: FlowControl, found: re.Match[str]) -> None:
+def tcpm(control: Control, flow: FlowControl, match: re.Match[str]) -> None:
     """FUNCTION TCPM and FUNCTION RESET TCPM."""
     control.suspended.pop("tcpm", None)
-    words = "" if found["reset"] else " ".join(found["rest"].upper().split())
+    words = "" if match["reset"] else " ".join(match["rest"].upper().split())
     control.path.by_vector, control.path.spatial = "PATHCTRL VECTOR" in words, "AXIS SPAT" in words
     if control.path.spatial:
         control.suspended["tcpm"] = SPATIAL_ANGLES
     if "REFPNT" in words and "TIP-TIP" not in words:
         control.suspended["tcpm"] = OTHER_POINT
-    tip_control(control, on=not found["reset"])
+    tip_control(control, on=not match["reset"])
 
 
 Do = Callable[[Control, FlowControl, re.Match[str]], None]
