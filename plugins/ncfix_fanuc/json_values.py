@@ -13,53 +13,53 @@ FAR = 1e6
 """mm or degree: beyond any machine."""
 
 
-def whole(found: Mapping[str, Any], key: str, low: int, high: int) -> int:
+def whole(record: Mapping[str, Any], key: str, low: int, high: int) -> int:
     """A whole number within limits."""
-    value = found[key]
+    value = record[key]
     if type(value) is not int or not low <= value <= high:
         raise ValueError(f"{key} is {value!r}, not a whole number from {low} to {high}")
     return value
 
 
-def real(found: Mapping[str, Any], key: str, low: float = -FAR, high: float = FAR) -> float:
+def real(record: Mapping[str, Any], key: str, low: float = -FAR, high: float = FAR) -> float:
     """A number within limits."""
-    value = found[key]
+    value = record[key]
     if type(value) not in (int, float) or not low <= value <= high:
         raise ValueError(f"{key} is {value!r}, not a number from {low:g} to {high:g}")
     return float(value)
 
 
-def reals(found: Mapping[str, Any], key: str, count: int, low: float = -FAR) -> tuple[float, ...]:
+def reals(record: Mapping[str, Any], key: str, count: int, low: float = -FAR) -> tuple[float, ...]:
     """So many numbers."""
-    values = found[key]
+    values = record[key]
     if not isinstance(values, list) or len(values) != count:
         raise ValueError(f"{key} is {values!r}, not {count} numbers")
     return tuple(real({key: value}, key, low) for value in values)
 
 
-def wholes(found: Mapping[str, Any], key: str) -> list[int]:
+def wholes(record: Mapping[str, Any], key: str) -> list[int]:
     """Whole numbers, however many."""
-    values = found[key]
+    values = record[key]
     if not isinstance(values, list) or any(type(value) is not int or abs(value) > FAR for value in values):
         raise ValueError(f"{key} holds something that is not a whole number")
     return values
 
 
-def text(found: Mapping[str, Any], key: str) -> str:
+def text(record: Mapping[str, Any], key: str) -> str:
     """A word."""
-    value = found[key]
+    value = record[key]
     if not isinstance(value, str):
         raise ValueError(f"{key} is {value!r}, not a word")
     return value
 
 
-def records(found: Any) -> list[Mapping[str, Any]]:
+def records(value: Any) -> list[Mapping[str, Any]]:
     """The list of records of a file."""
-    if not isinstance(found, dict) or not isinstance(found["records"], list):
+    if not isinstance(value, dict) or not isinstance(value["records"], list):
         raise ValueError("it is not an object with a list of records")
-    if not all(isinstance(record, dict) for record in found["records"]):
+    if not all(isinstance(record, dict) for record in value["records"]):
         raise ValueError("a record is not an object")
-    return found["records"]
+    return value["records"]
 
 
 SMALLEST = math.ulp(1.0)

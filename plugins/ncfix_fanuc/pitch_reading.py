@@ -75,18 +75,20 @@ def _check_turn(remarks: Remarks, first: int, increments: NDArray[np.int64]) -> 
         remarks.doubt(0, f"{text}has {increments[-1]}", "the same value for both")
 
 
-def _check(remarks: Remarks, found: Mapping[str, float], first: int, last: int) -> None:
-    if (found["low"], found["high"]) != (first, last):
-        remarks.refuse(0, f"points {first} to {last}, and the parameters say {found['low']:g} to {found['high']:g}")
-    if found["interval"] == 0:
+def _check(remarks: Remarks, parameters: Mapping[str, float], first: int, last: int) -> None:
+    if (parameters["low"], parameters["high"]) != (first, last):
+        remarks.refuse(
+            0, f"points {first} to {last}, and the parameters say {parameters['low']:g} to {parameters['high']:g}"
+        )
+    if parameters["interval"] == 0:
         remarks.refuse(0, "an interval of zero")
-    elif not 0 < found["interval"] <= FAR:
-        remarks.refuse(0, f"an interval of {found['interval']:g}")
-    if found["magnification"] not in range(MOST_MAGNIFICATION + 1):
-        remarks.refuse(0, f"a magnification of {found['magnification']:g}", f"0 to {MOST_MAGNIFICATION}")
-    if found["reference"] not in range(100_000):
-        remarks.refuse(0, f"a reference position at point {found['reference']:g}")
-    elif not first <= found["reference"] <= last:
+    elif not 0 < parameters["interval"] <= FAR:
+        remarks.refuse(0, f"an interval of {parameters['interval']:g}")
+    if parameters["magnification"] not in range(MOST_MAGNIFICATION + 1):
+        remarks.refuse(0, f"a magnification of {parameters['magnification']:g}", f"0 to {MOST_MAGNIFICATION}")
+    if parameters["reference"] not in range(100_000):
+        remarks.refuse(0, f"a reference position at point {parameters['reference']:g}")
+    elif not first <= parameters["reference"] <= last:
         remarks.doubt(0, "the reference position is outside the points")
 
 

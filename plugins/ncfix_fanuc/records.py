@@ -190,12 +190,12 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     return Volc(found["sign"], low, step, unit, magnification, values, style)
 
 
-def _style(found: Mapping[str, Any], remarks: Remarks) -> Style:
+def _style(record: Mapping[str, Any], remarks: Remarks) -> Style:
     first, largest = (
-        json_values.whole(found, key, low, MOST_NUMBER) for key, low in (("first_number", 0), ("largest", 1))
+        json_values.whole(record, key, low, MOST_NUMBER) for key, low in (("first_number", 0), ("largest", 1))
     )
-    order, template = json_values.text(found, "order"), json_values.text(found, "template")
-    home_minus = json_values.text({"home_minus": "", **found}, "home_minus")
+    order, template = json_values.text(record, "order"), json_values.text(record, "template")
+    home_minus = json_values.text({"home_minus": "", **record}, "home_minus")
     if sorted(order) != ["X", "Y", "Z"]:
         remarks.refuse(0, f"the order of the axes is {order!r}", "XYZ, ZYX, ...")
     if not set(home_minus) <= set("XYZ"):

@@ -137,12 +137,12 @@ def read_lattice(name: str, content: bytes, linear: bool) -> tuple[Lattice | Non
     return None, remarks
 
 
-def _checked(found: Any, remarks: Remarks, linear: bool) -> Lattice | None:
-    records = json_values.records(found)
-    counts, inputs = tuple(json_values.wholes(found, "counts")), _inputs(found, remarks, linear)
+def _checked(value: Any, remarks: Remarks, linear: bool) -> Lattice | None:
+    records = json_values.records(value)
+    counts, inputs = tuple(json_values.wholes(value, "counts")), _inputs(value, remarks, linear)
     words = ("three", SIDE) if linear else ("one or two", MOST_ROTARY)
-    if found["sign"] not in SIGNS:
-        remarks.refuse(0, f"the sign is {found['sign']!r}", "correction or error")
+    if value["sign"] not in SIGNS:
+        remarks.refuse(0, f"the sign is {value['sign']!r}", "correction or error")
     if len(counts) != len(inputs) or not all(2 <= count <= words[1] for count in counts):
         remarks.refuse(0, f"counts {counts}: 2 to {words[1]} points along each of {words[0]} axes")
     rows = {key: [json_values.wholes(record, key) for record in records] for key in ("lin", "rot")}
@@ -151,37 +151,37 @@ def _checked(found: Any, remarks: Remarks, linear: bool) -> Lattice | None:
         return None
     order = [*reversed(range(len(counts))), len(counts)]
     lin, rot = (np.array(rows[key], dtype=np.int64).reshape(*counts[::-1], 3).transpose(order) for key in rows)
-    return Lattice(inputs, *_ends(found, inputs), _scale(found), lin, rot, *_rest(found, remarks, linear))
+    return Lattice(inputs, *_ends(value, inputs), _scale(value), lin, rot, *_rest(value, remarks, linear))
 
 
-def _inputs(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[str, ...]:
+def _inputs(record: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[str, ...]:
     if linear:
         return LINEAR
-    axes = found["axes"]
+    axes = record["axes"]
     if not isinstance(axes, list) or len(axes) not in (1, 2) or any(axis not in ANGLES for axis in axes):
         remarks.refuse(0, f"the axes are {axes}", "one or two of A, B and C")
         return ()
     return tuple(axes)
 
 
-def _ends(found: Mapping[str, Any], inputs: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _ends(record: Mapping[str, Any], inputs: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     end = "mm" if inputs == LINEAR else "deg"
-    low = json_values.reals(found, f"first_{end}", len(inputs))
-    return low, json_values.reals(found, f"interval_{end}", len(inputs), SMALLEST)
+    low = json_values.reals(record, f"first_{end}", len(inputs))
+    return low, json_values.reals(record, f"interval_{end}", len(inputs), SMALLEST)
 
 
-def _scale(found: Mapping[str, Any]) -> Scale:
-    length, angle = (json_values.real(found, key, 1e-6, 10) for key in ("detection_unit_um", "detection_unit_deg"))
+def _scale(record: Mapping[str, Any]) -> Scale:
+    length, angle = (json_values.real(record, key, 1e-6, 10) for key in ("detection_unit_um", "detection_unit_deg"))
     keys = ("magnification", "angle_magnification")
-    lengths, angles = (json_values.whole(found, key, 1, MOST_MAGNIFICATION) for key in keys)
-    return Scale(found["sign"], (length / 1000, angle * DEGREE), (lengths, angles))
+    lengths, angles = (json_values.whole(record, key, 1, MOST_MAGNIFICATION) for key in keys)
+    return Scale(record["sign"], (length / 1000, angle * DEGREE), (lengths, angles))
 
 
-def _rest(found: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[tuple[float, ...], str]:
+def _rest(record: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[tuple[float, ...], str]:
     """The centre of a table's turns, or the way home of the linear axes."""
     if not linear:
-        return json_values.reals(found, "centre_mm", 3), ""
-    home_minus = json_values.text({"home_minus": "", **found}, "home_minus")
+        return json_values.reals(record, "centre_mm", 3), ""
+    home_minus = json_values.text({"home_minus": "", **record}, "home_minus")
     if not set(home_minus) <= set(LINEAR):
         remarks.refuse(0, f"home_minus is {home_minus!r}", "axes of X, Y and Z")
     return (), home_minus

@@ -68,7 +68,7 @@ def read_cec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     return good
 
 
-def _sort(each: Assignment, found: dict[int, Assigned], remarks: Remarks) -> None:
+def _sort(each: Assignment, tables: dict[int, Assigned], remarks: Remarks) -> None:
     name = each.name.upper()
     field = name.removeprefix(f"{VALUE}_")
     if field in LINKS:
@@ -83,25 +83,25 @@ def _sort(each: Assignment, found: dict[int, Assigned], remarks: Remarks) -> Non
         return
     index, *number = (int(text) for text in each.indices)
     place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
-    table = found.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
+    table = tables.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
     if number:
         table.put_value(number[0], each)
     else:
         table.put_field(field, each)
 
 
-def _table(index: int, found: Assigned, remarks: Remarks) -> Table | None:
+def _table(index: int, table: Assigned, remarks: Remarks) -> Table | None:
     before = len(remarks.wrong)
-    if found.lacks(NEEDED):
+    if table.lacks(NEEDED):
         return None
-    source, output = (_axis(found.fields[field], remarks) for field in NEEDED[:2])
-    direction = found.choice("DIRECTION", (0, 1, -1))
-    multiply = found.choice("MULT_BY_TABLE")
-    modulo = bool(found.choice("IS_MODULO", (0, 1)))
-    values = found.curve(modulo)
+    source, output = (_axis(table.fields[field], remarks) for field in NEEDED[:2])
+    direction = table.choice("DIRECTION", (0, 1, -1))
+    multiply = table.choice("MULT_BY_TABLE")
+    modulo = bool(table.choice("IS_MODULO", (0, 1)))
+    values = table.curve(modulo)
     if values is None or len(remarks.wrong) > before:
         return None
-    low, step = found.number("MIN"), found.number("STEP")
+    low, step = table.number("MIN"), table.number("STEP")
     return Table(index, source, output, low, step, values, direction, multiply, modulo)
 
 

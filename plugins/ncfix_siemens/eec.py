@@ -33,7 +33,7 @@ def read_eec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     return [table for table in tables if table is not None]
 
 
-def _sort(each: Assignment, found: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
+def _sort(each: Assignment, tables: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
     name = each.name.upper()
     field = name.removeprefix(f"{VALUE}_")
     wanted = 3 if name == VALUE else 2
@@ -46,19 +46,19 @@ def _sort(each: Assignment, found: dict[tuple[int, str], Assigned], remarks: Rem
         return
     encoder, axis = int(each.indices[0]), each.indices[-1].strip().upper()
     place, names = f"$AA_ENC_COMP[{encoder},{{}},{axis}]", f"$AA_ENC_COMP_{{}}[{encoder},{axis}]"
-    table = found.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
+    table = tables.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
     if wanted == 3:
         table.put_value(int(each.indices[1]), each)
     else:
         table.put_field(field, each)
 
 
-def _table(encoder: int, axis: str, found: Assigned, remarks: Remarks) -> Table | None:
+def _table(encoder: int, axis: str, table: Assigned, remarks: Remarks) -> Table | None:
     before = len(remarks.wrong)
-    if found.lacks(FIELDS[:3]):
+    if table.lacks(FIELDS[:3]):
         return None
-    modulo = bool(found.choice("IS_MODULO", (0, 1)))
-    values = found.curve(modulo)
+    modulo = bool(table.choice("IS_MODULO", (0, 1)))
+    values = table.curve(modulo)
     if values is None or len(remarks.wrong) > before:
         return None
-    return Table(encoder, axis, axis, found.number("MIN"), found.number("STEP"), values, modulo=modulo)
+    return Table(encoder, axis, axis, table.number("MIN"), table.number("STEP"), values, modulo=modulo)

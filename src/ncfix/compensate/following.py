@@ -83,20 +83,20 @@ def rotary_names(machine: Machine) -> frozenset[str]:
     return frozenset(axis.name for axis in machine.axes if axis.rotary)
 
 
-def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: Setup) -> Trace:
+def with_tool_lengths(program: Program, followed: Trace, machine: Machine, setup: Setup) -> Trace:
     """The trace with every tool length known.
 
     Where the errors do not depend on it, a length that is not given counts as zero; where they do, it must be given:
     raises UsageError NCF431 naming every tool that lacks it, unless the setup assumes zero, and NCF446 naming every
     tool with a length below zero, which is a distance of another kind.
     """
-    moves = found.moves
+    moves = followed.moves
     if machine.depends_on_tool_length:
         _require_lengths(program, moves)
     unknown = np.isnan(moves.tool_length)
     if not unknown.any():
-        return found
-    known = replace(found, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
+        return followed
+    known = replace(followed, moves=replace(moves, tool_length=np.where(unknown, 0.0, moves.tool_length)))
     unknown &= moves.rule == Rule.CORRECT
     if not machine.depends_on_tool_length or not unknown.any():
         return known
@@ -104,8 +104,8 @@ def with_tool_lengths(program: Program, found: Trace, machine: Machine, setup: S
     if not setup.assume_zero:
         raise UsageError.collected(_tool_needed(program, moves, tool, row) for tool, row in first.items())
     notes = [_tool_assumed(program, moves, tool, row) for tool, row in first.items()]
-    assumed = (*found.assumed, *(f"length of tool {tool}" for tool in first))
-    return replace(known, messages=(*found.messages, *notes), assumed=assumed)
+    assumed = (*followed.assumed, *(f"length of tool {tool}" for tool in first))
+    return replace(known, messages=(*followed.messages, *notes), assumed=assumed)
 
 
 def _first_motions(moves: Moves, chosen: NDArray[np.bool_]) -> dict[int, int]:

@@ -83,8 +83,8 @@ def select(scale: Scale, offered: Sequence[str], start: Members | None = None) -
     return members
 
 
-def _better(scale: Scale, members: dict[str, Member], found: dict[str, Member]) -> dict[str, Member]:
-    return found if scale.weight(found) > scale.weight(members) + HELPS else members
+def _better(scale: Scale, members: dict[str, Member], trial: dict[str, Member]) -> dict[str, Member]:
+    return trial if scale.weight(trial) > scale.weight(members) + HELPS else members
 
 
 def _together(scale: Scale, offered: Sequence[str], members: Members) -> dict[str, Member]:

@@ -87,9 +87,9 @@ def _machine(root: Section) -> Machine | None:
     return machine
 
 
-def _check_sizes(machine: Machine, found: list[tuple[Effect, ...]], report: Report) -> None:
+def _check_sizes(machine: Machine, tables: list[tuple[Effect, ...]], report: Report) -> None:
     """Note effects that are not finite at the ends of the travel: no machine has them, no arithmetic survives them."""
-    for index, effects in enumerate(found):
+    for index, effects in enumerate(tables):
         with np.errstate(all="ignore"):
             finite = [np.isfinite(at_the_ends(machine, effect)).all() for effect in effects]
         if not all(finite):

@@ -54,21 +54,21 @@ def residuals(problem: Problem, estimate: Estimate) -> Residuals:
     return Residuals(which, rows, tuple(names), np.array(turns, dtype=np.bool_), estimate.residual, studentised, cook)
 
 
-def place(problem: Problem, found: Residuals, index: int) -> Place:
+def place(problem: Problem, residual: Residuals, index: int) -> Place:
     """Where a value stands in its file."""
-    measurement = problem.observations[int(found.observation[index])].measurement
-    row = int(found.row[index])
+    measurement = problem.observations[int(residual.observation[index])].measurement
+    row = int(residual.row[index])
     return Place(measurement.path) if row < 0 else measurement.place(row)
 
 
-def rms_by_set(problem: Problem, found: Residuals) -> dict[str, float]:
+def rms_by_set(problem: Problem, residual: Residuals) -> dict[str, float]:
     """The rms of lengths in um, per file and set."""
     sizes: dict[str, float] = {}
     for index, each in enumerate(problem.observations):
-        mine = np.flatnonzero((found.observation == index) & (found.row >= 0) & ~found.turns)
+        mine = np.flatnonzero((residual.observation == index) & (residual.row >= 0) & ~residual.turns)
         for name in dict.fromkeys(each.measurement.sets):
             rows = np.flatnonzero(np.array(each.measurement.sets) == name)
-            chosen = found.value[mine[np.isin(found.row[mine], rows)]]
+            chosen = residual.value[mine[np.isin(residual.row[mine], rows)]]
             if chosen.size:
                 sizes[f"{each.measurement.path} set {name}"] = float(1e3 * np.sqrt((chosen**2).mean()))
     return sizes

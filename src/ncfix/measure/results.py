@@ -73,18 +73,18 @@ def _known(effect: Effect, covariance: Array) -> Effect:
     return replace(effect, covariance=tuple(tuple(float(value) for value in row) for row in even))
 
 
-def _outliers(problem: Problem, estimate: Estimate, found: Residuals) -> Iterator[Message]:
+def _outliers(problem: Problem, estimate: Estimate, residual: Residuals) -> Iterator[Message]:
     aside = np.flatnonzero(estimate.weight == 0)
-    for index in aside[np.argsort(-np.abs(found.studentised[aside]))][:NAMED]:
-        text = f"{found.component[index]} is {_size(found, index)} from the model: an outlier, given no weight"
-        yield Message("NCF633", text, place(problem, found, int(index)), "look at that row; --loss none keeps it")
+    for index in aside[np.argsort(-np.abs(residual.studentised[aside]))][:NAMED]:
+        text = f"{residual.component[index]} is {_size(residual, index)} from the model: an outlier, given no weight"
+        yield Message("NCF633", text, place(problem, residual, int(index)), "look at that row; --loss none keeps it")
     if len(aside) > NAMED:
         yield Message("NCF633", f"{len(aside) - NAMED} more outliers")
 
 
-def _size(found: Residuals, index: int) -> str:
-    angle = found.turns[index]
-    return f"{found.value[index] * (1e6 if angle else 1e3):+.1f} {'urad' if angle else 'um'}"
+def _size(residual: Residuals, index: int) -> str:
+    angle = residual.turns[index]
+    return f"{residual.value[index] * (1e6 if angle else 1e3):+.1f} {'urad' if angle else 'um'}"
 
 
 def _noise(problem: Problem, chi_square: float, freedom: int) -> Iterator[Message]:

@@ -68,8 +68,8 @@ def loads(data: bytes, path: str) -> Manifest:
         raise ConfigError.of("NCF486", text, Place(path), "export again") from error
 
 
-def _texts(found: Mapping[str, Any]) -> dict[str, str]:
-    return {str(name): str(value) for name, value in found.items()}
+def _texts(record: Mapping[str, Any]) -> dict[str, str]:
+    return {str(name): str(value) for name, value in record.items()}
 
 
 def check(manifest: Manifest, control: str, machine: Machine | None, path: str) -> None:

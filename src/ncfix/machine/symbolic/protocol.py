@@ -133,53 +133,55 @@ class Identification:
     equations: tuple[Equation, ...]
 
 
-def simplest(found: Iterable[Equation], wanted: sp.Expr | None = None, known: Iterable[sp.Expr] = ()) -> list[Equation]:
+def simplest(
+    system: Iterable[Equation], wanted: sp.Expr | None = None, known: Iterable[sp.Expr] = ()
+) -> list[Equation]:
     """The equations with the fewest unknowns that are not known yet; `wanted`: those that have this one."""
     done = frozenset(known)
-    open_ones = [(equation.unknowns - done, equation) for equation in found]
+    open_ones = [(equation.unknowns - done, equation) for equation in system]
     useful = [(rest, equation) for rest, equation in open_ones if rest and (wanted is None or wanted in rest)]
     fewest = min((len(rest) for rest, _ in useful), default=0)
     return [equation for rest, equation in useful if len(rest) == fewest]
 
 
-def protocol(found: Sequence[Equation], choose: Choose = shortest) -> tuple[Identification, ...]:
+def protocol(system: Sequence[Equation], choose: Choose = shortest) -> tuple[Identification, ...]:
     """Identify one error after the other, each from the simplest equation that is left.
 
     Errors that all these equations only have together are identified as one combination. Where no equation has a
     single unknown, several are solved together.
     """
-    unknowns = sorted(frozenset[sp.Expr]().union(*(equation.unknowns for equation in found)), key=sp.default_sort_key)
+    unknowns = sorted(frozenset[sp.Expr]().union(*(equation.unknowns for equation in system)), key=sp.default_sort_key)
     if not unknowns:
         return ()
-    columns = _columns(found, unknowns)
+    columns = _columns(system, unknowns)
     titles = {unknowns[pivot]: combination for pivot, combination in columns.combinations(unknowns).items()}
     known = set(unknowns) - titles.keys()
     tests: list[Identification] = []
-    while candidates := simplest(found, known=known):
-        solved, used = _solvable(found, choose(candidates), known)
+    while candidates := simplest(system, known=known):
+        solved, used = _solvable(system, choose(candidates), known)
         tests += [Identification(titles[unknown], used) for unknown in solved]
         known |= set(solved)
     return tuple(tests)
 
 
-def _columns(found: Sequence[Equation], unknowns: Sequence[sp.Expr]) -> Columns:
+def _columns(system: Sequence[Equation], unknowns: Sequence[sp.Expr]) -> Columns:
     """A column per unknown, a row per equation."""
     columns: list[dict[Hashable, Poly]] = [{} for _ in unknowns]
-    for equation in found:
+    for equation in system:
         for column, unknown in zip(columns, unknowns, strict=True):
             if unknown in equation.coefficients:
                 column[equation] = equation.coefficients[unknown]
-    return Columns(found[0].algebra, columns)
+    return Columns(system[0].algebra, columns)
 
 
 def _solvable(
-    found: Sequence[Equation], first: Equation, known: set[sp.Expr]
+    system: Sequence[Equation], first: Equation, known: set[sp.Expr]
 ) -> tuple[list[sp.Expr], tuple[Equation, ...]]:
     """The fewest unknowns, with those of the first equation, for which there are as many independent equations."""
     unknowns = sorted(first.unknowns - known, key=sp.default_sort_key)
     if len(unknowns) == 1:
         return unknowns, (first,)
-    useful = sorted((equation for equation in found if equation.unknowns - known), key=lambda equation: equation.terms)
+    useful = sorted((equation for equation in system if equation.unknowns - known), key=lambda equation: equation.terms)
     while True:
         fitting = [first, *(e for e in useful if e is not first and e.unknowns - known <= set(unknowns))]
         rows = _columns(fitting, unknowns).independent_rows
