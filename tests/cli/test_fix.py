@@ -317,3 +317,19 @@ def test_simulate_and_verify_say_that_what_they_take_for_meant_has_been_correcte
         assert f"{fixed}:{line}: NCF430" in ncfix(*arguments, *given).err
     for arguments in (("simulate", "--program", shop.program), ("verify", shop.program, fixed)):
         assert "NCF430" not in ncfix(*arguments, *given).err
+
+
+@pytest.mark.parametrize("part", [1 << 20, 60])
+def test_simulate_and_verify_say_what_they_took_for_granted(
+    shop: Any, ncfix: Any, monkeypatch: pytest.MonkeyPatch, part: int
+) -> None:
+    """Offsets that are taken as zero, and a code that may move anything; read as a whole and in parts."""
+    monkeypatch.setenv("NCFIX_PART_BYTES", str(part))
+    monkeypatch.setenv("NCFIX_NO_FAST", "1")
+    cuts = "".join(f"G1 X{10 + k}\n" for k in range(60))
+    shop.program.write_text(f"G21 G90 G94 F600\nG0 X10 Y10 Z1\n{cuts}G777\n{cuts}M2\n")
+    given = ("-m", shop.machine, "--assume-zero", "--dialect", "iso")
+    for arguments in (("simulate", "--program", shop.program), ("verify", shop.program, shop.program)):
+        said = ncfix(*arguments, *given).err
+        assert said.count("NCF205: work offset G54 is not given and is taken as zero") == 1
+        assert said.count(f"{shop.program}:63:1: NCF228: G777 is not known") == 1

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ncfix.cli import console
 from ncfix.cli.following import Following, figures
 from ncfix.cli.options import read_program
 from ncfix.cli.parts import Source, source_of
 from ncfix.cli.targets import STREAM
 from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
-from ncfix.diagnostics import SourceError
+from ncfix.diagnostics import Message, SourceError
 
 if TYPE_CHECKING:
     from ncfix.compensate.side_by_side import SideBySide
     from ncfix.program.tree import Program
+
+
+Said = tuple[Sequence[Message], ...]
+"""What there is to say of following the original, and the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +71,13 @@ class Pair:
     fixed: Source
     tolerance_um: float
 
-    def compared(self) -> SideBySide:
-        """What this machine does with the two, measured against what the first one means."""
+    def compared(self) -> tuple[SideBySide, Said]:
+        """What this machine does with the two, measured against what the first one means; what is said of following
+        them.
+        """
         return through((self.original, self.fixed), self._in_parts, self._as_wholes)
 
-    def _in_parts(self) -> SideBySide:
+    def _in_parts(self) -> tuple[SideBySide, Said]:
         """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
         from ncfix.compensate.cuts import Cuts
         from ncfix.compensate.side_by_side import SideBySide
@@ -80,19 +88,20 @@ class Pair:
             task = task_of(self.following, source, dialect, *beside)
             cuts.append(Cuts(task, source.read, meant=source is self.original))
         found.run(*map(iter, cuts))
-        return found
+        return found, tuple(each.said for each in cuts)
 
-    def _as_wholes(self) -> SideBySide:
+    def _as_wholes(self) -> tuple[SideBySide, Said]:
         from ncfix.compensate.cuts import whole
         from ncfix.compensate.side_by_side import SideBySide
 
         found = SideBySide(self.tolerance_um / 1e3)
         original = self._read(self.original)
-        machine, moves = self.following.on_machine(original, self.original.path)
+        meant = self.following.on_machine(original, self.original.path)
         other = self._read(self.fixed, like=original)
-        _, done = self.following.on_machine(other, self.fixed.path, self.original.path)
-        found.run(whole(machine, original, moves, meant=True), whole(machine, other, done))
-        return found
+        done = self.following.on_machine(other, self.fixed.path, self.original.path)
+        cuts = whole(meant.machine, original, meant.trace.moves, meant=True)
+        found.run(cuts, whole(meant.machine, other, done.trace.moves))
+        return found, (meant.trace.messages, done.trace.messages)
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
         """A program; if its text does not show that it is of another family, in the dialect of another one.
@@ -111,6 +120,8 @@ class Pair:
 def compared(following: Following, original: str, fixed: str, tolerance_um: float) -> Compared:
     """What this machine does with two programs, measured against what the first one means."""
     with source_of(original) as first, source_of(fixed) as second:
-        found = Compared.of(Pair(following, first, second, tolerance_um).compared())
+        found, (of_first, of_second) = Pair(following, first, second, tolerance_um).compared()
         tell_of_stamp(first)
-        return found
+    told = {(each.code, each.text) for each in of_first}
+    console.tell_some([*of_first, *(each for each in of_second if (each.code, each.text) not in told)])
+    return Compared.of(found)

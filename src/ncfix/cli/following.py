@@ -12,8 +12,9 @@ from ncfix.cli.setup_options import SetupOptions
 if TYPE_CHECKING:
     from ncfix.compensate.along import Along
     from ncfix.compensate.checking import Checked
+    from ncfix.compensate.following import Followed
     from ncfix.machine import Machine
-    from ncfix.program.moves import Moves, Trace
+    from ncfix.program.moves import Trace
     from ncfix.program.setup import Setup
     from ncfix.program.tree import Program, Template
 
@@ -67,13 +68,12 @@ class Following:
             return axes_of(program.templates), frozenset(ROTARY)
         return self.machine.axis_names, rotary_names(self.machine)
 
-    def on_machine(self, program: Program, *paths: str) -> tuple[Machine, Moves]:
+    def on_machine(self, program: Program, *paths: str) -> Followed:
         """A program as this machine follows it; `paths`: files beside which its subprograms may be."""
         from ncfix.compensate.following import follow
 
         assert self.machine is not None
-        found = follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
-        return found.machine, found.trace.moves
+        return follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
 
 
 def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:

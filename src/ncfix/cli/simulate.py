@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import chain
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ncfix.cli.table import Columns
     from ncfix.compensate.along import Along
     from ncfix.compensate.simulation import TipError
+    from ncfix.diagnostics import Message
     from ncfix.measure.synthetic import Faults
 
 NOT_NEGATIVE = FiniteRange(min=0.0, max=1e6)
@@ -84,8 +85,9 @@ def _simulate_program(following: Following, program: str, target: Target | None,
     with source_of(program) as source, ExitStack() as opened:
         errors = Errors(following, source, Keep(target.file, opened) if target else None)
         with console.busy(f"simulating {shown(program)}"):
-            table, along = through([source], errors.in_parts, errors.whole)
+            table, along, messages = through([source], errors.in_parts, errors.whole)
         tell_of_stamp(source)
+        console.tell_some(messages)
         if target:
             target.write(table)
     found = figures(along)
@@ -115,14 +117,19 @@ class Errors:
     source: Source
     keep: Keep | None
 
-    def in_parts(self) -> tuple[Iterable[bytes], Along]:
-        """The table and the figures, of a program that is read; raises what that does, and `NotInPartsError`."""
+    def in_parts(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
+        """The table, the figures and what else there is to say, of a program that is read.
+
+        Raises what reading does, and `NotInPartsError`.
+        """
         from ncfix.compensate.simulation import tip_errors_on
 
         task = task_of(self.following, self.source, dialect_in(self.following, self.source))
-        return self._gone_along(tip_errors_on(task, self.source.read), self.keep)
+        said: list[Message] = []
+        table, along = self._gone_along(tip_errors_on(task, self.source.read, said), self.keep)
+        return table, along, said
 
-    def whole(self) -> tuple[Iterable[bytes], Along]:
+    def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
         """The same of a program as a whole."""
         from ncfix.compensate.intent import Intent
         from ncfix.compensate.simulation import tip_errors
@@ -130,9 +137,11 @@ class Errors:
 
         path = self.source.path
         program = self.following.read(path, self.source.everything())
-        machine, moves = self.following.on_machine(program, path)
-        errors = tip_errors(Intent(machine, moves, State()), program.lines(moves.block))
-        return self._gone_along(errors, self.keep and list)
+        found = self.following.on_machine(program, path)
+        moves = found.trace.moves
+        errors = tip_errors(Intent(found.machine, moves, State()), program.lines(moves.block))
+        table, along = self._gone_along(errors, self.keep and list)
+        return table, along, found.trace.messages
 
     def _gone_along(
         self, errors: Iterable[TipError], keep: Callable[[Iterable[bytes]], Iterable[bytes]] | None

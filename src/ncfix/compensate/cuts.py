@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,7 @@ from ncfix.compensate.stretches import Stretches
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
+from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 from ncfix.program.parts import joined_moves, taken
@@ -113,11 +114,13 @@ class Cuts:
 
     read   gives the next so many bytes of the text; none at its end
     meant  with what it means
+    said   what there is to say of following it, once the last part is there
     """
 
     task: Task
     read: Read
     meant: bool
+    said: list[Message] = field(default_factory=list)
 
     def __iter__(self) -> Iterator[Cut]:
         """The parts. Raises what reading and following do, and UsageError for what is not given."""
@@ -127,6 +130,8 @@ class Cuts:
         around = None
         for unit in units:
             moves, lines = unit.part.moves, unit.part.lines
+            if unit.part.last:
+                self.said.extend(units.messages)
             if not matters(machine):
                 yield Cut.of(Intent(machine, moves, State()), lines, slice(None), unit.part.last, self.meant)
                 continue

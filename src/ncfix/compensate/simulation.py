@@ -19,6 +19,7 @@ from ncfix.compensate.ragged import batches, owners
 from ncfix.compensate.sampling import MOST_SHOWN, closely, even, merged, with_kinks
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
+from ncfix.diagnostics import Message
 from ncfix.machine import State
 from ncfix.program.moves import Kind, Moves
 
@@ -80,8 +81,11 @@ def tip_errors(intent: Intent, lines: Index, first: int = 0, made: Tip | None = 
         yield TipError(rows, lines[rows], fraction, intent.tip(rows, fraction), made(intent, rows, fraction))
 
 
-def tip_errors_on(task: Task, read: Read) -> Iterator[TipError]:
-    """As `tip_errors`, of the text that is read; raises what following does, and `NotInPartsError`."""
+def tip_errors_on(task: Task, read: Read, said: list[Message]) -> Iterator[TipError]:
+    """As `tip_errors`, of the text that is read; raises what following does, and `NotInPartsError`.
+
+    said  gets what there is to say of following it, at the end
+    """
     units = Units.of(task, read)
     for unit in units:
         if units.sided:
@@ -90,6 +94,7 @@ def tip_errors_on(task: Task, read: Read) -> Iterator[TipError]:
         else:
             yield from tip_errors(Intent(units.placed, unit.part.moves, State()), unit.part.lines)
     units.blocks_behind()
+    said += units.messages
 
 
 def samples(intent: Intent, first: int = 0) -> Iterator[tuple[Index, Array]]:

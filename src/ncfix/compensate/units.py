@@ -93,6 +93,11 @@ class Units(Parts):
         """What was taken as zero so far, in words."""
         return (*self.follower.assumed, *self.tools)
 
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """What there is to say of following the program, so far."""
+        return (*self.follower.messages, *self.notes.values())
+
     def __iter__(self) -> Iterator[Unit]:
         """The parts; none any more once something is lacking.
 
