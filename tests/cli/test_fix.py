@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
+from ncfix.cli.options import Beside
 from ncfix.diagnostics import ExitCode
 
 NEITHER_OFFSET_NOR_START = b"G21 G90 G94 G54\nG1 X10 F100\nM2\n"
@@ -254,6 +257,19 @@ def test_a_name_that_two_files_have_in_other_cases_is_no_subprogram(shop: Any, n
     for name in ("Side.ngc", "SIDE.ngc"):
         (shop.folder / name).write_bytes(b"o<side> sub\nG1 X100 F600\no<side> endsub\n")
     assert "NCF231" in ncfix("trace", shop.program).err
+
+
+def test_a_folder_is_listed_once_for_all_the_subprograms_that_it_lacks(tmp_path: Path) -> None:
+    """A builder's cycle may be called thousands of times, and the folder may have thousands of files."""
+    (tmp_path / "Bore.NC").write_bytes(b"M17")
+    find = Beside((str(tmp_path),))
+    with mock.patch("os.listdir", side_effect=os.listdir) as listed:
+        assert [find(f"L{number}") for number in range(9)] == [None] * 9
+        assert find("BORE") == b"M17"
+    assert listed.call_count == 1
+    (tmp_path / "Mill.NC").write_bytes(b"M30")
+    os.utime(tmp_path, ns=(0, 10**18))
+    assert find("MILL") == b"M30"
 
 
 def test_a_folder_of_subprograms_that_is_not_there_is_named(shop: Any, ncfix: Any, tmp_path: Path) -> None:

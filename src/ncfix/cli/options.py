@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -155,10 +156,20 @@ def file_of(folder: str, name: str) -> str:
     if os.path.isfile(path):
         return path
     try:
-        alike = [os.path.join(folder, each) for each in os.listdir(folder) if each.lower() == name.lower()]
+        alike = names_in(folder, os.stat(folder).st_mtime_ns).get(name.lower(), [])
     except OSError:
         return ""
-    return alike[0] if len(alike) == 1 and os.path.isfile(alike[0]) else ""
+    path = os.path.join(folder, alike[0]) if len(alike) == 1 else ""
+    return path if os.path.isfile(path) else ""
+
+
+@lru_cache(maxsize=8)
+def names_in(folder: str, changed: int) -> dict[str, list[str]]:
+    """What is in a folder that has changed last at a time (ns): names as they are, by names in lower case."""
+    found: dict[str, list[str]] = {}
+    for each in os.listdir(folder):
+        found.setdefault(each.lower(), []).append(each)
+    return found
 
 
 def subprograms(setup: Setup, *paths: str) -> Callable[[str], bytes | None]:
