@@ -93,6 +93,20 @@ def test_constants_that_the_data_put_elsewhere_are_said_and_changed(known: Machi
     assert abs(found.machine.effects[index].coefficients[0] - true) < 20e-6
 
 
+def test_nothing_missing_does_not_hide_constants_that_are_wrong(known: Machine) -> None:
+    """No machine file comes of it, so it is said who puts them right."""
+    index = next(k for k, effect in enumerate(known.effects) if effect.name == "EC0Y")
+    off = replace(known.effects[index], coefficients=(known.effects[index].coefficients[0] + 60e-6,))
+    found = diagnose(
+        [measured(known)], known.replace(effects=(*known.effects[:index], off, *known.effects[index + 1 :]))
+    )
+    assert found.verdict == NOTHING
+    assert found.machine is None
+    assert "but constants of the machine file are not what the data say" in words.text(found).splitlines()[0]
+    assert "ncfix calibrate" in words.text(found)
+    assert "ncfix calibrate" in markdown.render(document(found)).decode()
+
+
 def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None:
     """Kind `axis` has `direction`, not `dir_X`; play is seen all the same."""
     text = "# ncfix-measurement: 1\n# kind: axis\n# noise_um: 0.5\naxis,component,position,value,run,direction\n"

@@ -97,4 +97,5 @@ def _write_next(diagnosis: Diagnosis, target: Target) -> None:
 
 def _say_written(diagnosis: Diagnosis, output: str | None, written: str | None) -> None:
     if output and written is None:
-        console.say("no machine file was written: there is nothing to add to the model")
+        wrong = "; constants that are wrong are for `ncfix calibrate`" if diagnosis.moved else ""
+        console.say(f"no machine file was written: there is nothing to add to the model{wrong}")

@@ -44,6 +44,8 @@ FEWER = 0.8
 """Poses that ask for more must leave so much fewer cases open, as a share."""
 HELPS = 0.05
 """And any must raise the chance that one name stands alone by so much."""
+ALIKE = "wherever these axes go, and with other tools, they show nearly the same pattern"
+"""Why no poses are proposed."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -141,11 +143,12 @@ def _best_of(court: Court, sides: Sequence[Side], sigma: float, offered: Measure
     index = exchanged(rounds.useful, len(offered)) if rounds.useful else everything
     chances = [float(np.mean(chance(worst(rounds.contests, rows)))) for rows in ([], index)]
     before, after = (min(worst(rounds.useful or rounds.contests, rows)) for rows in ([], index))
-    reason, (name, *others) = _reason(court, [side.group for side in sides]), rounds.names
+    name, *others = rounds.names
     if not rounds.useful or chances[1] < chances[0] + HELPS:
-        return Proposal(name, None, before, after, chances[0], reason, tuple(others))
+        return Proposal(name, None, before, after, chances[0], ALIKE, tuple(others))
     told = rounds.told_from_first
     alike = tuple(each for each in others if each not in told)
+    reason = _reason(court, [side.group for side in sides])
     found = Proposal(name, None, before, after, chances[1], reason, told, alike, rounds.stuck)
     return _with_plan(found, offered.rows(index), court.background.view)
 

@@ -89,7 +89,12 @@ def _ambiguity(diagnosis: Diagnosis) -> dict[str, Any] | None:
         "reason": p.reason,
         "alike": p.alike,
         "stuck": p.stuck,
-        "told_apart": {"now": p.before, "after": p.after, "chance": p.chance, "times_each": p.times},
+        "told_apart": {
+            "now": p.before,
+            "after": p.after,
+            "chance": p.chance,
+            "times_each": p.times if p.plan is not None else None,
+        },
         "beyond_travels_measured": list(p.beyond),
         "tip_beyond": p.strays,
         "new_tool_lengths": list(p.tools),

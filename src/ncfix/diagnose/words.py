@@ -32,7 +32,7 @@ def text(diagnosis: Diagnosis) -> str:
     """The report for a terminal."""
     gap = diagnosis.gap
     lines = [
-        f"verdict: {diagnosis.verdict}: {SAID[diagnosis.verdict]}",
+        f"verdict: {diagnosis.verdict}: {verdict(diagnosis)}",
         f"gap: {gap.before:.2f} um before, {gap.after:.2f} um after, noise {gap.floor:.2f} um "
         f"({NOISE[diagnosis.floor.source]}); held out: {gap.holdout_before:.2f} -> {gap.holdout_after:.2f} um",
     ]
@@ -52,12 +52,25 @@ def text(diagnosis: Diagnosis) -> str:
     if diagnosis.moved:
         lines += ["", "constants of the machine file that the data put elsewhere (the gap before is after that):"]
         lines += [f"  {constant(each)}" for each in diagnosis.moved]
+        lines += [f"  {each}" for each in anew(diagnosis)]
     if diagnosis.verdict == NOTHING:
         lines += ["", *silence(diagnosis)]
     lines += _next(diagnosis)
     if diagnosis.case.outlying.any():
         lines += ["", f"{int(diagnosis.case.outlying.sum())} rows put aside as outliers (--json lists them)"]
     return "\n".join(lines) + "\n"
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """What the verdict means; that nothing is missing does not mean that the machine file is right."""
+    said = SAID[diagnosis.verdict]
+    return f"{said}, but constants of the machine file are not what the data say" if anew(diagnosis) else said
+
+
+def anew(diagnosis: Diagnosis) -> list[str]:
+    """What to do about constants that are wrong where no machine file comes out of the diagnosis."""
+    wrong = diagnosis.moved and diagnosis.verdict == NOTHING
+    return ["no machine file is written for these: `ncfix calibrate` estimates them anew"] if wrong else []
 
 
 def silence(diagnosis: Diagnosis) -> list[str]:

@@ -10,7 +10,7 @@ from ncfix.diagnose.findings import Diagnosis, Finding
 from ncfix.diagnose.verdict import NOTHING
 from ncfix.diagnose.words import (
     NOISE,
-    SAID,
+    anew,
     carried,
     constant,
     constants,
@@ -20,6 +20,7 @@ from ncfix.diagnose.words import (
     rest,
     silence,
     unusual,
+    verdict,
     why,
 )
 from ncfix.machine import Effect
@@ -60,7 +61,7 @@ def _verdict(diagnosis: Diagnosis) -> Section:
     files = ", ".join(dict.fromkeys(each.path for each in diagnosis.view.measurements))
     noise = f"noise {diagnosis.floor.sigma_um:.2f} um a value, {NOISE[diagnosis.floor.source]}"
     parts: list[Part] = [
-        Text(f"{diagnosis.verdict}: {SAID[diagnosis.verdict]}."),
+        Text(f"{diagnosis.verdict}: {verdict(diagnosis)}."),
         Text(f"{diagnosis.view.count} rows of {files}; {noise}."),
         Table(("gap, um rms", "before", "after", "noise"), rows),
     ]
@@ -94,6 +95,7 @@ def _moved(diagnosis: Diagnosis) -> Iterator[Part]:
     if diagnosis.moved:
         yield Text("Constants of the machine file that the data put elsewhere (the gap before is after that):")
         yield Table((), [(constant(each),) for each in diagnosis.moved])
+        yield from (Text(f"{each[0].upper()}{each[1:]}.") for each in anew(diagnosis))
 
 
 def _finding(diagnosis: Diagnosis, finding: Finding) -> Section:
