@@ -112,7 +112,7 @@ class Bulk:
         fit = plain & layouts.known[shapes]
         several = np.flatnonzero(np.diff(first_piece) > 1)
         fit[several] &= layouts.further[shapes[several]]
-        if pieces.arc.any():
+        if (moves.kind == Kind.ARC).any():
             fit |= sound(moves, pieces, first_piece) & whole_arcs(program, moves, pieces, first_piece[:-1], layouts)
         if language.one_by_one is not None:
             fit &= ~language.one_by_one(program, moves, pieces, first_piece)

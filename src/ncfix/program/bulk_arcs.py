@@ -36,17 +36,21 @@ TIE = 1e-4
 def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, layouts: Layouts) -> Mask:
     """(n,) arcs that become one arc, and whose words are such that it may be written in bulk.
 
+    Those that the renderer writes by themselves may become more than that.
+
     first  (n,) the first piece of each motion
     """
-    fit: Mask = (moves.kind == Kind.ARC) & pieces.arc[first]
+    fit: Mask = moves.kind == Kind.ARC
     if not fit.any() or not {"X", "Y", "Z"} <= set(moves.axes):
         return np.zeros(len(moves), dtype=np.bool_)
-    fit &= (pieces.fraction[first] == 1) & ((moves.modal == 20) | (moves.modal == 30))
-    fit &= layouts.round[program.template[moves.block]]
+    shapes = program.template[moves.block]
+    alone, single = layouts.alone[shapes], pieces.fraction[first] == 1
+    fit &= np.where(alone, single | layouts.further[shapes], single & pieces.arc[first])
+    fit &= layouts.round[shapes] & ((moves.modal == 20) | (moves.modal == 30))
     rows = np.flatnonzero(fit)
     plane = _spatial(moves)[_planes(moves, rows)]
     chord = np.take_along_axis(moves.end[rows] - moves.start[rows], plane, axis=1)
-    known = np.isfinite(pieces.centre[first[rows]]).all(axis=1)
+    known = np.isfinite(pieces.centre[first[rows]]).all(axis=1) | ~pieces.arc[first[rows]]
     fit[rows] = known & (np.abs(chord) >= CIRCLE_MM).any(axis=1)
     return fit
 

@@ -188,8 +188,7 @@ class _Emitter:
         self.end[first : first + len(ends)] = ends
         self.start[row] = self.position
         self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
-        self.in_stretch[row:stop] = True
-        self.cycle_end = None
+        self.in_stretch[row:stop], self.cycle_end = True, None
         self._write_alone(row, stop)
         self.position = self.end[first + len(ends) - 1].copy()
         return stop - row
@@ -198,6 +197,7 @@ class _Emitter:
         """Write the arcs of a stretch that the renderer has to write."""
         rows = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
         self.in_stretch[rows] = False
+        self.replaced = self.replaced if stop - 1 in rows[-1:] else None
         self.bulk.take_out(rows)
 
     def _written(self, row: int) -> FloatArray:

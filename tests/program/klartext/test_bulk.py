@@ -102,7 +102,9 @@ def test_arcs_among_many_at_a_time_as_one_by_one(comma: bool, size: float) -> No
                 blocks[place] = random.choice([motion(random, comma), DWELL, *OTHERS[:-1]])
         source = program("\n".join(["TOOL CALL 1 Z S1000", "L X+0 Y+0 Z+0 B+0 C+0 R0 F1000", *blocks]))
         found, moves = followed(source, ("same", "none")[seed % 2])
-        assert_same(found, moves, moved(moves, seed, size))
+        pieces = moved(moves, seed, size)
+        arcs = (moves.kind == Kind.ARC)[pieces.move] & (np.arange(len(pieces)) % 3 > 0)
+        assert_same(found, moves, replace(pieces, arc=pieces.arc | arcs))
 
 
 def test_motions_between_arcs_are_written_at_once() -> None:

@@ -51,7 +51,7 @@ def in_bulk(program: Program, block: int) -> BulkLayout | None:
         layout.words_at,
         layout.blank,
         lower=False,
-        further=layout.name in STRAIGHT and not layout.late,
+        further=not layout.late,
         lead=lead_of(program, block, layout),
         opening="L",
         closing=f"{layout.blank}FMAX" if layout.rapid else "",
