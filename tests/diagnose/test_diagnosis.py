@@ -104,7 +104,7 @@ def test_nothing_missing_does_not_hide_constants_that_are_wrong(known: Machine) 
     assert found.machine is None
     assert "but constants of the machine file are not what the data say" in words.text(found).splitlines()[0]
     assert "ncfix calibrate" in words.text(found)
-    assert "ncfix calibrate" in markdown.render(document(found)).decode()
+    assert "ncfix calibrate" in markdown.rendered(document(found)).decode()
 
 
 def test_a_laser_says_the_direction_of_its_runs_by_a_column_of_its_own() -> None:
