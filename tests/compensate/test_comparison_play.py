@@ -15,7 +15,9 @@ from scipy.spatial import KDTree
 
 from compensate.side import compared
 from compensate.test_comparison import fixed, moves_of
+from ncfix.compensate.bodies import Bodies
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.stretches import Stretches
 from ncfix.machine import Machine, State, load
 from ncfix.machine.effect import Effect
 from ncfix.machine.smooth import Backlash
@@ -181,3 +183,14 @@ def test_a_lift_within_one_cut_is_missed(machine: Machine) -> None:
     assert there.max == pytest.approx(0.05, abs=LIMIT), "half of it, from where the cut ends"
     where, column = there.where, machine.axis_names.index("X")
     assert after.start[where, column] < 52 < after.end[where, column]
+
+
+def test_play_that_is_taken_up_where_a_motion_ends_divides_none(machine: Machine) -> None:
+    """Steps as long as the play, of a machine without other errors, at places of all sizes."""
+    alone = machine.replace(effects=tuple(each for each in machine.effects if each.basis.needs_direction))
+    steps = [f"G1 X{at}\nX{at - 0.0072:.4f}\nY{k}\nX{at - 3}" for k, at in enumerate((20, 30, 7, 45, 100, 17))]
+    intent = Intent(
+        alone, moves_of("\n".join(["G21 G90 G94 G17 F900", "G0 X5 Y5 Z5", *steps, "M2", ""]), alone), State()
+    )
+    stretches = Bodies.of(intent, Stretches.of(intent), None).divided()
+    assert (stretches.stop - stretches.start).min() > 1e-6

@@ -155,9 +155,10 @@ class Bodies:
         gone = np.cumsum(np.abs(np.diff(places, prepend=places[:1])))
         run, far = runs.takes_up
         at = np.searchsorted(gone, gone[runs.begin[run]] + far)
-        inside = np.flatnonzero((at % 2 == 1) & (self.own[at // 2] >= 0))
-        run, leg = run[inside], at[inside] // 2
-        return self.own[leg], self._reaching(leg, axis, runs.q[run] + runs.way[run] * far[inside])
+        leg, target = at // 2, runs.q[run] + runs.way[run] * far
+        off = np.abs(self.q[:, leg, axis] - target).min(axis=0)  # else it is where a leg begins or ends
+        inside = np.flatnonzero((at % 2 == 1) & (self.own[leg] >= 0) & (off > REST))
+        return self.own[leg[inside]], self._reaching(leg[inside], axis, target[inside])
 
     def _reaching(self, which: Index, axis: int, target: Array) -> Array:
         """The fractions of motions at which, in legs (m,), an axis is at positions (m,), (m,)."""
