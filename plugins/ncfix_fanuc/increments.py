@@ -14,6 +14,7 @@ from ncfix.tables.positioning import positioning
 from ncfix_fanuc.pitch_text import LARGEST, MOST, Pitch
 
 MOST_MAGNIFICATION = 100
+"""The largest magnification of pitch errors (parameter 3623)."""
 
 
 def curves(request: Request) -> dict[str, tuple[Grid, ...]]:

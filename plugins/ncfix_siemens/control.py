@@ -39,6 +39,7 @@ WORTH = 0.9
 WORTHLESS = 0.2
 """Share of the error without tables that may be left at the worst, within the target, for a better orientation."""
 CHECKS = 1000
+"""Random poses at which schemes are compared."""
 
 
 class Siemens(Control):

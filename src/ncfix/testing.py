@@ -36,6 +36,7 @@ coefficients = [{size}, {half}]
 CHAINS = {"w F X Y Z t": 1, "w X F Y Z t": -1, "w Y X F Z t": -1}
 """Three-axis chains, with the direction in which the body of X moves: on the tool side and on the workpiece side."""
 POSES = 400
+"""Random poses at which is looked what the tables of the contract leave."""
 
 
 def single_error(effect: str, size: float = 0.01, topology: str = "w F X Y Z t") -> Machine:

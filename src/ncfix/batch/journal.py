@@ -18,8 +18,6 @@ from ncfix import files
 
 NAME = ".ncfix-journal.jsonl"
 SCHEMA = 1
-CHUNK = 1 << 20
-"""Bytes read at once."""
 
 Find = Callable[[str], bytes | None]
 """Gives the text of a subprogram by its name."""

@@ -23,6 +23,7 @@ MOST_SHOWN = 1 << 14
 MOST_TURNS = MOST / DENSITY * EIGHTH
 """rad; a motion that turns an axis by more cannot be looked at."""
 BISECTIONS = 40
+"""How often the stretch in which an axis turns round is halved to find where."""
 
 
 def features(machine: Machine) -> Array:

@@ -21,7 +21,9 @@ WIDE_UM = 1e5
 TRIM = 0.97
 """Share of the values that count: the rest may be outliers."""
 STEPS = 4
+"""Most steps of least squares on the exact model."""
 SETTLED_UM = 0.05
+"""A step that changes no prediction by so much is the last one."""
 
 
 @dataclass(frozen=True)

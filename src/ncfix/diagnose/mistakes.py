@@ -43,6 +43,7 @@ OFF_MM = 0.3
 NOWHERE_MM = 0.1
 """A first step that is smaller leads to none that is off: what it leaves is of second order."""
 PIVOT_STEPS = 3
+"""Steps in which the point of an axis is moved to where the data have it."""
 INCH = 25.4
 
 

@@ -15,9 +15,11 @@ from ncfix.measure.solve import orthonormal, without
 REACH = 0.16
 """Of the travel measured: how far a table may be off."""
 PLACES = 33
+"""Shifts that are tried over that reach, to both sides; the middle one is none."""
 OF_FILE = "stale table: the curves of the file belong some way beside: "
 OF_CONTROL = "stale table: the control corrects with a table shifted by "
 ROUNDS = 4
+"""How often the shift of each axis is chosen beside those of the others."""
 
 
 def tables(data: Sequence[Measurement], machine: Machine) -> Iterator[tuple[Machine, str]]:

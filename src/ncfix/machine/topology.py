@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-RESERVED = "FS"
-
 
 @dataclass(frozen=True, slots=True)
 class Topology:

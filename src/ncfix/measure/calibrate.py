@@ -24,11 +24,13 @@ from ncfix.measure.selection import Selection, select
 from ncfix.measure.solve import Solution, solve
 
 STEPS = 25
+"""Most steps of the iteration."""
 CONVERGED = 1e-5
 """Change of the predictions, in units of the noise, that is none."""
 FAR = 1e6
 """The same: from here on it is no iteration any more."""
 UNLIKELY = 0.01
+"""Probability of so large a chi-square below which the noise is taken to be larger than it is said to be."""
 ROUNDING = 1e-9
 """mm of reading per mm or rad of error: a column that is nowhere larger is made of rounding errors."""
 

@@ -14,7 +14,6 @@ from ncfix.measure.kinds import CHOICES, KINDS, STATES, Kind
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-DEGREE = np.pi / 180
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from ncfix.measure.candidates import Room, candidates
 from ncfix.measure.measurement import Array
 
 PLACES = 400
+"""Poses over the travels at which the tip error is predicted."""
 UM = 1e3
 
 

@@ -22,7 +22,6 @@ from ncfix.measure.kinds import KINDS, STATES, Kind
 from ncfix.measure.lines import Cell, Text
 from ncfix.measure.measurement import Array, Measurement
 
-SCHEMA = "ncfix-measurement"
 SEPARATED = "cells are separated by commas, numbers have a decimal point"
 COMMA = re.compile(r"[-+]?\d+,\d+")
 LABELS = ("set", "repeat")

@@ -26,7 +26,6 @@ BETTER = 0.2
 """Squares left after exchanging columns, of those before, from which on the columns look exchanged."""
 NAMED = 20
 """Outliers that are named one by one."""
-SMALLEST = 1e-18
 
 
 def result(problem: Problem, estimate: Estimate, loss: str) -> Calibration:

@@ -17,8 +17,9 @@ from ncfix.measure.observe import observe
 from ncfix.measure.probing import Probing
 
 ROUNDS = 50
-SETTLED = 1e-12
-HOUR = 3600.0
+"""Most iterations to find them."""
+SETTLED = 1e-9
+"""mm: readings that change by less are found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ def _settled(plan: Measurement, machine: Machine, setup: Array) -> tuple[Measure
         moved = float(np.abs(values[: 3 * len(plan)] - model.values[: 3 * len(plan)]).max())
         plan = model.with_values(values)
         model = observe(plan, machine)
-        if moved < SETTLED * 1e3:
+        if moved < SETTLED:
             break
     return plan, model
 

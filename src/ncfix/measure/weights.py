@@ -13,7 +13,6 @@ from ncfix.measure.measurement import Array
 from ncfix.measure.solve import Solution
 
 AUTO, NONE, HUBER, TUKEY = "auto", "none", "huber", "tukey"
-LOSSES = (AUTO, NONE, HUBER, TUKEY)
 HUBER_K, TUKEY_K = 1.345, 4.685
 """The usual constants: 95 % efficiency for normal noise."""
 ROUNDS = 30

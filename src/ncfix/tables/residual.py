@@ -14,6 +14,7 @@ from ncfix.tables.neutral import Tables
 from ncfix.tables.poses import random_poses, random_ways
 
 POSES = 20_000
+"""Random poses at which is looked what tables leave."""
 
 
 @dataclass(frozen=True, slots=True)

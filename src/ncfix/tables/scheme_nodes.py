@@ -17,6 +17,7 @@ SCALE = 10**4
 STEPS = ((120, 160, 200), (240, 320, 400), (720, 800, 640), (1440, 1600, 1280))
 """How many fine steps, from coarse to fine: numbers with many divisors. The first that divides the range is taken."""
 PER_FEATURE = 3
+"""Steps for each length within which the errors may bend."""
 
 
 @dataclass(frozen=True, slots=True)

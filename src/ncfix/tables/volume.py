@@ -28,6 +28,7 @@ CLOSE = 48
 """Up to here every count of even nodes is looked at, since they may come to lie on the kinks of a table; then some."""
 FAR = 130
 GROWTH = 1.15
+"""Most nodes that are looked at, and by which factor their count grows to there."""
 
 
 def as_it_is(grid: Grid) -> Grid:

@@ -18,7 +18,9 @@ from ncfix.machine.symbolic.variables import Variable
 CLOSE = 1e-14
 """How near an exact constant a number must be: well below what the fast engine resolves."""
 STEPS_PER_DEGREE = 60
+"""Angles of whole minutes of arc are exact."""
 LARGEST_DENOMINATOR = 100
+"""Numbers whose squares are fractions with no larger denominator are exact."""
 
 
 class Constants:

@@ -28,7 +28,6 @@ POSITIONS = (range(5001, 5021), range(5021, 5041), range(5041, 5061))
 """End of the block before, machine position, present position."""
 
 POSITION_READ = "NCF241"
-ALARM = 3000
 
 
 @dataclass(slots=True)

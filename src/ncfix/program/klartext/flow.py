@@ -18,6 +18,7 @@ NO_LABEL = "NCF276"
 NO_PROGRAM = "NCF231"
 TOO_DEEP = "NCF232"
 MOST_CALLS = 64
+"""How deep calls may be nested."""
 
 
 @dataclass(frozen=True, slots=True)

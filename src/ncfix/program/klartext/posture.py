@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.program.follow.coordinates import Rotation, Vector, X, Y, Z, as_rotation
 from ncfix.program.follow.tcp import PROBE
@@ -18,8 +17,6 @@ from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.transformations import Triple, minus, unit
 from ncfix.program.moves import TcpState
 from ncfix.program.pointing import SQUARE, within
-
-FloatArray = NDArray[np.float64]
 
 NOT_NORMAL = "the tool does not stand normal to the tilted plane, by the axis positions of the program"
 

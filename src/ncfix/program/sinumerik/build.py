@@ -34,6 +34,7 @@ BRACKET = "("
 
 BASES = {"H": 16, "B": 2, "D": 10}
 MAX_DEPTH = 150
+"""How deep expressions may be nested."""
 
 
 def build(tree: Branch, text: str) -> Parsed:

@@ -17,6 +17,7 @@ from ncfix.program.sinumerik.variables import Local
 from ncfix.program.tree import Expression, NamedParameter, Parameter
 
 MAX_CALLS = 16
+"""How deep subprograms may be nested."""
 TOO_DEEP = "NCF232"
 NO_LABEL = "NCF230"
 

@@ -17,7 +17,6 @@ MEASURING = "measuring (MEAS)"
 AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
 REFERENCE = {740: "reference point (G74)", 750: "fixed point (G75)"}
 AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
-APPROACH = frozenset({1400, 1410, 1420, 1430, 1470, 1480, 2470, 2480, 3400, 3410, 3470, 3480})
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
 AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
 CORNERS = frozenset({"RND", "CHF", "CHR"})
