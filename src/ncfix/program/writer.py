@@ -99,6 +99,13 @@ class Splices:
         data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(kept, self.length)]
         return Splices(self.start[kept], self.stop[kept], self.length[kept], data.tobytes())
 
+    def rows(self, chosen: NDArray[np.int64]) -> Splices:
+        """Some of them, (k,) in order."""
+        length, before = self.length.take(chosen), np.cumsum(self.length) - self.length
+        places = np.arange(int(length.sum())) + np.repeat(before.take(chosen) - (np.cumsum(length) - length), length)
+        data = np.frombuffer(self.data, dtype=np.uint8).take(places).tobytes()
+        return Splices(self.start.take(chosen), self.stop.take(chosen), length, data)
+
     def edits(self) -> Iterator[Edit]:
         """One by one."""
         at = 0
@@ -123,9 +130,8 @@ def spliced(source: bytes, splices: Splices) -> bytes:
         writing_kernels.spliced(text, *columns, data, out)
         return out.tobytes()
     other = np.flatnonzero(splices.length != stop - start)
-    if FEW * len(other) > len(splices):
-        return _laid_out(source, splices)
-    return _put_in(_in_place(source, splices, other), splices, other)
+    begun, others = _in_place(source, splices, other), splices.rows(other)
+    return _laid_out(begun, others) if FEW * len(other) > len(splices) else _put_in(begun, others)
 
 
 def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
@@ -139,7 +145,7 @@ def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
 
 
 FEW = 16
-"""Where no more than one in so many edits changes the length of the text, the others are made where they stand."""
+"""Where no more than one in so many edits changes the length of the text, these are made one by one."""
 
 
 def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> memoryview:
@@ -157,19 +163,16 @@ def _stretches(text: bytes | bytearray, size: int) -> NDArray[np.void]:
     return np.ndarray((len(text) - size + 1,), f"V{size}", text, strides=(1,))
 
 
-def _put_in(text: memoryview, splices: Splices, other: NDArray[np.int64]) -> bytes:
-    """The text with the `other` edits made, too."""
-    pieces: list[bytes | memoryview] = []
-    done = 0
-    ends = np.cumsum(splices.length)[other]
-    edges = (splices.start[other], splices.stop[other], ends - splices.length[other], ends)
-    for start, stop, begin, end in zip(*(edge.tolist() for edge in edges), strict=True):
-        pieces += (text[done:start], splices.data[begin:end])
-        done = stop
-    return b"".join([*pieces, text[done:]])
+def _put_in(source: memoryview, splices: Splices) -> bytes:
+    """The source with all edits made, one by one."""
+    pieces, done, at = list[bytes | memoryview](), 0, 0
+    for start, stop, length in zip(splices.start.tolist(), splices.stop.tolist(), splices.length.tolist(), strict=True):
+        pieces += (source[done:start], splices.data[at : at + length])
+        done, at = stop, at + length
+    return b"".join([*pieces, source[done:]])
 
 
-def _laid_out(source: bytes, splices: Splices) -> bytes:
+def _laid_out(source: memoryview, splices: Splices) -> bytes:
     """The source with all edits made, by masks of what is kept and of what is new."""
     start, stop = splices.start, splices.stop
     kept = ~_cover(len(source), start, stop)
