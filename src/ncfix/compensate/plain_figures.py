@@ -18,7 +18,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.known import TURNED, Known
 from ncfix.compensate.plain import Course
 from ncfix.compensate.ragged import batches, owners, places
-from ncfix.compensate.rows import greatest, lengths, picked
+from ncfix.compensate.rows import greatest, lengths, picked, totals
 from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, even, features, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
@@ -59,7 +59,7 @@ def _by_columns(
     """
     (shown, apart), moves, machine = masks, course.part.moves, course.intent.machine
     apart |= greatest(np.abs(written.end - course.real.end)[:, machine.rotary]) > TURNED
-    bends = (np.abs(moves.end - moves.start) / features(machine)).sum(axis=1)
+    bends = totals(np.abs(moves.end - moves.start) / features(machine))
     counts = _looks(course, shown & ~apart, _led_bends(course) if moves.tcp[0] else bends)
     rows = np.flatnonzero(shown & ~apart)
     if rows.size:

@@ -56,6 +56,11 @@ def greatest(table: Array) -> Array:
     return reduce(np.maximum, table.T, np.zeros(len(table)))
 
 
+def totals(table: Array) -> Array:
+    """The sum of each row, (n,), from the first column on."""
+    return reduce(np.add, table.T)
+
+
 def farthest(table: Array) -> Array:
     """How far from 0 each column goes, (m,); NaN if that is not known."""
     return np.array([np.abs(column).max() for column in table.T])
