@@ -8,7 +8,7 @@ import pytest
 
 FAMILIES = {"rs274", "fanuc", "sinumerik", "klartext"}
 ELSEWHERE = {
-    "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures",
+    "scipy", "rich", "sympy", "numba", "llvmlite", "multiprocessing", "concurrent.futures", "numpy.ma",
     "ncfix.diagnose", "ncfix.measure", "ncfix.report", "ncfix.machine.symbolic", "ncfix.kernel",
     "ncfix.compensate.stream", "ncfix.compensate.flat", "ncfix.program.rs274.unroll",
     "ncfix.program.setup_file", "ncfix.program.tool_table",

@@ -211,7 +211,7 @@ class _Emitter:
         rows = self.pieces.move[np.flatnonzero(self.pieces.arc)]
         rows = rows[self.in_stretch[rows]]
         frames = self.reading.frame[rows]
-        for frame in np.unique(frames).tolist():
+        for frame in sorted(set(frames.tolist())):
             own = rows[frames == frame]
             at = self.first_piece[own]
             ends = self.start[own], self.end[at]

@@ -191,11 +191,11 @@ PlainScan = Callable[[bytes, NDArray[np.int64]], Scan]
 
 def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan:
     """What `scan` makes of a text, a slice of it at a time."""
-    begins = np.unique(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)))
+    begins = set(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)).tolist())
     if len(source) <= SLICE_BYTES or len(begins) == 1:
         return scan(source, blocks)
     parts = list[tuple[int, Scan]]()
-    for begin, end in pairwise([*begins[begins < len(blocks)].tolist(), len(blocks)]):
+    for begin, end in pairwise(sorted(begins | {len(blocks)})):
         start, stop = int(blocks[begin, 0]), int(blocks[end, 0]) if end < len(blocks) else len(source)
         parts.append((start, scan(source[start:stop], blocks[begin:end] - start)))
     return Scan.joined(parts)
