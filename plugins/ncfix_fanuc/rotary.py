@@ -131,7 +131,8 @@ class FanucRotary(Control):
         Assumption(
             "FROT-4",
             "There is a second lattice, over the rotary axes of a table: what it says is added, lengths as they are, "
-            "angles times the distance of the tip from centre_mm, right-handed about X, Y and Z.",
+            "angles times the distance of the tip from centre_mm (X, Y and Z as commanded, Z less the tool's length, "
+            "minus centre_mm), right-handed about X, Y and Z.",
             "a patent (US 7969111) adds six-component vectors that depend on rotary axes to those that depend on "
             "linear axes; no public text says that the control has it so",
             "it is written; --set rotary=no leaves it out",

@@ -62,6 +62,8 @@ class LinuxCnc(Control):
     }
     steps = (
         "Save the ini file, and note the values of BACKLASH: a joint with COMP_FILE ignores it.",
+        "The files are in mm and degree: look that LINEAR_UNITS and ANGULAR_UNITS of the ini file are, too. A machine "
+        "in inches would take them for 25.4 times as much.",
         "Copy the .comp files beside the ini file.",
         "Put the lines of comp.ini into the [JOINT_n] sections.",
         "Start LinuxCNC and home all joints.",
