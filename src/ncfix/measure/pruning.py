@@ -1,7 +1,8 @@
 """Stepwise regression: coefficients that cannot be told from zero are taken out, one at a time (Soons, section 3.3).
 
 The least significant one goes first; one that went comes back if it has become significant. A coefficient that is out
-is zero. Tests are two-sided t-tests with the noise that the residuals show.
+is zero; one that the measurements cannot tell stays at what the machine file says. Tests are two-sided t-tests with the
+noise that the residuals show.
 """
 
 from __future__ import annotations
@@ -35,14 +36,16 @@ def pruned(problem: Problem, estimate: Estimate, level: float, loss: str) -> tup
 
 def _significant(problem: Problem, estimate: Estimate, risk: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Which coefficients stay, by backward elimination with a look back after each step."""
+    inside = np.zeros(len(estimate.coefficients), dtype=np.bool_)
+    inside[estimate.solution.kept] = True
+    held = ~inside & (estimate.coefficients != 0)
     root = np.sqrt(estimate.weight) / problem.sigma
     basis = estimate.solution.nuisance
     design = without(basis, problem.design * root[:, None])
-    target = without(basis, (estimate.residual + problem.design @ estimate.coefficients) * root)
-    inside = np.zeros(design.shape[1], dtype=np.bool_)
-    inside[estimate.solution.kept] = True
+    asked = np.where(held, 0.0, estimate.coefficients)
+    target = without(basis, (estimate.residual + problem.design @ asked) * root)
     start = int((estimate.weight > 0).sum()) - basis.shape[1]
-    banned: set[int] = set()
+    banned = set(np.flatnonzero(held).tolist())
     while inside.any():
         chances, left = _chances(design[:, inside], target, start)
         worst = int(np.flatnonzero(inside)[np.argmax(chances)])
@@ -54,7 +57,8 @@ def _significant(problem: Problem, estimate: Estimate, risk: float) -> np.ndarra
             banned.add(back[0])
             continue
         inside[worst] = False
-    return inside
+    stays: np.ndarray[tuple[int], np.dtype[np.bool_]] = inside | held
+    return stays
 
 
 def _chances(design: Array, target: Array, start: int) -> tuple[Array, Array]:
