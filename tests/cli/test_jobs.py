@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from ncfix.cli import jobs
+from ncfix.cli import processes
 from ncfix.cli.batch import Batch
-from ncfix.cli.jobs import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, settled
+from ncfix.cli.processes import AUTO, ON_ONE, PAYS_BYTES, PAYS_PROGRAMS, settled
 from ncfix.cli.targets import STREAM, Target
 from ncfix.diagnostics import ExitCode
 
@@ -19,7 +19,7 @@ PROCESSORS = 12
 @pytest.fixture(autouse=True)
 def computer(monkeypatch: pytest.MonkeyPatch) -> None:
     """One with a dozen processors."""
-    monkeypatch.setattr(jobs, "processors", lambda: PROCESSORS)
+    monkeypatch.setattr(processes, "processors", lambda: PROCESSORS)
 
 
 def programs(folder: Path, count: int, size: int) -> list[Target]:
@@ -73,7 +73,7 @@ def test_without_jobs_a_long_program_is_shared_out(ncfix: Any, shop: Any, monkey
         return run(batch, jobs, make)
 
     monkeypatch.setattr(Batch, "run", noted)
-    monkeypatch.setattr(jobs, "PAYS_BYTES", shop.program.stat().st_size // 5)
+    monkeypatch.setattr(processes, "PAYS_BYTES", shop.program.stat().st_size // 5)
     call = ("fix", shop.program, "-m", shop.machine, "-o", "-", "--assume-zero")
     outputs = {ncfix(*call, *chosen).out for chosen in ([], ["--jobs", "auto"], ["-j", "1"])}
     assert asked == [5, 5, 1]

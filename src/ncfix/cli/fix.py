@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
-from ncfix.cli.jobs import Jobs, settled
 from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, tolerance_option
+from ncfix.cli.processes import Jobs, settled
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, Outputs, check_streams, targets
 
