@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -9,25 +10,43 @@ from ncfix.diagnostics import Message
 
 FEW = 8
 """So many stretches of lines are named one by one."""
+FIGURE = re.compile(r"(?<![-.\w])\d[\d.]*(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
+"""How much it is, in a message."""
 
 
 def gathered(messages: Iterable[Message]) -> list[Message]:
-    """Each message once, where it first stands, with the other lines of which it is said."""
+    """Each message once, where it first stands, with the other lines of which it is said.
+
+    Of those that differ only in how much it is, the one that says the most stands for all.
+    """
     groups: dict[tuple[str, ...], list[Message]] = {}
     for number, message in enumerate(messages):
         place = message.place
         alone = "" if place is not None and place.line else str(number)
-        key = message.code, message.text, message.hint, place.path if place else "", alone
+        key = message.code, _kind(message.text), message.hint, place.path if place else "", alone
         groups.setdefault(key, []).append(message)
     return [_as_one(group) for group in groups.values()]
 
 
 def _as_one(group: Sequence[Message]) -> Message:
-    first = group[0]
+    most = max(group, key=lambda message: _size(message.text))
     if len(group) == 1:
-        return first
+        return most
     lines = sorted({message.place.line for message in group if message.place})
-    return replace(first, text=f"{first.text} ({len(group)} times, {named(lines)})")
+    shown = "" if all(message.text == most.text for message in group) else "; the largest is shown"
+    return replace(most, text=f"{most.text} ({len(group)} times, {named(lines)}{shown})")
+
+
+def _kind(text: str) -> str:
+    """A text without its figure; one with several figures is a kind of its own."""
+    found = FIGURE.findall(text)
+    return FIGURE.sub("", text) if len(found) == 1 else text
+
+
+def _size(text: str) -> float:
+    """The figure of a text, 0 without one."""
+    found = FIGURE.search(text)
+    return float(found[0]) if found else 0.0
 
 
 def named(lines: Sequence[int]) -> str:
