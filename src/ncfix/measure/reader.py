@@ -187,8 +187,13 @@ def _columns(
     labels: dict[str, tuple[str, ...]] = {}
     for index, name in enumerate(names):
         cells = [row[index] for row in rows]
-        if plan and name in form.measured and not any(cell.text for cell in cells):
-            columns |= {name: np.full(len(cells), math.nan)} if form.any_of else {}
+        if name in form.measured and not any(cell.text for cell in cells):
+            if not plan:
+                said = f"column {name!r} is empty in all rows"
+                text.note(
+                    "NCF607", said, cells[0].line, cells[0].column, "fill it in, or leave it out if it was not measured"
+                )
+            columns |= {name: np.full(len(cells), math.nan)} if form.any_of or not plan else {}
             continue
         if name in (*LABELS, *form.labels):
             labels[name] = tuple(_label(text, cell, name) for cell in cells)
