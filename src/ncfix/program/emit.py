@@ -88,17 +88,12 @@ def emit(
 class _Emitter:
     """The walk over the motions; `run()` is called once.
 
-    The control's book:
-
-    position     (n_axes,) the command at which it stands, as emitted
+    position     (n_axes,) the command at which the control stands, as emitted
     jumps        (n, n_axes) where a motion does not start where the one before ended
     replaced     the motion code in force, in tenths, where it is not the program's own; else None
     replaced_by  the block that has put it there
     cycle_end    (n_axes,) the bottom of the last hole while canned cycles follow each other; None otherwise
     levels       the level R of canned cycles
-
-    What is written:
-
     in_stretch   (n,) motions that were written in bulk
     written      block -> what was written of each of the others
     latest       the blocks among these whose edits have not been taken yet
