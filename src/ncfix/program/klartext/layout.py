@@ -92,16 +92,12 @@ class Layout:
 
 def layout_of(program: Program, block: int) -> Layout | None:
     """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
-    found = _of_shape(Shape(program.templates[int(program.template[block])]))
+    shape = Shape(program.templates[int(program.template[block])])
+    found = _of_shape(shape)
     if found is None:
         return None
-    layout, last = found
-    return replace(
-        layout,
-        blank=separator(program, block, last),
-        comma=uses_comma(program.source),
-        corner=is_corner(program, block, -1) or is_corner(program, block, 1),
-    )
+    corner = is_corner(program, block, -1) or is_corner(program, block, 1)
+    return _in_place(shape, separator(program, block, found[1]), uses_comma(program.source), corner)
 
 
 class Shape:
@@ -117,6 +113,13 @@ class Shape:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Shape) and other.template is self.template
+
+
+@lru_cache(maxsize=4096)
+def _in_place(shape: Shape, blank: str, comma: bool, corner: bool) -> Layout | None:
+    """The layout of blocks of a shape that have the rest in common, too."""
+    found = _of_shape(shape)
+    return None if found is None else replace(found[0], blank=blank, comma=comma, corner=corner)
 
 
 @lru_cache(maxsize=4096)

@@ -23,7 +23,9 @@ class Style:
     def like(self, was: str, value: float, decimals: int) -> str:
         """A number in place of another one, in its manner; what had a sign keeps one."""
         style = NumberStyle.of(was.replace(",", "."))
-        text = replace(style, plus=was.strip()[:1] in "+-").write(value, decimals)
+        if was.strip()[:1] == "-":
+            style = replace(style, plus=True)
+        text = style.write(value, decimals)
         comma = "," in was or (self.comma and "." not in was)
         return text.replace(".", ",") if comma else text
 

@@ -144,16 +144,16 @@ class Renderer(HoleWriter):
 
     def _as_written(self, begin: FloatArray, end: FloatArray, *, own: bool) -> FloatArray:
         """An end on the digits that will be written; `own`: by the words of the block itself."""
-        result = end.copy()
+        result, decimals, values = end.tolist(), self.target.decimals.tolist(), self.program.values_of(self.block)
         for column, letter in self.columns:
             word = self.layout.axes.get(letter) if own else None
             base = float(begin[column]) if word is not None and word.address[0] == "I" else 0.0
-            result[column] = base + round(float(end[column]) - base, int(self.target.decimals[column]))
+            result[column] = base + round(result[column] - base, decimals[column])
             if word is not None and isinstance(word.value, Literal):
-                original = base + float(self.program.values_of(self.block)[word.value.slot])
+                original = base + float(values[word.value.slot])
                 if abs(result[column] - original) < self.half[column]:
                     result[column] = original
-        return result
+        return np.array(result)
 
     def _own_arc(self, centre: FloatArray) -> FloatArray:
         """The block itself as an arc."""

@@ -77,9 +77,9 @@ class WordWriter(BlockWriter[Layout]):
     def _stands(self, column: int) -> bool:
         """A rotary axis stands where it should in all pieces, but for rounding."""
         target = self.target
-        off = np.abs(target.ends[:, column] - target.nominal[column])
-        here = abs(target.ends[0, column] - target.start[column])
-        return bool((off < UNCORRECTED).all() and here <= ROUNDED * self.half[column])
+        ends, nominal = target.ends[:, column].tolist(), float(target.nominal[column])
+        here = abs(ends[0] - float(target.start[column]))
+        return here <= ROUNDED * self.half[column] and all(abs(end - nominal) < UNCORRECTED for end in ends)
 
     def _turned(self, column: int, end: float, piece: int = 0) -> float:
         """The end of a piece, of a rotary axis on its side of zero and of a full turn."""
