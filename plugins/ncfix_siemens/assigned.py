@@ -34,19 +34,19 @@ class Assigned:
     fields: dict[str, Assignment] = field(default_factory=dict)
     values: dict[int, Assignment] = field(default_factory=dict)
 
-    def put_field(self, name: str, each: Assignment) -> None:
+    def put_field(self, name: str, assignment: Assignment) -> None:
         """Take a field; the last of several counts."""
-        self._look_for_another(self.fields.get(name), each)
-        self.fields[name] = each
+        self._look_for_another(self.fields.get(name), assignment)
+        self.fields[name] = assignment
 
-    def put_value(self, number: int, each: Assignment) -> None:
+    def put_value(self, number: int, assignment: Assignment) -> None:
         """Take a value; the last of several counts."""
-        self._look_for_another(self.values.get(number), each)
-        self.values[number] = each
+        self._look_for_another(self.values.get(number), assignment)
+        self.values[number] = assignment
 
-    def _look_for_another(self, other: Assignment | None, each: Assignment) -> None:
+    def _look_for_another(self, other: Assignment | None, assignment: Assignment) -> None:
         if other is not None:
-            self.remarks.doubt(each.line, "is assigned twice: the control keeps the last", "a slip?")
+            self.remarks.doubt(assignment.line, "is assigned twice: the control keeps the last", "a slip?")
 
     def lacks(self, needed: Iterable[str]) -> bool:
         """Whether fields are missing, which is refused."""
@@ -61,11 +61,11 @@ class Assigned:
         """A field as a number; 0, and refused, if it is none."""
         return self._number(self.fields[name])
 
-    def _number(self, each: Assignment) -> float:
-        if each.number is None:
-            what = "a decimal comma" if "," in each.value else f"{each.value!r} is not a number"
-            self.remarks.refuse(each.line, what, "a decimal point")
-        return each.number or 0.0
+    def _number(self, assignment: Assignment) -> float:
+        if assignment.number is None:
+            what = "a decimal comma" if "," in assignment.value else f"{assignment.value!r} is not a number"
+            self.remarks.refuse(assignment.line, what, "a decimal point")
+        return assignment.number or 0.0
 
     def choice(self, name: str, allowed: Sequence[int] | None = None) -> int:
         """A field that is a whole number, one of those allowed; 0 if it is not there."""

@@ -68,26 +68,28 @@ def read_cec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     return good
 
 
-def _sort(each: Assignment, tables: dict[int, Assigned], remarks: Remarks) -> None:
-    name = each.name.upper()
+def _sort(assignment: Assignment, tables: dict[int, Assigned], remarks: Remarks) -> None:
+    name = assignment.name.upper()
     field = name.removeprefix(f"{VALUE}_")
     if field in LINKS:
-        remarks.doubt(each.line, f"${each.name}: axes of other control units are not followed")
+        remarks.doubt(assignment.line, f"${assignment.name}: axes of other control units are not followed")
         return
     wanted = 2 if name == VALUE else 1
     if name != VALUE and field not in FIELDS:
-        remarks.refuse(each.line, f"${each.name} is not a variable of these tables")
+        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
         return
-    if len(each.indices) != wanted or not all(index.strip().isdecimal() for index in each.indices):
-        remarks.refuse(each.line, f"${each.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets")
+    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices):
+        remarks.refuse(
+            assignment.line, f"${assignment.name} takes {wanted} whole number{'s' * (wanted > 1)} in its brackets"
+        )
         return
-    index, *number = (int(text) for text in each.indices)
+    index, *number = (int(text) for text in assignment.indices)
     place, names = f"$AN_CEC[{index},{{}}]", f"$AN_CEC_{{}}[{index}]"
     table = tables.setdefault(index, Assigned(f"table {index + 1}", place, names, remarks))
     if number:
-        table.put_value(number[0], each)
+        table.put_value(number[0], assignment)
     else:
-        table.put_field(field, each)
+        table.put_field(field, assignment)
 
 
 def _table(index: int, table: Assigned, remarks: Remarks) -> Table | None:
@@ -105,10 +107,10 @@ def _table(index: int, table: Assigned, remarks: Remarks) -> Table | None:
     return Table(index, source, output, low, step, values, direction, multiply, modulo)
 
 
-def _axis(each: Assignment, remarks: Remarks) -> str:
-    name = each.value.strip().removeprefix("(").removesuffix(")").strip()
+def _axis(assignment: Assignment, remarks: Remarks) -> str:
+    name = assignment.value.strip().removeprefix("(").removesuffix(")").strip()
     if not name.replace("_", "").isalnum():
-        remarks.refuse(each.line, f"{each.value!r} is not the name of an axis")
+        remarks.refuse(assignment.line, f"{assignment.value!r} is not the name of an axis")
     return name.upper()
 
 

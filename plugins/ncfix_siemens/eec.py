@@ -33,24 +33,24 @@ def read_eec(lines: Iterable[Line], remarks: Remarks) -> list[Table]:
     return [table for table in tables if table is not None]
 
 
-def _sort(each: Assignment, tables: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
-    name = each.name.upper()
+def _sort(assignment: Assignment, tables: dict[tuple[int, str], Assigned], remarks: Remarks) -> None:
+    name = assignment.name.upper()
     field = name.removeprefix(f"{VALUE}_")
     wanted = 3 if name == VALUE else 2
     if name != VALUE and field not in FIELDS:
-        remarks.refuse(each.line, f"${each.name} is not a variable of these tables")
+        remarks.refuse(assignment.line, f"${assignment.name} is not a variable of these tables")
         return
-    if len(each.indices) != wanted or not all(index.strip().isdecimal() for index in each.indices[:-1]):
+    if len(assignment.indices) != wanted or not all(index.strip().isdecimal() for index in assignment.indices[:-1]):
         inside = "encoder, number and axis" if wanted == 3 else "encoder and axis"
-        remarks.refuse(each.line, f"${each.name} takes {inside} in its brackets")
+        remarks.refuse(assignment.line, f"${assignment.name} takes {inside} in its brackets")
         return
-    encoder, axis = int(each.indices[0]), each.indices[-1].strip().upper()
+    encoder, axis = int(assignment.indices[0]), assignment.indices[-1].strip().upper()
     place, names = f"$AA_ENC_COMP[{encoder},{{}},{axis}]", f"$AA_ENC_COMP_{{}}[{encoder},{axis}]"
     table = tables.setdefault((encoder, axis), Assigned(axis, place, names, remarks))
     if wanted == 3:
-        table.put_value(int(each.indices[1]), each)
+        table.put_value(int(assignment.indices[1]), assignment)
     else:
-        table.put_field(field, each)
+        table.put_field(field, assignment)
 
 
 def _table(encoder: int, axis: str, table: Assigned, remarks: Remarks) -> Table | None:

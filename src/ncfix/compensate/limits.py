@@ -147,20 +147,20 @@ def too_fast(written: Written) -> Finding:
     return Finding("NCF407", rows, values, "the correction changes by {value:.4f} mm at once")
 
 
-def excess(machine: Machine, joints: Joints, each: Index, curved: Mask, ends: Array | None = None) -> Array:
+def excess(machine: Machine, joints: Joints, motion: Index, curved: Mask, ends: Array | None = None) -> Array:
     """How far axes go beyond their ranges along motions, (k, n_axes) mm and rad; negative while within.
 
     joints  gives axis positions (j, n_axes) at fractions (j,) of motions (j,)
-    each    (k,) motions
+    motion  (k,) which motions
     curved  (k,) axes do not move linearly along it: looked at inside too, not only at the end
     ends    (k, n_axes) axis positions where they end, if known
     """
-    result = _beyond(machine, joints(each, np.ones(len(each))) if ends is None else ends)
+    result = _beyond(machine, joints(motion, np.ones(len(motion))) if ends is None else ends)
     rows = np.flatnonzero(curved)
     if not rows.size:
         return result
     looks = np.arange(LOOKS + 1) / LOOKS
-    q = joints(np.repeat(each[rows], LOOKS + 1), np.tile(looks, len(rows)))
+    q = joints(np.repeat(motion[rows], LOOKS + 1), np.tile(looks, len(rows)))
     inside = _beyond(machine, q).reshape(len(rows), LOOKS + 1, -1)
     travel = np.ptp(q.reshape(inside.shape), axis=1)
     best = inside.max(axis=1)
@@ -169,7 +169,7 @@ def excess(machine: Machine, joints: Joints, each: Index, curved: Mask, ends: Ar
     low, high = looks[np.maximum(place - 1, 0)], looks[np.minimum(place + 1, LOOKS)]
 
     def beyond(which: Index, fraction: Array) -> Array:
-        q = joints(each[rows[near[which]]], fraction)
+        q = joints(motion[rows[near[which]]], fraction)
         found: Array = _beyond(machine, q)[np.arange(len(which)), axis[which]]
         return found
 
@@ -218,10 +218,10 @@ def programmed_excess(written: Written) -> Array:
     return excess(intent.machine, intent.joints_at, each, curved, ends)
 
 
-def _may_leave(intent: Intent, joints: Joints, each: Index, ends: Array | None) -> Mask:
+def _may_leave(intent: Intent, joints: Joints, motion: Index, ends: Array | None) -> Mask:
     """(k,) which of these motions under tool-centre-point control may leave a range on their way; see `excess`."""
-    begin = joints(each, np.zeros(len(each)))
-    end = joints(each, np.ones(len(each))) if ends is None else ends
+    begin = joints(motion, np.zeros(len(motion)))
+    end = joints(motion, np.ones(len(motion))) if ends is None else ends
     longest = float(np.nanmax(intent.moves.tool_length, initial=0.0))
     return ~surely_within(intent.machine, begin, end, longest)
 
