@@ -170,6 +170,15 @@ def test_robust_losses_hold_an_outlier_down(loss):
     assert np.nanmax(moved) < 2.0
 
 
+@pytest.mark.parametrize("loss", ["none", "huber", "tukey"])
+def test_robust_weights_do_not_make_the_noise_look_smaller(loss):
+    """Of 1 um of noise that no header states, a reduced chi-square of 1; its spread with 570 degrees is 0.06."""
+    known = perfect(machine("three_axis"))
+    data = replace(simulate(plan(known, "tcp", 200), known, Faults(noise_um=1.0), seed=4), headers=())
+    found = calibrate([data], known, "EC0Y,EB0Z,EA0Z", loss)
+    assert abs(found.scale - 1) < 4 * 0.06 / 2
+
+
 def test_exchanged_columns_are_suspected():
     known = machine("wCBXFZYSt")
     data = simulate(plan(known, "tcp", 150), known, Faults(noise_um=0.5, setup=0.1), seed=4)

@@ -43,6 +43,7 @@ class Estimate:
     solution                the last linear step
     residual                values minus predictions, (m,), mm or rad
     weight                  (m,) 0 ... 1
+    share                   how much of the squares of normal noise the weights leave: 1 if values count in full
     """
 
     coefficients: Array
@@ -50,6 +51,12 @@ class Estimate:
     solution: Solution
     residual: Array
     weight: Array
+    share: float = 1.0
+
+    def reduced(self, sigma: Array, freedom: int) -> float:
+        """The reduced chi-square for standard deviations (m,): 1 if the residuals are as large as the noise."""
+        squares = self.weight * (self.residual / sigma) ** 2
+        return float(squares.sum() / (self.share * freedom))
 
 
 @dataclass(frozen=True)
@@ -139,8 +146,7 @@ class Calibration:
     @property
     def chi_square(self) -> float:
         """The reduced chi-square: 1 if the residuals are as large as the noise."""
-        squares = self.estimate.weight * (self.estimate.residual / self.problem.sigma) ** 2
-        return float(squares.sum() / max(self.freedom, 1))
+        return self.estimate.reduced(self.problem.sigma, max(self.freedom, 1))
 
     @property
     def covariance(self) -> Array:
@@ -252,9 +258,11 @@ def _iterate(problem: Problem, weight: Array, loss: str) -> Estimate:
             weight = weights.of(loss, target - change)
             settled = settled and bool(np.abs(weight - before).max() < 1e-3)
         if settled:
-            return Estimate(coefficients, unknowns, solution, problem.residual(coefficients, unknowns), weight)
+            residual = problem.residual(coefficients, unknowns)
+            return Estimate(coefficients, unknowns, solution, residual, weight, weights.share(loss))
     if loss in (weights.HUBER, weights.TUKEY) and np.abs(change).max() < 0.1:
-        return Estimate(coefficients, unknowns, solution, problem.residual(coefficients, unknowns), weight)
+        residual = problem.residual(coefficients, unknowns)
+        return Estimate(coefficients, unknowns, solution, residual, weight, weights.share(loss))
     size = float(np.abs(change).max())
     still = f"still change by {size:.3g} times the noise" if size < FAR else "run away"
     text = f"after {STEPS} steps the predictions {still}"

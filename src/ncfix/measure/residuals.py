@@ -40,7 +40,7 @@ def residuals(problem: Problem, estimate: Estimate) -> Residuals:
     solution, weight = estimate.solution, estimate.weight
     freedom = max(int((weight > 0).sum()) - solution.rank, 1)
     size = estimate.residual / problem.sigma
-    scale = np.sqrt(float((weight * size**2).sum()) / freedom) or 1.0
+    scale = np.sqrt(estimate.reduced(problem.sigma, freedom)) or 1.0
     leverage = np.where(weight > 0, solution.leverage, 0.0).clip(0.0, 1 - 1e-9)
     studentised = size / (scale * np.sqrt(1 - leverage))
     cook = studentised**2 * leverage / ((1 - leverage) * max(solution.rank, 1))

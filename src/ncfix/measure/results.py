@@ -31,7 +31,7 @@ NAMED = 20
 def result(problem: Problem, estimate: Estimate, loss: str) -> Calibration:
     """The calibrated machine, with covariances and provenance."""
     freedom = max(int((estimate.weight > 0).sum()) - estimate.solution.rank, 1)
-    chi_square = float((estimate.weight * (estimate.residual / problem.sigma) ** 2).sum() / freedom)
+    chi_square = estimate.reduced(problem.sigma, freedom)
     scale = noise_scale(problem, chi_square, freedom)
     found = residuals(problem, estimate)
     remarks = [each for seen in problem.observations for each in seen.measurement.remarks]

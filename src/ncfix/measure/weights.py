@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
+from scipy.special import chdtr, ndtri, stdtrit
 
 from ncfix.measure.measurement import Array
 from ncfix.measure.solve import Solution
@@ -34,6 +34,19 @@ def of(loss: str, residual: Array) -> Array:
     if loss == HUBER:
         return np.minimum(1.0, HUBER_K / np.maximum(size, 1e-12))
     return np.where(size < TUKEY_K, (1 - (size / TUKEY_K) ** 2) ** 2, 0.0)
+
+
+def share(loss: str) -> float:
+    """The mean of weight times square over normal noise of one: residuals so weighted look smaller than the noise is.
+
+    Moments of the normal distribution within a bound are chi-square probabilities.
+    """
+    if loss == HUBER:
+        return float(chdtr(1, HUBER_K**2))
+    if loss == TUKEY:
+        square = TUKEY_K**2
+        return float(chdtr(3, square) - 6 * chdtr(5, square) / square + 15 * chdtr(7, square) / square**2)
+    return 1.0
 
 
 def outliers(solution: Solution) -> NDArray[np.bool_]:
