@@ -16,7 +16,8 @@ from compensate.streaming import SETUP, compared, streamed, whole
 from ncfix import fast
 from ncfix.compensate.following import traced
 from ncfix.diagnostics import NcfixError
-from ncfix.machine import Machine, load
+from ncfix.machine import Effect, Machine, load
+from ncfix.machine.smooth import Backlash
 from ncfix.program import emit
 from ncfix.program.follow.lane import take
 from ncfix.program.reader import read
@@ -202,6 +203,29 @@ def test_blocks_are_written_in_bulk_as_one_by_one(
     assert all(layout is not None and layout.led for layout in layouts)
     monkeypatch.setattr(emit, "language_of", lambda dialect: replace(SINUMERIK, bulk=None))
     assert [whole(source, machine, "siemens", files=S_FILES)[0] for source in sources] == found
+
+
+UNTIMED = {
+    "one behind another": "G1 X158. C12.\nG93\nG1 X158.121 Z65.740 C12.162\nG1 X158.115\nG1 X158.116 B-2.848 C11.656\n"
+    "G1 X161.213 Z65.737 C11.679\nG1 X161.211 B-4.026\nG94\nG1 Z99. F500.\nG1 X50.\n",
+    "whole parts": "G1 Y151.\nG93\n"
+    + "".join(f"G1 X{150 + k % 2}. Z{50 - k % 2}.\n" for k in range(12))
+    + "G94\nG1 X155. F500.\nG1 Z80.\n",
+}
+
+
+@pytest.mark.parametrize("body", UNTIMED.values(), ids=UNTIMED)
+def test_motions_that_are_refused_for_their_text_where_parts_meet(body: str, machine: Machine) -> None:
+    """In G93 without an F they cannot be split.
+
+    One that begins where a refused one ends may not need that any more, and is refused all the same, as in the whole
+    program; and what stands beside its place stays there.
+    """
+    machine = machine.replace(effects=tuple(Effect(f"E{axis}{axis}", (0.005,), Backlash()) for axis in "XYZ"))
+    source = f"G21 G90 G94 G54 F500.\nG0 X150. Y150. Z50. B0. C0.\n{body}M30\n".encode()
+    for size in (60, 80, 100, 150):
+        assert compared(source, machine, "fanuc", size) == ""
+    assert compared(source, machine, "fanuc", 60, jobs=2) == ""
 
 
 def test_tools_without_a_length_are_named_in_the_order_of_the_program(machine: Machine) -> None:

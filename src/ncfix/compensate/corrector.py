@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ncfix import fast
+from ncfix.compensate.before import Before, Round
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import stamp_of, strays
@@ -16,7 +17,7 @@ from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
 from ncfix.compensate.plain_text import largest_shift, written
 from ncfix.compensate.proof import SelfCheckError, differences
-from ncfix.compensate.settle import Agreed, Before, Settled, agree, increments, settle
+from ncfix.compensate.settle import Agreed, Settled, agree, increments, settle
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Unit, Units
@@ -124,7 +125,7 @@ class Corrector:
         text = spliced(part.program.source, plain.splices)
         if not part.last:
             shift = course.real.start[-1] - moves.start[-1]
-            left = Before(False, shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
+            left = Before.steady(shift, np.zeros(len(shift), dtype=np.int8), plain.end[-1].copy())
             share.leave(number, left, len(text))
         settled = course.settled(plain)
         _check(differences(settled, self._read_again(text, part, plain.splices)))
@@ -138,7 +139,7 @@ class Corrector:
         """The plan of a part by the long way, as far as it does not depend on what the part before has left."""
         part = unit.together
         nowhere = np.zeros(len(part.moves.axes))
-        guess = None if unit.head is None else Before(False, nowhere, unit.direction, nowhere)
+        guess = None if unit.head is None else Before.steady(nowhere, unit.direction, nowhere)
         return agree(part.moves, self.machine, self.task.dialect, self.task.options, guess)
 
     def _settled(self, unit: Unit, agreed: Agreed, before: Before | None, number: int, share: Share) -> Done:
@@ -148,7 +149,7 @@ class Corrector:
         first: Agreed | None = agreed
         if before is not None:
             before = replace(before, direction=unit.direction)
-            first = None if before.kept or _still_off(moves, before) else first
+            first = None if _is_off(moves, before.rounds[0]) else first
         settled = settle(part.program, moves, self.machine, task.options, before=before, first=first)
         if before is not None and (settled.unmoored or settled.kept[0] != before.kept):
             raise NotInPartsError("a refusal reaches back into an earlier part")
@@ -227,15 +228,11 @@ def _check(wrong: Mask | None) -> None:
         raise NotInPartsError(FRAMES)
 
 
-def _still_off(moves: Moves, before: Before) -> bool:
-    """Whether an axis goes on standing off its place where a part begins, which its plan did not know."""
-    return bool((moves.wordless[0] & (before.shift != 0)).any())
+def _is_off(moves: Moves, before: Round) -> bool:
+    """Whether in a round the motion before was left as it was, or an axis goes on standing off its place behind it."""
+    return bool(before.kept.any() or (moves.wordless[0] & (before.shift != 0)).any())
 
 
 def _left(settled: Settled) -> Before:
     """What a part leaves to the next one, but for the way in which the axes came there."""
-    plan, moves = settled.plan, settled.moves
-    shift = plan.start[-1] - moves.start[-1]
-    shift = np.where(np.isfinite(shift), shift, 0.0)
-    nowhere = np.zeros(len(shift), dtype=np.int8)
-    return Before(bool(settled.kept[-1]), shift, nowhere, settled.emission.end[-1].copy())
+    return Before.of(settled.rounds, np.zeros(len(settled.moves.axes), dtype=np.int8))

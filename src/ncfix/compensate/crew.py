@@ -20,9 +20,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
+from ncfix.compensate.before import Before
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
-from ncfix.compensate.settle import Before
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)

@@ -82,9 +82,17 @@ def plan(
     kept = (moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)
     kept |= keep if keep is not None else False
     if machine.is_perfect or kept.all():
-        return untouched(moves, kept)
+        as_it_is = untouched(moves, kept)
+        return as_it_is if before is None else _behind(machine, as_it_is, moves, before)
     demands = Demands(Budget(tolerance_mm, rounding_mm), closure, split_rapids, arc_pieces)
     return _plan(Intent(machine, moves, state, before), strategy, demands, kept)
+
+
+def _behind(machine: Machine, as_it_is: Plan, moves: Moves, before: Array) -> Plan:
+    """A plan that changes nothing, behind motions that have left the axes so far off, (n_axes,) mm and rad."""
+    kept = as_it_is.pieces.kept
+    where = standing(machine, moves, moves.end, kept, before)
+    return replace(as_it_is, start=where.start, pieces=replace(as_it_is.pieces, end=where.end))
 
 
 def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> Plan:

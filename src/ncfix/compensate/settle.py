@@ -13,9 +13,9 @@ import numpy as np
 
 from ncfix.compensate.account import Reason
 from ncfix.compensate.assembly import Plan
+from ncfix.compensate.before import Before, Round
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.digits import on_digits
-from ncfix.compensate.direction import Signs
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.following import kinematics_of
 from ncfix.compensate.idle import without_idle
@@ -42,22 +42,6 @@ CODE_OF_TEXT = "NCF433"
 
 
 @dataclass(frozen=True, slots=True)
-class Before:
-    """What a part of a program leaves to the next one, which begins with its last motion once more.
-
-    kept       that motion was left as it was
-    shift      (n_axes,) how far off the axes stood at its start, mm and rad
-    direction  (n_axes,) in which the axes came there
-    position   (n_axes,) the command at its end, as written
-    """
-
-    kept: bool
-    shift: Array
-    direction: Signs
-    position: Array
-
-
-@dataclass(frozen=True, slots=True)
 class Settled:
     """A plan that can be written, and its text.
 
@@ -65,6 +49,7 @@ class Settled:
     kept      (n,) those left as they were
     reasons   block -> why it was refused
     unmoored  a refusal needs something before the first motion as it was
+    rounds    what the last motion was in each round that plan and emitter took
     """
 
     moves: Moves
@@ -73,6 +58,7 @@ class Settled:
     kept: Mask
     reasons: dict[int, Reason]
     unmoored: bool
+    rounds: tuple[Round, ...] = ()
 
     def shown(self, rapids: bool) -> Mask:
         """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them."""
@@ -95,12 +81,19 @@ class Agreed:
     kept      (n,) motions left as they were
     reasons   block -> why it was refused
     unmoored  a refusal needs something before the first motion as it was
+    trail     in each plan on the way here, whether the last motion was left as it was, and how far off its start was
     """
 
     plan: Plan
     kept: Mask
     reasons: dict[int, Reason]
     unmoored: bool
+    trail: tuple[tuple[bool, Array], ...]
+
+    def round(self, position: Array) -> Round:
+        """What the last motion was, the end of which was written as a command `position` (n_axes,)."""
+        kept, shift = zip(*self.trail, strict=True)
+        return Round(np.array(kept), np.array(shift), position.copy())
 
 
 def settle(
@@ -119,20 +112,23 @@ def settle(
     first    the plan to begin with, from `agree`, if that has been made already
     """
     agreed = first or agree(moves, machine, program.dialect, options, before)
-    done, kinematics = None if before is None else before.position, kinematics_of(machine)
+    kinematics, rounds = kinematics_of(machine), list[Round]()
     while True:
+        done = None if before is None else before.in_round(len(rounds)).position
         emission = emit(program, moves, agreed.plan.pieces, increments(machine), reading, done, kinematics)
         moving = without_idle(moves, agreed.plan.pieces, emission, 0 if done is None else 1)
         if moving is not agreed.plan.pieces:
             agreed = replace(agreed, plan=replace(agreed.plan, pieces=moving))
             continue
-        if not emission.conflicts:
-            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons, agreed.unmoored)
-        if emission.conflicts.keys() <= agreed.reasons.keys():
+        if len(moves):
+            rounds.append(agreed.round(emission.end[-1]))
+        if not emission.conflicts and (before is None or len(rounds) >= len(before.rounds)):
+            return Settled(moves, agreed.plan, emission, agreed.kept, agreed.reasons, agreed.unmoored, tuple(rounds))
+        if emission.conflicts and emission.conflicts.keys() <= agreed.reasons.keys():
             raise AssertionError(f"blocks {sorted(emission.conflicts)} are kept and yet in conflict")
         for block, why in emission.conflicts.items():
             _explain(agreed.reasons, [block], CODE_OF_TEXT, why)
-        agreed = agree(moves, machine, program.dialect, options, before, agreed)
+        agreed = agree(moves, machine, program.dialect, options, before, agreed, len(rounds))
 
 
 def agree(
@@ -142,26 +138,33 @@ def agree(
     options: FixOptions,
     before: Before | None = None,
     earlier: Agreed | None = None,
+    number: int = 0,
 ) -> Agreed:
-    """Plan until nothing speaks against it; `earlier` says what is kept already, and why."""
+    """Plan until nothing speaks against it; `earlier` says what is kept already, and why, in round `number`."""
     kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)) if earlier is None else earlier.kept
     reasons = _by_rule(moves) if earlier is None else earlier.reasons
-    state = State()
-    if before is not None:
-        kept[0] |= before.kept
-        state = State(direction=before.direction)
+    head = None if before is None else before.in_round(number)
+    state, trail = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
     bound = np.zeros(len(moves), dtype=bool)
     while True:
+        shift = None
+        if head is not None:
+            at = min(len(trail), len(head.kept) - 1)
+            kept[0] |= head.kept[at]
+            shift = head.shift[at]
         kept, unmoored = _with_what_they_need(moves, kept, bound, reasons)
-        planned = _planned(dialect, moves, machine, options, kept, state, before)
+        planned = _planned(dialect, moves, machine, options, kept, state, shift)
+        if len(moves):
+            trail.append(_last_of(planned, moves))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
         refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
             refused[finding.moves] = True
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
-        if not (refused.any() or (~bound[astray]).any()):
-            return Agreed(planned, kept, reasons, unmoored)
+        waiting = head is not None and len(trail) < len(head.kept)
+        if not (refused.any() or (~bound[astray]).any() or waiting):
+            return Agreed(planned, kept, reasons, unmoored, tuple(trail))
         _explain_findings(reasons, (*against, *planned.findings), moves, refused)
         kept |= refused
         bound[astray] = True
@@ -208,7 +211,7 @@ def _planned(
     options: FixOptions,
     kept: Mask,
     state: State,
-    before: Before | None,
+    before: Array | None,
 ) -> Plan:
     strategy = get_strategy(options.strategy)
     return plan(
@@ -221,9 +224,15 @@ def _planned(
         rounding_mm=rounding(machine, strategy.corrects_orientation),
         split_rapids=options.split_rapids,
         state=state,
-        before=None if before is None else before.shift,
+        before=before,
         arc_pieces=language_of(dialect).arc_pieces,
     )
+
+
+def _last_of(planned: Plan, moves: Moves) -> tuple[bool, Array]:
+    """Whether the last motion is left as it was, and how far off the axes stand at its start, (n_axes,) mm and rad."""
+    shift = planned.start[-1] - moves.start[-1]
+    return bool(planned.pieces.kept[-1]), np.where(np.isfinite(shift), shift, 0.0)
 
 
 def _first_rows(planned: Plan, n: int) -> Index:
