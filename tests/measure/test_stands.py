@@ -65,3 +65,13 @@ def test_targets_whose_levers_are_not_known_are_remarked_on(targets, said):
     aim = replace(plan(truth, "tool", 90), headers=(("carried_by", "tool"), *targets, ("noise_um", "1")))
     found = calibrate([simulate(aim, truth, Faults(noise_um=1.0), seed=3)], truth, "E?Z")
     assert ("NCF643" in {message.code for message in found.remarks}) is said
+
+
+def test_targets_are_not_remarked_on_where_no_angle_acts_on_them():
+    """One target shows neither place nor turn of the instrument; without angles nothing depends on its place."""
+    clean = machine("three_axis").replace(effects=())
+    aim = plan(clean, "tool", 30)
+    labels = {**aim.labels, "target": ("1",) * len(aim)}
+    aim = replace(aim, headers=(("carried_by", "tool"), ("noise_um", "1")), labels=labels)
+    found = calibrate([simulate(aim, clean, Faults(noise_um=1.0), seed=3)], clean, "EZZ")
+    assert "NCF643" not in {message.code for message in found.remarks}

@@ -79,6 +79,7 @@ class Sights:
         free = np.concatenate([np.repeat(~self.known, 3), np.ones(6 * len(turns), dtype=bool)])
         design = self.design(places, turns)[:, free]
         size = np.linalg.norm(design, axis=0)
+        size[size == 0] = 1.0
         _, values, right = np.linalg.svd(design / size, full_matrices=False)
         changes = np.zeros(((values < OPEN * values[0]).sum(), len(free)))
         changes[:, free] = right[values < OPEN * values[0]] / size

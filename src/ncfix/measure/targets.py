@@ -88,10 +88,13 @@ class Targets(Observation):
 
     def doubts(self, machine: Machine) -> Iterator[Message]:
         """See `Observation`: angles act by levers, which no reading shows where only linear axes move."""
-        start = self.unknowns.start
-        read = self.predict(machine, start)
+        start, perfect = self.unknowns.start, machine.replace(effects=())
+
+        def shown(unknowns: Array) -> Array:
+            return self.predict(machine, unknowns) - self.predict(perfect, unknowns)
+
         changes = self.sights.left_open(self.places, self.stands[:, :3, :3])
-        levers = [self.predict(machine, start + change) - read for change in changes]
+        levers = [shown(start + change) - shown(start) for change in changes]
         size = max((float(np.linalg.norm(each / self.sigma)) for each in levers), default=0.0)
         if size > 1:
             most = 1e3 * max(float(np.abs(each).max()) for each in levers)
