@@ -24,6 +24,7 @@ from program.arcs import full_of_arcs
 from program.tracing import KNOWN, ZERO, follow
 
 ALWAYS, NEVER = 1, 10**9
+ASSUMED = Setup(assume_zero=True)
 
 
 @contextmanager
@@ -152,6 +153,37 @@ def test_both_lanes_make_the_same_arcs_of_sinumerik(seed: int) -> None:
     setup = Setup(work_offsets={"G54": ZERO, "G55": dict.fromkeys("XYZABC", 1.5)}, assume_zero=True, initial=ZERO)
     head = "G0 X0 Y0 Z0 B0 C0" if random.random() < 0.9 else "X0 Y0"
     assert_same("\n".join([head, "F100", *body]), "siemens", setup)
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc", "siemens"])
+@pytest.mark.parametrize("odd", ["0.", "-0.", ".5"])
+def test_centre_words_across_the_plane(odd: str, dialect: str) -> None:
+    radius = "CR=" if dialect == "siemens" else "R"
+    for plane, second, one, across in (("G17", "Y", "J", "K"), ("G18", "Z", "K", "J")):
+        arcs = [
+            f"G2 X{n}. {second}1. I.5 {one}0. {across}0.\nX{n + 0.5} {radius}.25\nX{n}. {radius}.25"
+            for n in range(1, 30)
+        ]
+        arcs[20] = arcs[20].replace(f"{across}0.", across + odd)
+        text = "\n".join([f"{plane} G90 G0 X0. Y1. Z1. B0. C0.", "F100.", *arcs])
+        assert_same(text, dialect, Setup(assume_zero=True, initial=ZERO))
+
+
+@pytest.mark.parametrize("dialect", ["iso", "fanuc", "siemens"])
+def test_the_lane_takes_arcs_with_all_of_i_j_and_k(dialect: str) -> None:
+    arcs = [f"G2 X{n}. Y1. I.5 J0. K0." for n in range(1, 40)]
+    with mock.patch.object(lane, "take", side_effect=lane.take) as taken:
+        follow("\n".join(["G17 G90 F100.", "G0 X0. Y1. Z0. B0. C0.", *arcs]), "XYZBC", ASSUMED, dialect)
+    assert sum(len(call.args[1].mask) for call in taken.call_args_list) >= len(arcs)
+
+
+def test_what_is_in_the_way_again_and_again_is_not_looked_for_in_all_that_comes() -> None:
+    """Arcs that the lane leaves alone, among blocks that it would take: these are gone through a few times only."""
+    blocks = 400 * (["G1 X2. Y1."] * 20 + ["G1 X0. Y0.", "G2 X1. Y0. I.5 J0. K.5"])
+    text = "\n".join(["G17 G90 F100.", "G0 X0. Y0. Z0. B0. C0.", *blocks])
+    with mock.patch.object(lane, "count_allowed", side_effect=lane.count_allowed) as looked:
+        follow(text, "XYZBC", ASSUMED, "fanuc")
+    assert sum(len(call.args[1].mask) for call in looked.call_args_list) < 50 * len(blocks)
 
 
 def test_arcs_with_centres_that_count_from_zero() -> None:

@@ -9,6 +9,9 @@ import numpy as np
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.stage import LONGEST, Mask, Stage, Text, feed_unit, stage_of
 
+FEWEST = 256
+"""Blocks that are offered at least: few enough to be gone through in no time."""
+
 
 @dataclass(slots=True)
 class Ahead:
@@ -24,6 +27,7 @@ class Ahead:
     done   the blocks before it may have been taken: their rows must not change any more, nor where this one starts,
            which is where they end; a jump may come back to it from elsewhere
     reach  so many blocks are looked at next time
+    most   so many blocks are offered to be taken next time
     """
 
     begin: int = 0
@@ -31,6 +35,7 @@ class Ahead:
     frame: object = None
     done: int = 0
     reach: int = field(default=LONGEST)
+    most: int = field(default=LONGEST)
 
     def stretch(self, control: Control, unit: Text, block: int, stop: int) -> Stage:
         """The blocks from one on; the control stands before it. `done` is to be set to what has been taken of them."""
@@ -44,6 +49,13 @@ class Ahead:
         if block > begin:
             put_right(found, control)
         return found
+
+    def note(self, taken: int, offered: int) -> None:
+        """So many of the blocks offered can be taken: where others are in the way again and again, fewer are offered.
+
+        What is offered is gone through to find what is in the way.
+        """
+        self.most = min(2 * self.most, LONGEST) if taken == offered else max(2 * taken, FEWEST)
 
     def _looked(self, control: Control, unit: Text, block: int, stop: int) -> Stage:
         """Look at blocks, at twice as many as the last look was good for, but for those to `stop` at least."""

@@ -70,21 +70,33 @@ def fitting(control: Control, unit: Text, block: int, stage: Stage, rows: IntArr
     """
     assert stage.turns is not None
     turns, motion = stage.turns[rows], stage.motion[rows]
-    arcs, able = (motion == CLOCKWISE) | (motion == COUNTER), named(control, unit.lanes)
-    odd = (turns | (stage.mask[rows] != 0)) & (turns != arcs) | turns & ~able[unit.program.template[block + rows]]
+    arcs = (motion == CLOCKWISE) | (motion == COUNTER)
+    able = named(control, unit.lanes)[unit.program.template[block + rows]] & is_flat(control, unit, block + rows)
+    odd = (turns | (stage.mask[rows] != 0)) & (turns != arcs) | turns & ~able
     return int(rows[np.argmax(odd)]) if odd.any() else len(stage.mask)
 
 
 def named(control: Control, lanes: LaneTables) -> Mask:
-    """(s,) shapes with the words that an arc needs in the plane in force; no spirals."""
+    """(s,) shapes with the words that an arc needs in the plane in force."""
     plane = control.modal.plane
     if plane.across > 2:
         return np.zeros(len(lanes.turns), dtype=np.bool_)
-    first, second, across = (lanes.centre[:, letter] >= 0 for letter in (plane.first, plane.second, plane.across))
+    first, second = (lanes.centre[:, letter] >= 0 for letter in (plane.first, plane.second))
     centre = first & second if control.modal.arc_absolute else first | second
     ends_there = lanes.mask & (1 << plane.first | 1 << plane.second) != 0
-    able: Mask = np.where(lanes.radius >= 0, ends_there, centre & ~across)
+    able: Mask = np.where(lanes.radius >= 0, ends_there, centre)
     return able & ~lanes.fixed[:, X] if control.modal.diameter else able
+
+
+def is_flat(control: Control, unit: Text, blocks: IntArray) -> Mask:
+    """(k,) blocks without a centre word across the plane in force, or with one that says nothing: no spirals."""
+    program, plane = unit.program, control.modal.plane
+    if plane.across > 2:
+        return np.zeros(len(blocks), dtype=np.bool_)
+    slots = unit.lanes.centre[program.template[blocks], plane.across]
+    across = words(program.numbers, program.first_number[blocks], slots)
+    flat: Mask = np.isnan(across) | ((across == 0.0) & control.takes_zero_across)
+    return flat
 
 
 def said(control: Control, unit: Text, blocks: IntArray, begin: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -74,6 +74,11 @@ class Control(Standing):
         """By how much the radii at both ends of an arc may differ, mm."""
         return self.dialect.closure_mm
 
+    @property
+    def takes_zero_across(self) -> bool:
+        """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
+        return True
+
     @cached_property
     def pointing(self) -> Pointing | None:
         """How the machine's two rotary axes point the tool; None if that cannot be known."""

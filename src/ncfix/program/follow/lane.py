@@ -17,7 +17,7 @@ from ncfix.program.follow.builder import Circles
 from ncfix.program.follow.contour import resting_of_many
 from ncfix.program.follow.control import Control
 from ncfix.program.follow.lane_tables import Lane
-from ncfix.program.follow.stage import LONGEST, IntArray, Mask, Stage, Text
+from ncfix.program.follow.stage import IntArray, Mask, Stage, Text
 from ncfix.program.follow.stretch import Stretch
 from ncfix.program.moves import FeedMode, Kind
 
@@ -63,13 +63,14 @@ def run_lane(
 
     turned  of languages that have arcs in the fast lane: finds the circles of a stage that begins with a block
     """
-    stop = min(unit.lane_end(block), block + LONGEST)
+    stop = min(unit.lane_end(block), block + unit.ahead.most)
     if stop - block < SHORTEST or not is_open(control, unit, block):
         return 0
     stage = unit.ahead.stretch(control, unit, block, stop)
     count, circles = min(before_placing(control, stage.mask, 0), count_allowed(control, stage)), None
     if turned is not None and stage.turns is not None and count >= SHORTEST:
         circles, count = turned(block, stage.rows(0, count))
+    unit.ahead.note(count, stop - block)
     if count < SHORTEST:
         return 0
     unit.ahead.done = block + count

@@ -74,6 +74,11 @@ class Control(shared.Control):
         """As of every control; with inches in force it is given in these."""
         return self.dialect.closure_mm * (1.0 if self.modal.unit == 1.0 else INCH / 10)
 
+    @property
+    def takes_zero_across(self) -> bool:
+        """As of every control, but for LinuxCNC's."""
+        return not self.rules.strict
+
     def anchors(self) -> list[Hashable]:
         """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
         offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool
