@@ -9,7 +9,7 @@ from ncfix import fast
 from ncfix.cli import console
 from ncfix.cli.following import ROTARY, Following, axes_of
 from ncfix.cli.options import dialect_of, subprograms
-from ncfix.cli.parts import Source, part_bytes
+from ncfix.cli.parts import Source, looked_bytes
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
 
@@ -62,7 +62,7 @@ def task_of(following: Following, source: Source, dialect: Dialect, *beside: str
 
     assert following.machine is not None
     find, path = subprograms(following.setup, source.path, *beside), shown(source.path)
-    return Task(following.machine, following.setup, OPTIONS, find, path, dialect, part_bytes(), source.head)
+    return Task(following.machine, following.setup, OPTIONS, find, path, dialect, looked_bytes(), source.head)
 
 
 def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Parts, Iterator[Part]]:
@@ -84,7 +84,7 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
         axes = axes_of(PartReader(reader.path, dialect, source.head).read(source.first_lines).templates)
         find = subprograms(following.setup, source.path)
         follower = follower_of(dialect, Run(following.setup, axes, frozenset(ROTARY), find))
-    parts = Parts(OPTIONS, reader, follower, source.read, part_bytes())
+    parts = Parts(OPTIONS, reader, follower, source.read, looked_bytes())
 
     def found() -> Iterator[Part]:
         for part in parts.parts():
