@@ -10,7 +10,7 @@ from ncfix.diagnostics import Message
 
 FEW = 8
 """So many stretches of lines are named one by one."""
-FIGURE = re.compile(r"(?<![-.\w])\d[\d.]*(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
+FIGURE = re.compile(r"(?<![-.\w])\d+(?:\.\d+)?(?:e[-+]\d+)?(?= (?:mm|um|degrees|times)\b(?!/))")
 """How much it is, in a message."""
 
 
