@@ -7,7 +7,7 @@ import math
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import replace
@@ -76,13 +76,18 @@ def tell(*messages: Message) -> None:
         say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
 
 
-def tell_some(messages: Sequence[Message]) -> None:
-    """Coded messages, those that say the same as one, at most `MOST` of each code; how many more there are is said."""
+def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iterable[Message]] = list) -> None:
+    """Coded messages, those that say the same as one, at most `MOST` of each code; how many more there are is said.
+
+    shown  makes of those that are told what is shown of them
+    """
     seen: Counter[str] = Counter()
+    first = []
     for message in gathered(messages):
         seen[message.code] += 1
         if seen[message.code] <= MOST:
-            tell(message)
+            first.append(message)
+    tell(*shown(first))
     for code, count in seen.items():
         if count > MOST:
             tell(Message(code, f"and {count - MOST} more like these", hint="--json lists all"))

@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -146,7 +146,8 @@ def _let_stay() -> None:
 
 def _written(fixed: Fixed, target: Target, options: FixOptions) -> Outcome:
     entry: dict[str, Any] = fixed.report.as_dict()
-    console.tell_some(_with_lines([*fixed.report.warnings, *_refusals(target.source, entry["refused"])], target.source))
+    messages = [*fixed.report.warnings, *_refusals(target.source, entry["refused"])]
+    console.tell_some(messages, partial(_with_lines, source=target.source))
     refused = bool(entry["refused"]) and not options.allow_refused
     if not refused:
         _write(fixed, target)
