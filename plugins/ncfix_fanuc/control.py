@@ -17,6 +17,9 @@ from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.settings import Form, one_of, whole
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
 from ncfix_fanuc.filling import AXES, FITS, SAID, TEMPLATE, GridFilling
+from ncfix_fanuc.placing import OPTIONS as PLACES
+from ncfix_fanuc.placing import STEP as PLACING
+from ncfix_fanuc.placing import assumption
 from ncfix_fanuc.records import (
     MOST_NUMBER,
     NAME,
@@ -89,6 +92,7 @@ class Fanuc(Control):
             "Punch the grid that is in the control and compare the form; --set template=... follows it.",
         ),
         ASSUMPTION,
+        assumption("FANUC-7"),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": sign_option("FANUC-1"),
@@ -107,11 +111,13 @@ class Fanuc(Control):
             "zero: exact with the rotary axes at zero; middle: between what all their angles ask for",
             one_of(*SAID),
         ),
+        **PLACES,
         **OPTIONS,
     }
     steps = (
         "Settle the assumptions below on the machine, sign first.",
-        "Set numbers of points, intervals, reference points and magnification as volume.json has them.",
+        PLACING,
+        "Set the magnification as volume.json has it.",
         "Write the records of volume.json with cnc_wrvolc, or type in volume.csv.",
         STEP,
         "Switch power off and on, home all axes.",

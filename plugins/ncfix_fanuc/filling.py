@@ -17,6 +17,7 @@ from ncfix.tables.reversal import reversal_note
 from ncfix.tables.settings import wrong
 from ncfix.tables.volume import Volume
 from ncfix_fanuc.backlash import Backlash
+from ncfix_fanuc.placing import Placing, anchors
 from ncfix_fanuc.records import MOST_MAGNIFICATION, SIDE, TEXT, Style, Volc, check_template
 from ncfix_fanuc.units import sense_of
 
@@ -37,6 +38,7 @@ class GridFilling:
 
     sign  "correction" or "error"
     unit  detection unit, mm
+    reference  machine coordinates of the reference position, mm
     """
 
     request: Request
@@ -46,6 +48,7 @@ class GridFilling:
     backlash: Backlash
     fit: str
     rotary: str
+    reference: tuple[float, ...]
 
     @classmethod
     def of(cls, request: Request, settings: Mapping[str, str]) -> GridFilling:
@@ -56,7 +59,8 @@ class GridFilling:
         sign = settings["sign"]
         unit = float(settings["detection_unit_um"]) / 1000
         fit, rotary = settings["fit"], settings["rotary"]
-        return cls(request, sign, unit, _style(settings), Backlash.of(request, settings, unit), fit, rotary)
+        style, reference = _style(settings), anchors(request, settings, AXES)
+        return cls(request, sign, unit, style, Backlash.of(request, settings, unit), fit, rotary, reference)
 
     def volc(self) -> tuple[Volc, Mesh]:
         """The grid in whole numbers, and what it misses."""
@@ -69,9 +73,9 @@ class GridFilling:
             hint = f"the control takes {MOST_MAGNIFICATION}; a larger detection unit, or is the error in mm?"
             raise RefusedError.of("NCF484", text, hint=hint)
         whole = np.rint(sense_of(self.sign) * values / (magnification * self.unit)).astype(np.int64)
-        low = tuple(float(line[0]) for line in mesh.grid.nodes)
+        placing = Placing.of(self.reference, mesh.grid.nodes)
         step = tuple(round(float(line[1] - line[0]), 6) for line in mesh.grid.nodes)
-        return Volc(self.sign, low, step, self.unit, magnification, whole, self.style), mesh
+        return Volc(self.sign, placing.first(step), step, self.unit, magnification, whole, self.style, placing), mesh
 
     def _searched(self) -> Mesh:
         """Exact at its points if that will do, or fitted to what is around them, with points only where it bends."""
@@ -93,7 +97,8 @@ class GridFilling:
         volume = of(request.machine, AXES, request.space, request.tool_length, area)
         shift = self.backlash.shift(self.unit)[[AXES.index(axis) for axis in volume.outputs]]
         exact = volume.exact
-        return replace(volume, exact=lambda places: exact(places) + shift, written=self._rounded)
+        rounded = self._rounded
+        return replace(volume, exact=lambda places: exact(places) + shift, written=rounded, anchors=self.reference)
 
     def _rounded(self, grid: Grid) -> Grid:
         """What whole numbers make of it."""
@@ -118,6 +123,8 @@ class GridFilling:
         counts = " x ".join(map(str, mesh.grid.counts))
         missed = f"it misses {1e3 * mesh.left:.2f} um at most, rounding included"
         yield f"Grid {counts}: {mesh.grid.points} points; {missed}."
+        if volc.placing is not None:
+            yield from volc.placing.notes(AXES, mesh.grid.counts, volc.step, "mm")
         rounding = volc.magnification * self.unit / 2
         yield f"Magnification {volc.magnification}: a value is rounded by up to {1e3 * rounding:.2f} um."
         if rounding > request.target:

@@ -18,6 +18,7 @@ from ncfix.tables.grid import Grid
 from ncfix.tables.lines import Remarks
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
+from ncfix_fanuc.placing import Placing, placed
 from ncfix_fanuc.units import SIGNS
 
 POINTS = 24
@@ -60,6 +61,7 @@ class Volc:
     magnification  values are in units times this
     values         (nx, ny, nz, 3)
     style          numbering and text
+    placing        how the parameters of the control put it; None in files that do not say it
     """
 
     sign: str
@@ -69,6 +71,7 @@ class Volc:
     magnification: int
     values: NDArray[np.int64]
     style: Style = Style()
+    placing: Placing | None = None
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -106,6 +109,7 @@ def json_text(volc: Volc) -> bytes:
         "first_mm": volc.low,
         "interval_mm": volc.step,
         "counts": volc.values.shape[:3],
+        **_placing(volc),
         "detection_unit_um": round(volc.unit * 1000, 6),
         "magnification": volc.magnification,
         "first_number": volc.style.first,
@@ -117,6 +121,17 @@ def json_text(volc: Volc) -> bytes:
     lines = [f' "{key}": {json.dumps(value)},\n' for key, value in head.items()]
     records = ",\n".join(f"  {json.dumps(record)}" for record in _records(volc.rows, volc.style.first))
     return f'{{\n{"".join(lines)} "records": [\n{records}\n ]\n}}\n'.encode()
+
+
+def _placing(volc: Volc) -> dict[str, Any]:
+    """How the parameters put the grid, and the number of the point at the reference position among all."""
+    if volc.placing is None:
+        return {}
+    fastest = volc.axes[::-1]
+    return {
+        **volc.placing.entries("mm"),
+        "reference_number": volc.placing.number(volc.values.shape[:3], fastest, volc.style.first),
+    }
 
 
 def _records(rows: NDArray[np.int64], first: int) -> list[dict[str, Any]]:
@@ -179,7 +194,8 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
         remarks.refuse(0, f"{len(rows)} values in the records, {3 * math.prod(counts)} expected of {counts}")
     if any(abs(value) > style.largest for value in rows):
         remarks.refuse(0, f"a value beyond -{style.largest} to {style.largest}")
-    low, step = json_values.reals(found, "first_mm", 3), json_values.reals(found, "interval_mm", 3, SMALLEST)
+    step = json_values.reals(found, "interval_mm", 3, SMALLEST)
+    low, placing = placed(found, "mm", step, counts, remarks)
     unit = json_values.real(found, "detection_unit_um", 1e-6, 10) / 1000
     magnification = json_values.whole(found, "magnification", 1, MOST_MAGNIFICATION)
     if remarks.wrong:
@@ -187,7 +203,12 @@ def _volc(found: Any, remarks: Remarks) -> Volc | None:
     slowest = ["XYZ".index(axis) for axis in reversed(style.order)]
     stacked = np.array(rows, dtype=np.int64).reshape(*(counts[axis] for axis in slowest), 3)
     values = stacked.transpose(*np.argsort(slowest), 3)
-    return Volc(found["sign"], low, step, unit, magnification, values, style)
+    volc = Volc(found["sign"], low, step, unit, magnification, values, style, placing)
+    for key, number in _placing(volc).items():
+        if key == "reference_number" and found.get(key) != number:
+            remarks.refuse(0, f"{key} is {found.get(key)!r}, and by the numbers of the axes it is {number}")
+            return None
+    return volc
 
 
 def _style(record: Mapping[str, Any], remarks: Remarks) -> Style:

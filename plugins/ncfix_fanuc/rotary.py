@@ -27,6 +27,9 @@ from ncfix.tables.residual import residual
 from ncfix.tables.reversal import reversal_note
 from ncfix.tables.settings import one_of, whole
 from ncfix_fanuc.backlash import ASSUMPTION, OPTIONS, STEP, Backlash, read_backlash
+from ncfix_fanuc.placing import OPTIONS as PLACES
+from ncfix_fanuc.placing import STEP as PLACING
+from ncfix_fanuc.placing import assumption
 from ncfix_fanuc.rotary_fill import PART, LatticeFilling, table_axes
 from ncfix_fanuc.rotary_records import LARGEST, LINEAR, MOST_ROTARY, SIDE, Lattice, read_lattice
 from ncfix_fanuc.units import UNITS, sign_option, units_of
@@ -139,6 +142,7 @@ class FanucRotary(Control):
             "Load lin = [100, 0, 0] at one angle only, and see whether X moves there.",
         ),
         ASSUMPTION,
+        assumption("FROT-5"),
     )
     options: ClassVar[Mapping[str, Option]] = {
         "sign": sign_option("FROT-1"),
@@ -146,6 +150,7 @@ class FanucRotary(Control):
         "rotary": Option(
             "yes", "yes: a second lattice, over the rotary axes of a table (FROT-4); no: none", one_of("yes", "no")
         ),
+        **PLACES,
         **OPTIONS,
         "rotary_points": Option(
             "72",
@@ -154,9 +159,9 @@ class FanucRotary(Control):
         ),
     }
     steps = (
-        "Settle FROT-1 to FROT-4 on the machine.",
-        "Set numbers of points, intervals and magnifications as rotary.json, and rotary-axes.json if it is there, have "
-        "them.",
+        "Settle FROT-1 to FROT-5 on the machine.",
+        PLACING,
+        "Set the magnifications as rotary.json, and rotary-axes.json if it is there, have them.",
         STEP,
         "Write the records with cnc_wrrotvolc, switch power off and on, home all axes.",
         "Measure one line with a short and with a long tool: both errors must have become smaller.",
@@ -179,7 +184,7 @@ class FanucRotary(Control):
         units = units_of(settings)
         most = int(settings["rotary_points"])
         backlash = Backlash.of(request, settings, units[0])
-        filling = LatticeFilling(request, sign, units, backlash)
+        filling = LatticeFilling(request, sign, units, backlash, settings)
         two = rotary == "yes" and bool(table_axes(request))
         lattices = [filling.linear(PART if two else 1.0)]
         if two and (second := filling.rotary(PART, most)):
@@ -242,6 +247,9 @@ def _notes(
             f"Lattice {counts}: {mesh.grid.points} points; lengths are rounded by up to {1e3 * length:.2f} um, angles "
             f"by {1e6 * angle:.2f} urad: together up to {1e3 * _rounding(request, lattice):.2f} um at the tip."
         )
+        if lattice.placing is not None:
+            unit = "mm" if lattice.inputs == LINEAR else "degree"
+            yield from lattice.placing.notes(lattice.inputs, mesh.grid.counts, lattice.step, unit)
         tables = (
             Turning(*lattice.grids(), play=play)
             if tables is None

@@ -6,7 +6,7 @@ and the turn times the distance from where it is said to be about: six numbers f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,6 +20,7 @@ from ncfix.tables.mesh import AIM, Mesh, search
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_fanuc.backlash import Backlash
 from ncfix_fanuc.filling import LEVEL
+from ncfix_fanuc.placing import anchors
 from ncfix_fanuc.rotary_records import ANGLES, LINEAR, SIDE, Lattice
 
 LENGTH = 100.0
@@ -32,12 +33,13 @@ TRIES = ((False, False), (True, True))
 
 @dataclass(frozen=True, slots=True)
 class LatticeFilling:
-    """How lattices are filled."""
+    """How lattices are filled, under these settings."""
 
     request: Request
     sign: str
     units: tuple[float, float]
     backlash: Backlash
+    settings: Mapping[str, str]
 
     @property
     def machine(self) -> Machine:
@@ -63,7 +65,10 @@ class LatticeFilling:
         volume = Volume.of(self.machine, LINEAR, self.request.space, length, area)
         shift = self.backlash.shift(self.units[0])[[LINEAR.index(axis) for axis in volume.outputs]]
         exact = volume.exact
-        return replace(volume, exact=lambda places: exact(places) + shift)
+        return replace(volume, exact=lambda places: exact(places) + shift, anchors=self._anchors(LINEAR))
+
+    def _anchors(self, inputs: Sequence[str]) -> tuple[float, ...]:
+        return anchors(self.request, self.settings, inputs)
 
     def _lattice(self, counts: Sequence[int], area: bool, covered: Array) -> Lattice:
         """Tools of two lengths tell lengths from angles."""
@@ -73,7 +78,8 @@ class LatticeFilling:
         lever = (long.values - bare.values)[..., order] / LENGTH
         angles = np.stack([lever[..., 1], -lever[..., 0], np.zeros(lever.shape[:-1])], axis=-1)
         lengths = replace(bare, outputs=LINEAR, values=bare.values[..., order])
-        found = Lattice.of((lengths, replace(bare, outputs=ANGLES, values=angles)), self.sign, self.units)
+        grids = lengths, replace(bare, outputs=ANGLES, values=angles)
+        found = Lattice.of(grids, self.sign, self.units, self._anchors(LINEAR))
         return replace(found, home_minus=self.backlash.home_minus)
 
     def _as_written(self, grid: Grid, area: bool, covered: Array) -> Grid:
@@ -93,13 +99,14 @@ class LatticeFilling:
         units = tuple(self.machine.axes[column].unit for column in table.columns)
         names = (*LINEAR, *ANGLES)
         volume = Volume(inputs, space, units, names, lambda places: table.six(places) * ([1.0] * 3 + [reach] * 3))
+        volume.anchors = self._anchors(inputs)
         mesh = search(volume, share * AIM * self.request.target, [most] * len(inputs), most ** len(inputs))
         lengths, angles = mesh.grid.values[..., :3], mesh.grid.values[..., 3:] / reach
         grids = (
             replace(mesh.grid, outputs=LINEAR, values=lengths),
             replace(mesh.grid, outputs=ANGLES, values=angles),
         )
-        return Lattice.of(grids, self.sign, self.units, table.centre), mesh
+        return Lattice.of(grids, self.sign, self.units, volume.anchors, table.centre), mesh
 
 
 def table_axes(request: Request) -> tuple[str, ...]:

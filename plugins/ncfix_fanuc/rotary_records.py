@@ -17,6 +17,7 @@ from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix_fanuc import json_values
 from ncfix_fanuc.json_values import SMALLEST
+from ncfix_fanuc.placing import Placing, placed
 from ncfix_fanuc.units import SIGNS, sense_of
 
 SIDE = 25
@@ -65,6 +66,7 @@ class Lattice:
     rot      (*counts, 3) angles about X, Y and Z
     centre   mm: where angles turn about, if they turn a table
     home_minus  the linear axes whose reference position return goes towards minus
+    placing  how the parameters of the control put it; None in files that do not say it
     """
 
     inputs: tuple[str, ...]
@@ -75,12 +77,21 @@ class Lattice:
     rot: NDArray[np.int64]
     centre: tuple[float, ...] = ()
     home_minus: str = ""
+    placing: Placing | None = None
 
     @classmethod
     def of(
-        cls, grids: tuple[Grid, Grid], sign: str, units: tuple[float, float], centre: Array | None = None
+        cls,
+        grids: tuple[Grid, Grid],
+        sign: str,
+        units: tuple[float, float],
+        reference: Sequence[float],
+        centre: Array | None = None,
     ) -> Lattice:
-        """Corrections in whole numbers, with the smallest magnifications that hold them."""
+        """Corrections in whole numbers, with the smallest magnifications that hold them.
+
+        reference: where a node of each axis lies, mm or degree.
+        """
         factors, whole = [], []
         for grid, unit in zip(grids, units, strict=True):
             factors.append(max(1, math.ceil(float(np.abs(grid.values).max()) / (LARGEST * unit) - 1e-9)))
@@ -90,10 +101,11 @@ class Lattice:
             whole.append(np.rint(sense_of(sign) * grid.values / (factors[-1] * unit)).astype(np.int64))
         inputs = grids[0].inputs
         lines = [line / unit_of(name) for name, line in zip(inputs, grids[0].nodes, strict=True)]
-        low = tuple(round(float(line[0]), 6) for line in lines)
+        placing = Placing.of(reference, lines)
         step = tuple(round(float(line[-1] - line[0]) / (len(line) - 1), 6) for line in lines)
         scale = Scale(sign, units, (factors[0], factors[1]))
-        return cls(inputs, low, step, scale, whole[0], whole[1], () if centre is None else tuple(centre.tolist()))
+        middle = () if centre is None else tuple(centre.tolist())
+        return cls(inputs, placing.first(step), step, scale, whole[0], whole[1], middle, placing=placing)
 
     def grids(self) -> tuple[Grid, Grid]:
         """Lengths and angles as corrections, mm and rad."""
@@ -105,6 +117,14 @@ class Lattice:
         lin, rot = (np.asarray(part, dtype=np.float64) for part in (self.lin, self.rot))
         return Grid(self.inputs, nodes, LINEAR, lin * length), Grid(self.inputs, nodes, ANGLES, rot * angle)
 
+    def _placing(self) -> dict[str, Any]:
+        """How the parameters put it, and which record is that of the reference position."""
+        if self.placing is None:
+            return {}
+        counts = self.lin.shape[:-1]
+        number = self.placing.number(counts, range(len(counts)))
+        return {**self.placing.entries("mm" if self.inputs == LINEAR else "deg"), "reference_number": number}
+
     def text(self) -> bytes:
         """JSON: what the parameters must be, and a record for each point."""
         linear = self.inputs == LINEAR
@@ -114,6 +134,7 @@ class Lattice:
             "first_mm" if linear else "first_deg": self.low,
             "interval_mm" if linear else "interval_deg": self.step,
             "counts": self.lin.shape[:-1],
+            **self._placing(),
             "detection_unit_um": round(self.scale.units[0] * 1000, 6),
             "detection_unit_deg": round(self.scale.units[1] / DEGREE, 9),
             "magnification": self.scale.magnifications[0],
@@ -151,7 +172,12 @@ def _checked(value: Any, remarks: Remarks, linear: bool) -> Lattice | None:
         return None
     order = [*reversed(range(len(counts))), len(counts)]
     lin, rot = (np.array(rows[key], dtype=np.int64).reshape(*counts[::-1], 3).transpose(order) for key in rows)
-    return Lattice(inputs, *_ends(value, inputs), _scale(value), lin, rot, *_rest(value, remarks, linear))
+    step, end = _interval(value, inputs)
+    low, placing = placed(value, end, step, counts, remarks)
+    if remarks.wrong:
+        return None
+    rest = _rest(value, remarks, linear)
+    return Lattice(inputs, low, step, _scale(value), lin, rot, *rest, placing)
 
 
 def _inputs(record: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[str, ...]:
@@ -164,10 +190,10 @@ def _inputs(record: Mapping[str, Any], remarks: Remarks, linear: bool) -> tuple[
     return tuple(axes)
 
 
-def _ends(record: Mapping[str, Any], inputs: tuple[str, ...]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _interval(record: Mapping[str, Any], inputs: tuple[str, ...]) -> tuple[tuple[float, ...], str]:
+    """The interval along each axis, and its unit."""
     end = "mm" if inputs == LINEAR else "deg"
-    low = json_values.reals(record, f"first_{end}", len(inputs))
-    return low, json_values.reals(record, f"interval_{end}", len(inputs), SMALLEST)
+    return json_values.reals(record, f"interval_{end}", len(inputs), SMALLEST), end
 
 
 def _scale(record: Mapping[str, Any]) -> Scale:

@@ -18,6 +18,8 @@ from ncfix.testing import check_control, single_error
 
 CONTROL = get_control("fanuc-rotary")
 SETTINGS = CONTROL.settings({"sign": "correction"})
+CORNER = CONTROL.settings({"sign": "correction", "reference": "X-200,Y-150,Z-300"})
+"""With the reference position at the lowest corner of the travel, so that two points an axis will do."""
 
 
 def test_the_contract() -> None:
@@ -27,9 +29,10 @@ def test_the_contract() -> None:
 def test_golden_record() -> None:
     """The spindle is tilted by 20 um/m about X: -1.146 thousandths of a degree, eleven units, at every point."""
     machine = single_error("EXX").replace(effects=(Effect("EA0S", (20e-6,)),))
-    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS), 100)
+    made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, CORNER), 100)
     found = json.loads(made.native["rotary.json"])
     assert found["counts"] == [2, 2, 2]
+    assert (found["reference_mm"], found["reference_points"]) == ([-200.0, -150.0, -300.0], [1, 1, 1])
     assert found["records"][0] == {"no": 1, "lin": [0, 0, 0], "rot": [-11, 0, 0]}
 
 
@@ -87,7 +90,11 @@ def test_golden_record_of_a_table() -> None:
     second = json.loads(
         CONTROL.write(Request(turned, ranges_of(turned), 0.0, 0.0005, SETTINGS)).files["rotary-axes.json"]
     )
-    assert (second["axes"], second["first_deg"], second["centre_mm"]) == (["A"], [-60.0], [0.0, 0.0, -350.0])
+    assert (second["axes"], second["centre_mm"]) == (["A"], [0.0, 0.0, -350.0])
+    (first,), (step,), (point,) = (second[key] for key in ("first_deg", "interval_deg", "reference_points"))
+    assert first + (point - 1) * step == 0  # A at its reference position
+    assert first <= -60 < first + step
+    assert first + (second["counts"][0] - 1) * step == 90
     at_90 = second["records"][-1]
     assert at_90["rot"] == [0, 0, 0]
     assert [abs(value) * second["magnification"] for value in at_90["lin"]] == pytest.approx([0, 100, 100], abs=2)
@@ -124,7 +131,7 @@ def test_broken_second_lattices(case: str) -> None:
 
 def damaged(change: Callable[[dict[str, Any]], object]) -> dict[str, bytes]:
     machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
-    files = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, SETTINGS)).files
+    files = CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, CORNER)).files
     found = json.loads(files["rotary.json"])
     change(found)
     return {"rotary.json": json.dumps(found).encode()}

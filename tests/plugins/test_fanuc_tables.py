@@ -16,11 +16,13 @@ from ncfix.tables.poses import ranges_of
 from ncfix.testing import check_control, single_error
 
 CONTROL = get_control("fanuc")
+CORNER = "X-200,Y-150,Z-300"
+"""The reference position at the lowest corner of the travel, so that two points an axis will do."""
 
 
 def exported(sign: str = "correction", unit: str = "0.1", size: float = 0.01) -> Exported:
     machine = single_error("EXX").replace(effects=(Effect("EXX", (size,)),))
-    settings = CONTROL.settings({"sign": sign, "detection_unit_um": unit})
+    settings = CONTROL.settings({"sign": sign, "detection_unit_um": unit, "reference": CORNER})
     return export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 100)
 
 
@@ -37,6 +39,9 @@ def test_golden_records() -> None:
         "first_mm": [-200.0, -150.0, -300.0],
         "interval_mm": [500.0, 400.0, 300.0],
         "counts": [2, 2, 2],
+        "reference_mm": [-200.0, -150.0, -300.0],
+        "reference_points": [1, 1, 1],
+        "reference_number": 1,
         "detection_unit_um": 0.1,
         "magnification": 1,
         "first_number": 1,
@@ -113,9 +118,79 @@ def test_broken_files(case: str) -> None:
         CONTROL.read(files)
 
 
+def test_the_control_can_put_the_grid_by_what_it_is_given() -> None:
+    """Parameters have no first position: how many points, how far apart, and which is at the reference position."""
+    machine = single_error("EXX", 0.02)
+    for reference in ("", "X-137.2, Y12.5", "X300 Y250 Z-299.9995"):
+        settings = CONTROL.settings({"sign": "error", "reference": reference})
+        made = export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 2000)
+        found = json.loads(made.native["volume.json"])
+        place, points, steps = found["reference_mm"], found["reference_points"], found["interval_mm"]
+        assert place == {"": [0, 0, 0], "X-137.2, Y12.5": [-137.2, 12.5, 0]}.get(reference, [300, 250, -299.9995])
+        line = made.native["volume.csv"].decode().splitlines()[found["reference_number"]].split(",")
+        assert line[0] == str(found["reference_number"])
+        assert [float(word) for word in line[1:4]] == pytest.approx(place, abs=1e-9)
+        for low_high, at, number, step, count in zip(
+            ranges_of(machine), place, points, steps, found["counts"], strict=True
+        ):
+            assert at - (number - 1) * step <= low_high[0] + 1e-9  # the grid reaches over the travel
+            assert at + (count - number) * step >= low_high[1] - 1e-9
+            assert step == round(step, 3)  # of what a parameter can say
+        assert made.left.after.max() <= 0.001
+        sheet = made.files["hand-over.md"].decode()
+        assert f"the reference position X{place[0]:g} is point {points[0]}" in sheet
+        assert "FANUC-7" in sheet
+        nodes = CONTROL.read({**made.native}).grids[0].nodes
+        assert [line[number - 1] for line, number in zip(nodes, points, strict=True)] == pytest.approx(place)
+
+
+def test_the_grid_is_run_where_the_parameters_put_it() -> None:
+    """Another point at the reference position is another place of the grid, and the files must agree on it."""
+    found = json.loads(exported().native["volume.json"])
+    found["reference_points"] = [2, 1, 1]
+    files = {**exported().native, "volume.json": json.dumps(found).encode()}
+    assert any("the grid begins at [-700.0, -150.0, -300.0]" in message.text for message in CONTROL.lint(files))
+    with pytest.raises(ConfigError):
+        CONTROL.read(files)
+    del found["reference_points"]  # as files were written before: run, with a word
+    old = {**exported().native, "volume.json": json.dumps(found).encode()}
+    assert [message.code for message in CONTROL.lint(old)] == ["NCF492"]
+    assert CONTROL.read(old).grids[0].nodes[0][0] == -200
+
+
+def referred(reference: str) -> None:
+    machine = single_error("EXX")
+    settings = CONTROL.settings({"sign": "error", "reference": reference})
+    CONTROL.write(Request(machine, ranges_of(machine), 0.0, 0.001, settings))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("Z5", "the reference position of Z, 5 is not between -300 and 0"),
+        ("Z5,W3", "X0,Y0,Z-10.5"),
+        ("B3", "reference names B"),
+        ("X1 X2", "X0,Y0,Z-10.5"),
+    ],
+)
+def test_a_reference_position_that_the_grid_cannot_have_is_asked_for(given: str, words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        referred(given)
+    assert caught.value.code == "NCF485"
+    assert words in str(caught.value)
+
+
+def test_machine_zero_beyond_the_range_is_not_guessed_about() -> None:
+    machine = single_error("EXX")
+    space = ranges_of(machine, {"X": (100.0, 300.0)})
+    with pytest.raises(UsageError, match="taken to be machine zero"):
+        CONTROL.write(Request(machine, space, 0.0, 0.001, CONTROL.settings({"sign": "error"})))
+
+
 def template(**settings: str) -> dict[str, bytes]:
     machine = single_error("EXX").replace(effects=(Effect("EXX", (0.01,)),))
-    chosen = CONTROL.settings({"sign": "correction", "template": "N{no}A1P{dx}A2P{dy}A3P{dz};", **settings})
+    said = {"sign": "correction", "template": "N{no}A1P{dx}A2P{dy}A3P{dz};", "reference": CORNER}
+    chosen = CONTROL.settings({**said, **settings})
     return dict(export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.001, chosen), 100).native)
 
 
@@ -161,12 +236,8 @@ def test_a_text_file_that_says_something_else_is_named() -> None:
 
 def test_least_squares_leave_less_at_the_worst() -> None:
     machine = single_error("EXX", 0.05)
-    made = [
-        export(
-            CONTROL, Request(machine, ranges_of(machine), 0.0, 0.004, CONTROL.settings({"sign": "error", "fit": fit}))
-        )
-        for fit in ("nodes", "area")
-    ]
+    kinds = [CONTROL.settings({"sign": "error", "fit": fit, "reference": CORNER}) for fit in ("nodes", "area")]
+    made = [export(CONTROL, Request(machine, ranges_of(machine), 0.0, 0.004, kind)) for kind in kinds]
     assert made[1].tables.points < made[0].tables.points
     assert made[1].left.after.max() < 0.004 + 1e-4  # and the rounding
 

@@ -71,15 +71,16 @@ class Bending:
         found: Array = self.values[:, cell] * (1 - part) + self.values[:, cell + 1] * part
         return found
 
-    def missed(self, count: int) -> float:
-        """The largest correction that evenly spaced nodes miss, mm."""
-        nodes = np.linspace(self.places[0], self.places[-1], count)
+    def missed(self, nodes: Array) -> float:
+        """The largest correction that evenly spaced nodes (n,) miss, mm; the outermost may lie beyond the ends."""
+        count = len(nodes)
         part = np.mod(np.arange(BETWEEN) / BETWEEN + GOLDEN * np.arange(count - 1)[:, None], 1.0)
         inside = (nodes[:-1, None] + part * (nodes[1] - nodes[0])).reshape(-1)
         ends, values = self.at(nodes), self.at(inside)
         share = part.reshape(-1)[:, None]
         chord = np.repeat(ends[:, :-1], BETWEEN, axis=1) * (1 - share) + np.repeat(ends[:, 1:], BETWEEN, axis=1) * share
-        return float(np.linalg.norm(values - chord, axis=2).max())
+        seen = (inside >= self.places[0]) & (inside <= self.places[-1])
+        return float(np.linalg.norm(values - chord, axis=2)[:, seen].max(initial=0.0))
 
     def ends(self, allowed: float) -> tuple[float, float]:
         """The places between which corrections change: before and after them by no more than is allowed, mm."""

@@ -18,7 +18,7 @@ from ncfix.tables.fit import hats
 from ncfix.tables.grid import Array
 from ncfix.tables.minimax import least_worst
 from ncfix.tables.poses import corners, even_poses, random_ways
-from ncfix.tables.volume import Volume
+from ncfix.tables.volume import Volume, even_line
 
 PLACES, OTHERS = 96, 96
 """Positions of the axes that are looked up, and poses of the others at each."""
@@ -76,7 +76,9 @@ def of_even_nodes(volume: Volume, index: int, count: int) -> Least:
     Along a line such a table is straight between them; which values come nearest at the worst is a linear programme.
     """
     low, high = volume.covered[index].tolist()
-    nodes = np.linspace(low, high, count)
+    anchor = volume.anchors[index] if volume.anchors else None
+    unit = volume.units[index]
+    nodes = even_line(low / unit, high / unit, count, anchor) * unit
     fine = np.linspace(low, high, FINE * (count - 1) + 1)
     starts = np.concatenate([corners(volume.ranges), even_poses(volume.ranges, LINES)])
     starts[:, index] = low

@@ -48,7 +48,8 @@ def search(volume: Volume, target: float, most: Sequence[int], points: int, equa
     """
     if equal:
         side = int(min(min(most), np.floor(points ** (1 / len(most)) + 1e-9)))
-        ladder = np.repeat(np.arange(2, side + 1)[:, None], len(most), axis=1)
+        fewest = max(volume.least(axis) for axis in range(len(most)))
+        ladder = np.repeat(np.arange(fewest, side + 1)[:, None], len(most), axis=1)
         return _first(volume, target, ladder)
     found = _bisected(
         volume, target, _frontier([_along(volume, axis, target, n) for axis, n in enumerate(most)], points)
@@ -71,7 +72,7 @@ def _frontier(axes: Sequence[tuple[Counts, Array]], points: int) -> Counts:
     """The counts (k, n_inputs) of which none has more nodes and misses more than another, by their number of nodes."""
     counts, missed = np.zeros((1, 0), dtype=np.intp), np.zeros(1)
     for index, (line, part) in enumerate(axes):
-        rest = 2 ** (len(axes) - index - 1)
+        rest = int(np.prod([line[0] for line, _ in axes[index + 1 :]]))
         grown = np.concatenate([np.repeat(counts, len(line), axis=0), np.tile(line, len(counts))[:, None]], axis=1)
         total = (missed[:, None] + part).reshape(-1)
         allowed = grown.prod(axis=1) * rest <= points
@@ -121,7 +122,7 @@ def _thinned(volume: Volume, mesh: Mesh, target: float) -> Mesh:
     """Take nodes away as long as the target still holds."""
     counts = np.array(mesh.grid.counts, dtype=np.intp)
     for axis in np.argsort(counts):
-        while counts[axis] > 2:
+        while counts[axis] > volume.least(int(axis)):
             fewer = counts.copy()
             fewer[axis] = volume.fewer(int(axis), int(counts[axis]))
             found = _at(volume, fewer, target)

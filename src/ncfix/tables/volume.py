@@ -22,6 +22,12 @@ MATTERS = 1e-6
 """mm: a smaller change of the correction is none."""
 DIGITS = 6
 """Decimals of a node's position, mm or degree."""
+STEP = 1e-3
+"""Of nodes with an anchor, what steps are whole multiples of: mm or degree, what parameters of controls can say."""
+SLACK = 1e-6
+"""Of that, what rounding may come to."""
+END = 1e-9
+"""An anchor that is no farther from an end of the range is there."""
 OTHERS = 12
 """Poses of other axes, besides the corners of their ranges, over which a middle is taken."""
 CLOSE = 48
@@ -51,6 +57,8 @@ class Volume:
     kinks    of each input, positions at which the corrections may have a corner
     uneven   nodes need not be evenly spaced
     covered  (n_inputs, 2) where nodes are, mm and rad; beyond, but within the ranges, the values at the ends hold
+    anchors  of each input, a position within its range at which there must be a node, in its unit of the file, or None.
+             Steps are then whole thousandths of that unit, and the outermost nodes may lie beyond the range
     """
 
     inputs: tuple[str, ...]
@@ -63,6 +71,7 @@ class Volume:
     kinks: tuple[Array, ...] = ()
     uneven: bool = False
     covered: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    anchors: tuple[float | None, ...] = ()
     _bending: dict[int, Bending] = field(default_factory=dict, init=False)
     _checks: list[tuple[Array, Array]] = field(default_factory=list, init=False)
 
@@ -117,8 +126,21 @@ class Volume:
         within = WITHIN if len(nodes) <= 3 else WITHIN // 2
         looked_at = tuple(self._around(index, line, within) for index, line in enumerate(nodes)) if self.area else nodes
         places = np.stack(np.meshgrid(*looked_at, indexing="ij"), axis=-1)
-        values = self.exact(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(self.outputs))
+        values = self._at(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(self.outputs))
         return Grid(self.inputs, nodes, self.outputs, fitted(values, looked_at, nodes) if self.area else values)
+
+    def _at(self, places: Array) -> Array:
+        """The corrections at places (n, n_inputs); beyond the ranges they go on as straight as they came there."""
+        if not self.anchors:
+            return self.exact(places)
+        low, high = self.ranges.T
+        edge = np.clip(places, low, high)
+        values = self.exact(edge)
+        beyond = (edge != places).any(axis=1)
+        if beyond.any():
+            mirrored = np.clip(2 * edge[beyond] - places[beyond], low, high)
+            values[beyond] = 2 * values[beyond] - self.exact(mirrored)
+        return values
 
     def _around(self, index: int, nodes: Array, within: int) -> Array:
         """Places between the nodes, and where the ends hold: these count as much as half a cell."""
@@ -129,12 +151,21 @@ class Volume:
         return np.concatenate([before, between(nodes, within), after[::-1]])
 
     def _nodes(self, index: int, count: int) -> Array:
-        low, high = (self.covered[index] / self.units[index]).tolist()
-        line: Array = np.linspace(low, high, count)
         if self.uneven:
             line = self._bends(index).uneven()[count][0] / self.units[index]
+        else:
+            low, high = (self.covered[index] / self.units[index]).tolist()
+            line = even_line(low, high, count, self._anchor(index))
         nodes: Array = np.round(line, DIGITS) * self.units[index]
         return nodes
+
+    def _anchor(self, index: int) -> float | None:
+        return self.anchors[index] if self.anchors else None
+
+    def least(self, index: int) -> int:
+        """The fewest nodes along one input: a node at its anchor that is not at an end makes them three."""
+        anchor = self._anchor(index)
+        return 2 if anchor is None or np.abs(self.covered[index] / self.units[index] - anchor).min() < END else 3
 
     def left(self, grid: Grid) -> float:
         """The largest correction that a grid misses at random poses, mm."""
@@ -148,7 +179,7 @@ class Volume:
         """How many nodes may be put along one input."""
         if self.uneven:
             return sorted(count for count in self._bends(index).uneven() if count <= most)
-        found = [2]
+        found = [self.least(index)]
         while found[-1] < min(most, FAR):
             found.append(found[-1] + 1 if found[-1] < CLOSE else int(np.ceil(found[-1] * GROWTH)))
         return [count for count in found if count <= min(most, FAR)]
@@ -160,12 +191,16 @@ class Volume:
     def bending(self, index: int, count: int) -> float:
         """The largest correction that `count` nodes along one input miss on random lines along it, mm."""
         bends = self._bends(index)
-        return bends.uneven()[count][1] if self.uneven else bends.missed(count)
+        return bends.uneven()[count][1] if self.uneven else bends.missed(self._nodes(index, count))
 
     def trimmed(self, index: int, allowed: float) -> Volume:
         """Nodes of one input only where the corrections change: at either end by no more than is allowed, mm."""
         covered = self.covered.copy()
         covered[index] = self._bends(index).ends(allowed)
+        anchor = self._anchor(index)
+        if anchor is not None:
+            place = anchor * self.units[index]
+            covered[index] = min(covered[index, 0], place), max(covered[index, 1], place)
         return replace(self, covered=covered)
 
     def _bends(self, index: int) -> Bending:
@@ -181,6 +216,24 @@ class Volume:
         positions = np.repeat(spread, len(line), axis=0)
         positions[:, axis] = np.tile(line, len(spread))
         return self.exact(positions).reshape(len(spread), len(line), -1)
+
+
+def even_line(low: float, high: float, count: int, anchor: float | None) -> Array:
+    """Evenly spaced nodes from one end to the other, or as near to that as they can be with one at the anchor."""
+    if anchor is None:
+        line: Array = np.linspace(low, high, count)
+        return line
+    before = np.arange(count)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = [
+            np.where(part > 0, length / part, 0.0 if length < END else np.inf)
+            for length, part in ((anchor - low, before), (high - anchor, before[::-1]))
+        ]
+    steps = np.max(sides, axis=0)
+    chosen = int(np.argmin(steps))
+    step = np.ceil(steps[chosen] / STEP - SLACK) * STEP
+    nodes: Array = anchor + step * (before - chosen)
+    return nodes
 
 
 def inputs_that_matter(machine: Machine, space: Array, tool_length: float) -> tuple[str, ...]:
