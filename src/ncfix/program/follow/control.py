@@ -114,6 +114,8 @@ class Control(Standing):
         """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
         if not motion.passing:
             self._ask_for_start(motion)
+        if self.shaky:
+            self.places.lose(mask_of(self.shaky))
         settles = self._settles(motion)
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)

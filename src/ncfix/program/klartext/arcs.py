@@ -32,6 +32,7 @@ from ncfix.program.moves import Kind
 BAD_ARC = "NCF220"
 
 NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
+NO_ANGLE = "CP without an angle (PA, IPA): whether the control makes a full circle of it or stops is not sure"
 AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
 FLAT = 1e-9
 
@@ -98,6 +99,10 @@ def circular_polar(control: Control, step: Step) -> None:
     )
     if give_up(control, step, where):
         return
+    if not step.words.values.keys() & {"PA", "IPA"}:
+        axes = step.words.axes or 3
+        somewhere(control, axes, *command_of(control, where, axes), NO_ANGLE)
+        return
     start, end = points(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]
     if math.hypot(*centre) < FLAT:
@@ -126,7 +131,7 @@ def tangential(control: Control, step: Step) -> None:
     left = -ahead[plane.second], ahead[plane.first]
     side = away[0] * left[0] + away[1] * left[1]
     size = math.hypot(*left)
-    if size < FLAT or abs(side) < FLAT * math.hypot(*away):
+    if size < FLAT or abs(side) <= FLAT * math.hypot(*away):
         do_without(control, step, where, NO_TANGENT)
         return
     radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)

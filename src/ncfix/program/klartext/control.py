@@ -199,8 +199,9 @@ class Control(base.Control):
     def make(self, motion: Motion) -> None:
         """As of every control.
 
-        What must not be split: elements at a corner that the control makes (RND, CHF), and turns of the tool in a plane
-        (PATHCTRL VECTOR), which in pieces would be turns of axes.
+        What must not be split: elements at a corner that the control makes (RND, CHF), turns of the tool in a plane
+        (PATHCTRL VECTOR), which in pieces would be turns of axes, and increments of an axis whose datum is not known,
+        which further pieces would have to name.
         """
         if motion.kind == Kind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
             motion = motion._replace(passing=motion.passing or first_reason(motion.unknown))
@@ -208,6 +209,8 @@ class Control(base.Control):
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
         if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
+            self.whole = True
+        if motion.axes & mask_of(self.shaky):
             self.whole = True
         super().make(motion)
         if self.is_rotated:

@@ -19,10 +19,10 @@ from ncfix.program.klartext.control import Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.lane import run_lane
 from ncfix.program.klartext.layout import CORNERS
-from ncfix.program.klartext.paths import PATHS
+from ncfix.program.klartext.paths import PATHS, astray
 from ncfix.program.klartext.plans import Plan
 from ncfix.program.klartext.statements import statement
-from ncfix.program.klartext.step import Step
+from ncfix.program.klartext.step import Step, refuse
 from ncfix.program.klartext.targets import Words, axis_letters, set_pole
 from ncfix.program.klartext.tools import call_tool, define_tool
 from ncfix.program.klartext.units import Unit
@@ -315,17 +315,20 @@ class Interpreter:
             control.path.corner = True
             return
         calls = step.name.startswith("cycl call")
+        called = not calls and cycles.executes(control, step) and (plan.moves or 99 in step.codes)
         if calls and step.name.endswith("pat"):
             cycles.pattern(control, control.cycle.places, "CYCL CALL PAT")
+        elif why := astray(control, step, called=called):
+            refuse(control, why)
         elif plan.moves and step.codes & {91, 92}:
             lines.at_machine(control, step)
-        elif calls or (cycles.executes(control, step) and (plan.moves or 99 in step.codes)):
+        elif calls or called:
             cycles.call(control, step)
         elif step.name.startswith("appr "):
             lines.approach(control, step)
         elif step.name.startswith("dep "):
             lines.departure(control, step)
-        elif plan.moves or step.name in ("ln",):
+        elif plan.moves:
             PATHS[step.name](control, step)
         else:
             return

@@ -100,7 +100,7 @@ def lane_of(plan: Plan, slots: Mapping[str, int] | None, axes: int) -> Lane | No
         return NOTHING if slots.keys() == {"X", "Y"} and not plan.flags and not plan.codes else None
     if plan.name in ARCS:
         return arc_of(plan, slots) if not (named | IN_PLANE) & ~axes else None
-    if plan.name not in STRAIGHT or (plan.name == "ln" and not plan.moves):
+    if plan.name not in STRAIGHT or (plan.name == "ln" and not slots.keys() & LETTERS):
         return None
     if not slots.keys() <= LETTERS | IDLE or named & ~axes:
         return None

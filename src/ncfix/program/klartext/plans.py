@@ -53,7 +53,7 @@ class Plan:
     statement    the span of a statement that is not taken apart, and its kind
     spans        address -> where the word stands
     skip         the block may be skipped
-    moves        the block has words of axes or of polar coordinates
+    moves        the block leads somewhere: by its words, or by its path function alone
     empty        the block does nothing
     """
 
@@ -78,10 +78,14 @@ CORNERS = frozenset({"RND", "CHF"})
 STATEMENTS = frozenset({"program", "statement", UNREAD})
 """Kinds of text that is not taken apart."""
 
-MOVING = frozenset(
-    [letter for axis in "XYZABCUVW" for letter in (axis, "I" + axis)] + ["PA", "IPA", "PR", "IPR"],
-)
+CARTESIAN = frozenset(letter for axis in "XYZABCUVW" for letter in (axis, "I" + axis))
+POLAR = frozenset({"PA", "IPA", "PR", "IPR"})
+VECTOR = frozenset({"TX", "TY", "TZ"})
+MOVING = CARTESIAN | POLAR | VECTOR
 """The addresses that lead somewhere."""
+
+ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "lp", "ln"})
+"""Path functions that move even where they name no end: `C DR-` is a full circle."""
 
 
 def owners(items: Sequence[Item]) -> dict[int, int]:
@@ -160,6 +164,6 @@ def plan_of(template: Template) -> Plan:
         statement=next(((item.kind, item.span) for item in opaque), None),
         spans={word.address: word.span for word in reversed(words)},
         skip=any(isinstance(item, Skip) for item in items),
-        moves=any(word.address in MOVING for word in words),
+        moves=any(word.address in MOVING for word in words) or opening in ALWAYS_MOVING,
     )
     return replace(plan, empty=plan == Plan())

@@ -18,6 +18,7 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import AT_START, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext.control import SPATIAL, Control
+from ncfix.program.klartext.plans import MOVING
 
 BAD_POLE = "NCF271"
 POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"
@@ -206,7 +207,8 @@ def set_pole(control: Control, words: Words) -> None:
         INDEX[address.removeprefix("I")] for address in words.values if address.removeprefix("I") in "XYZ"
     )
     plane = PLANE_OF.get(named, path.plane) if len(named) == 2 else path.plane
-    if any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
+    others = words.values.keys() & (MOVING - {f"{sign}{letter}" for sign in ("", "I") for letter in "XYZ"})
+    if others or any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
         raise Fault(BAD_POLE, "CC needs the two axes of one plane")
     where = led(control, words)
     old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
