@@ -7,12 +7,14 @@ import pytest
 
 from classes.judging import SHIFT, Case, followed, judged, machine
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.program.moves import Kind
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
 
 HEAD = "BEGIN PGM C MM\nTOOL CALL 0 Z S1000\nL X+1 Y+2 Z+50 FMAX\n"
 """Three lines; the third is the motion to the start."""
 
+DRILL = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=50"
 R, P, N = "right", "passed", "refused"
 
 
@@ -33,6 +35,9 @@ WORDS = [
     case("formulas of constants", "Q1 = 5 * ( 2 + 1 )\nFN 0: Q2 = -2\nL X+Q1 Z+Q2 F100", L6=R),
     case("a value of the control", "FN 18: SYSREAD Q1 = ID50 NR1\nL X+Q1 F100\nL X+5 FMAX", L5=N, L6=R),
     case("a parameter that is not set", "L X+Q50 F100\nL X+5 FMAX", L4=N, L5=R),
+    case("CYCL CALL POS without a height", f"{DRILL}\nCYCL CALL POS X+5 Y+5\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("CYCL CALL POS at a height by steps", f"{DRILL}\nCYCL CALL POS X+5 Y+5 IZ+3\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("a cycle behind an arc", f"{DRILL}\nCC X+11 Y+2\nC X+11 Y+12 DR- M99\nL X+5 Y+5 Z+5 FMAX", L6=N, L7=R),
     case("block skip", "/5 L X+5\nL Y+5 F100", L4=R, L5=R),
     case("M codes beside words", "L X+5 F100 M8\nL Y+5 M9", L4=R, L5=R),
     case("words that belong to an M code", "L X+5 F100 M118 Z+1\nL Z+5", L4=R, L5=R),
@@ -51,6 +56,14 @@ ARCS = [
     case("CR", "CR X+11 Y+12 R+10 DR-", L4=R),
     case("CR of more than half a turn", "CR X+11 Y+12 R-10 DR-", L4=R),
     case("CP", "CC X+11 Y+2\nCP IPA-90 DR-\nCP PA+0 DR-", L5=R, L6=R),
+    case("CP without an angle", "CC X+11 Y+2\nCP DR- F100\nL X+5", L3=N, L5=N, L6=R),
+    case("CR without an end point", "CR R+10 DR- F100\nL X+5", L4=N, L5=R),
+    case("CT without an end point", "L X+5 F100\nCT\nL X+7", L4=R, L5=N, L6=R),
+    case("C with a polar angle", "CC X+11 Y+2\nC PA+90 DR-\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("CP with an end point", "CC X+11 Y+2\nCP X+11 Y+12 DR-\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("LP with axes of its plane", "CC X+11 Y+2\nLP X+11 PR+3\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("L with polar words", "CC X+11 Y+2\nL PR+11 PA+3\nL X+5 Y+5 Z+5 FMAX", L5=N, L6=R),
+    case("an approach to nowhere", "APPR LT LEN5 F100\nL X+5 Y+5 Z+5 FMAX", L4=N, L5=R),
     case("an arc in another plane", "CC X+11 Z+50\nC X+11 Z+60 DR+", L5=R),
     case("tangential arc", "L X+5 F100\nCT X+10 Y+5\nL X+20", L4=R, L5=R, L6=R),
     case("tangential arc in polar words", "CC X+5 Y+12\nL X+5 F100\nCTP PR+10 PA+0", L5=R, L6=R),
@@ -65,6 +78,15 @@ ARCS = [
 ]
 FRAMES = [
     case("datum shift", "CYCL DEF 7.0 D\nCYCL DEF 7.1 X+3\nCYCL DEF 7.2 IY+2\nL X+5 F100", L7=R),
+    case(
+        "an unknown datum of an axis without a word",
+        "CYCL DEF 7.0 D\nCYCL DEF 7.1 Z+Q50\nL IX+2 F100\nL X+5",
+        L6=R,
+        L7=R,
+    ),
+    case(
+        "an increment from an unknown datum", "CYCL DEF 7.0 D\nCYCL DEF 7.1 Z+Q50\nL IX+2 IZ-1 F100\nL Z+5", L6=R, L7=N
+    ),
     case("datum from a table", "CYCL DEF 7.0 D\nCYCL DEF 7.1 #2\nL X+5 Y+5 Z+5 F100", L6=N),
     case("TRANS DATUM", "TRANS DATUM AXIS X+3\nL X+5 F100\nTRANS DATUM RESET\nL X+5", L5=R, L7=R),
     case("mirror", "CYCL DEF 8.0 M\nCYCL DEF 8.1 X\nL X-5 F100\nCR X-15 Y+2 R+9 DR-", L6=R, L7=R),
@@ -112,6 +134,22 @@ def test_classes_of_klartext(each: Case) -> None:
     found = judged(each, "heidenhain")
     stops = [*found.values()] == [N] and len(each.expected) <= 3 and N in each.expected.values()
     assert found == each.expected or (stops and found.keys() <= each.expected.keys())
+
+
+@pytest.mark.parametrize("circle", ["C DR-", "C DR+ F100", "C X+1 DR-", "C IX+0 Y+2 DR+"])
+def test_a_full_circle_needs_no_end_point(circle: str) -> None:
+    text = f"{HEAD}CC X+11 Y+2\n{circle}\nL X+5\nC X+17 DR+\nM30\nEND PGM C MM\n".encode()
+    setup = Setup(work_offsets={"PRESET": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})
+    known = machine()
+    fixed = fix_program(read(text, "c.h"), known, setup, FixOptions(tolerance_um=50.0, verify=False))
+    before, after = followed(text, known, "heidenhain"), followed(fixed.text, known, "heidenhain")
+    assert fixed.report.refused == ()
+    assert before.kind.tolist() == after.kind.tolist() == [Kind.RAPID, Kind.ARC, Kind.FEED, Kind.ARC]
+    assert np.abs(after.end - before.end - list(SHIFT.values())).max() < 1e-3
+    arcs = [1, 3]
+    assert np.abs((after.centre - before.centre)[arcs][:, :2] - [SHIFT["X"], SHIFT["Y"]]).max() < 1.5e-3
+    assert np.abs(after.sweep - before.sweep)[arcs].max() < 1e-3
+    assert abs(before.sweep[1]) == pytest.approx(2 * np.pi)
 
 
 CYCLES = {
