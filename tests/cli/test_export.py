@@ -124,7 +124,7 @@ def test_a_range_may_be_written_with_a_comma_or_a_colon(shop: Any, ncfix: Any) -
 def test_corrections_beyond_what_the_machine_allows(shop: Any, ncfix: Any) -> None:
     """2 um per mm: a correction of 1 mm at the end, where half a millimetre is allowed."""
     shop.machine.write_text(shop.machine.read_text().replace("1e-4", "2e-3"))
-    result = ncfix("export", "isg", "-m", shop.machine, "-o", shop.folder / "t")
+    result = ncfix("export", "isg", "-m", shop.machine, "-o", shop.folder / "t", "--force")
     assert (result.code, "NCF489" in result.err) == (ExitCode.REFUSED, True)
     assert not (shop.folder / "t").exists()
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ncfix.cli import console
-from ncfix.cli.options import force_option, json_option, load_machine, machine_option
+from ncfix.cli.options import force_option, json_option, load_machine, machine_option, sound
 from ncfix.cli.targets import STREAM, Outputs, check_streams, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode
 
@@ -64,6 +64,7 @@ def diagnose(
     console.tell(*remarks(diagnosis.view, diagnosis.case.unheard_of))
     written = None
     if machine_target is not None and diagnosis.machine is not None:
+        sound(diagnosis.machine, machine_target.path, force)
         machine_target.write(dumps(result.with_provenance(diagnosis)).encode())
         written = machine_target.path
     if next_target is not None:

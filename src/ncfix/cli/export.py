@@ -12,7 +12,7 @@ import click
 from ncfix import files
 from ncfix.cli import console
 from ncfix.cli.following import Following
-from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option
+from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import STREAM
 from ncfix.diagnostics import ExitCode, Place, UsageError
@@ -80,6 +80,7 @@ def export(
     following = Following.of(machine_path, dialect, given)
     machine = following.machine
     assert machine is not None
+    sound(machine, machine_path, force)
     space = ranges_of(machine, given_ranges(machine, ranges))
     options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings), complete=not probe)
     request = Request(machine, space, tool_length, 1e-3 * target_um, options)

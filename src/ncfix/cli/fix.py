@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
-from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, tolerance_option
+from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, sound, tolerance_option
 from ncfix.cli.processes import Jobs, settled
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, Outputs, check_streams, targets
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 @machine_option
 @click.option("-o", "--output", metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout.")
 @click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
-@click.option("--force", is_flag=True, help="Replace an existing output; correct a program that carries a stamp.")
+@click.option(
+    "--force", is_flag=True, help="Replace an output; correct a stamped program; take a machine that cannot be."
+)
 @click.option("--resume", is_flag=True, help="Go on with a batch where it stopped: what is done in -o DIR stays.")
 @click.option(
     "--strategy",
@@ -102,4 +104,5 @@ def _job(machine_path: str, dialect: str | None, setup: SetupOptions, choices: d
 
     if choices.pop("thesis"):
         choices["strategy"] = "thesis"
-    return Job(load_machine(machine_path), setup.load(), dialect, FixOptions(**choices))
+    machine = sound(load_machine(machine_path), machine_path, choices["force"])
+    return Job(machine, setup.load(), dialect, FixOptions(**choices))

@@ -9,7 +9,7 @@ import click
 from ncfix.cli import console
 from ncfix.cli.options import json_option, load_machine
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import Message, Place
+from ncfix.diagnostics import ExitCode, Message, Place
 from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
@@ -24,21 +24,28 @@ def machine() -> None:
 @machine.command()
 @click.argument("file")
 @json_option
-def check(file: str, as_json: bool) -> None:
+def check(file: str, as_json: bool) -> int:
     """Check that FILE describes a machine.
 
-    Every fault of the file is named at once.
+    Every fault of the file is named at once. Exit code 1: it can be read, but there is no such machine.
     """
+    from ncfix.machine.plausible import doubts
+
     found = load_machine(file)
-    remarks = _remarks(found, shown(file))
+    odd = doubts(found, shown(file))
+    impossible = sum(doubt.impossible for doubt in odd)
+    remarks = [*(doubt.message for doubt in odd), *_remarks(found, shown(file))]
     console.tell(*remarks)
     if as_json:
         said = [message.as_dict() for message in remarks]
-        console.put_json(path=shown(file), ok=True, name=found.name, hash=found.hash, remarks=said)
+        console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=said)
+    elif impossible:
+        console.say(f"{shown(file)}: {found.name}: {console.counted(impossible, 'fault')}: no machine is like this one")
     else:
         axes = "1 axis" if len(found.axes) == 1 else f"{len(found.axes)} axes"
         effects = console.counted(len(found.effects), "effect")
         console.say(f"{shown(file)}: {found.name}: in order, {axes}, {effects}")
+    return ExitCode.FINDINGS if impossible else ExitCode.DONE
 
 
 def _remarks(machine: Machine, path: str) -> list[Message]:

@@ -107,6 +107,20 @@ def load_machine(path: str) -> Machine:
     return load(path) if path != STREAM else loads(read(path), shown(path))
 
 
+def sound(machine: Machine, path: str, force: bool) -> Machine:
+    """The machine, for something to be made with it; what is odd about it is told.
+
+    Raises `RefusedError` NCF320 to NCF324 if no machine can be so, unless the user insists.
+    """
+    from ncfix.machine.plausible import doubts, required
+
+    if force:
+        console.tell(*(doubt.message for doubt in doubts(machine, shown(path))))
+    else:
+        console.tell(*required(machine, shown(path), "--force makes it all the same"))
+    return machine
+
+
 def read_program(path: str, dialect: str | None, machine: Machine | None = None, text: bytes | None = None) -> Program:
     """A program from a file or standard input, in the dialect given, else in that of the machine's control.
 

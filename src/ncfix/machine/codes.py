@@ -1,4 +1,4 @@
-"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF318) and states (NCF340)."""
+"""What the message codes of the machine floor mean: machine files (NCF300 ... NCF324) and states (NCF340)."""
 
 from __future__ import annotations
 
@@ -101,6 +101,39 @@ CODES = {
         "other sign the body is ahead, as a control makes it that takes out more play than there is; if that is not "
         "meant, every correction of this play doubles it.",
         "Measure one point from both sides: `ncfix calibrate` finds size and sign.",
+    ),
+    "NCF320": Code(
+        "an error larger than machines have",
+        "Over the travel this error is more than is much for a machine tool in use, which `ncfix effects` lists for a "
+        "machine of a metre; it grows with travel and reach, and is ten times as much for arms of rotary joints. "
+        "Beyond ten times that no machine runs: the number is in another unit (rotations are in rad, translations in "
+        "mm), or a polynomial is used far outside where it was fitted (`center`, `scale`, `range`).",
+        "Correct the number. `fix --force` and `export --force` take it as it is.",
+    ),
+    "NCF321": Code(
+        "axes that do not span",
+        "Two of X, Y and Z are parallel, or all three lie in a plane, or two rotary axes that follow one another turn "
+        "about the same line: one axis does what others do, and no machine is built so. Further linear axes (U V W) "
+        "may be parallel to X Y Z.",
+        "See `direction` and `point` of these axes.",
+    ),
+    "NCF322": Code(
+        "a size that no machine has",
+        "A travel, a pitch, a point, a step or a limit is far from what machines have: it is in another unit. Lengths "
+        "are in mm, rotary ranges and steps in degrees.",
+        FORMATS,
+    ),
+    "NCF323": Code(
+        "positions of an error that its axis does not have",
+        "The positions of a table, or the knots of a curve, are outside the range of the axis, cover next to nothing "
+        "of it, or look like radians. They are in mm or degrees, after `center` and `scale`.",
+        FORMATS,
+    ),
+    "NCF324": Code(
+        "a machine like no other",
+        "Something about this machine file cannot be, see the messages before this one. Programs and tables for it "
+        "would be wrong by as much.",
+        "`ncfix machine check` lists all of it.",
     ),
     "NCF340": Code(
         "an input of the error model is not given",

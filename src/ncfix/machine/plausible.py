@@ -1,0 +1,323 @@
+"""Is a well-formed machine one that there is? Sizes against those of real machines, units likely meant, axes that span.
+
+What is *much* for an error component says `ncfix.machine.catalogue`, for a machine of a metre. Errors along an axis
+grow with its travel, where an axis lies is known the less the further one must reach, and arms of rotary joints err ten
+times as much as machines with slides: their users speak of tenths of a millimetre and more where those of machining
+centres speak of hundredths. So `much` here scales with travel, reach and the kind of chain; it never is less than on a
+machine of a metre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ncfix.diagnostics import Message, Place, RefusedError
+from ncfix.machine import catalogue
+from ncfix.machine.axis import Axis
+from ncfix.machine.effect import SPINDLE, Effect
+from ncfix.machine.error_model import signals_of
+from ncfix.machine.linear import course_of
+from ncfix.machine.machine import Machine
+from ncfix.machine.se3 import Array
+from ncfix.machine.state import State, flatten
+from ncfix.machine.summary import travel
+
+BEYOND = 10.0
+"""Times what is much: no machine that runs is so wrong."""
+METRE = 1000.0
+"""mm: the machine for which the catalogue says what is much."""
+ARM, JOINTS = 10.0, 3
+"""How much more an arm errs, and how many rotary axes in one branch make one."""
+UNLIMITED_MM = 100.0
+"""Half the travel that is taken for a linear axis without a range."""
+PLANE = 0.05
+"""Least singular value of the directions of X Y Z: axes within some 3 degrees of one plane, or of one line."""
+SAME, SAME_MM = 1e-6, 1e-3
+"""Axis lines that differ by less are one."""
+LEAST_TRAVEL, MOST_TRAVEL = 1.0, 200_000.0
+"""mm: travels that no axis has; a metre written as 1 is among the first, a metre in um among the second."""
+PITCHES = (0.1, 2000.0)
+"""mm: no screw and no rack has a pitch beyond these."""
+COARSEST = (0.1, 1.0)
+"""mm and degree: no control counts in coarser steps."""
+MOST_CORRECTION = (50.0, 10.0)
+"""mm and degree: who allows corrections of this size has meant another unit."""
+CORNER = 1 / 300
+"""Of the travel: a table that covers less is in another unit."""
+TURN_RAD = 2 * np.pi + 0.01
+UNITS = {
+    False: (("um", 1e-3),),
+    True: (("degrees", np.pi / 180), ("seconds of arc", np.pi / 648000), ("urad", 1e-6)),
+}
+"""By whether it is an angle: in what it may have been written, and mm or rad per that."""
+LEAST = 1e-3
+"""Of what is much: nobody writes down less, so no unit was meant that makes it of a number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """What is odd about a machine, and whether it is more than odd: no machine is so."""
+
+    message: Message
+    impossible: bool
+
+
+def doubts(machine: Machine, path: str) -> list[Doubt]:
+    """All that machines do not have or hardly have: NCF320 to NCF323; `path` is that of the file."""
+    place = Place(path)
+    found = [*_sizes(machine), *_span(machine), *_travels(machine), *_settings(machine), *_positions(machine)]
+    return [Doubt(Message(code, text, place, hint), impossible) for code, text, hint, impossible in found]
+
+
+def required(machine: Machine, path: str, accepted: str) -> list[Message]:
+    """What is merely odd about a machine that something shall be made with.
+
+    Raises `RefusedError` with all that cannot be; `accepted` says how the user can have it all the same.
+    """
+    found = doubts(machine, path)
+    impossible = [each.message for each in found if each.impossible]
+    if impossible:
+        text = f"no machine is like this one: nothing is made with it; {accepted}"
+        raise RefusedError((*impossible, Message("NCF324", text, Place(path))))
+    return [each.message for each in found]
+
+
+Fault = tuple[str, str, str, bool]
+"""Code, text, hint, and whether it cannot be."""
+
+
+# -- sizes -------------------------------------------------------------------------------------------------------------
+
+
+def much(machine: Machine, name: str) -> float:
+    """What is much of an error component on this machine, mm or rad."""
+    location, joint = len(name) == 4, name[-1]
+    axis = next((each for each in machine.axes if each.name == joint), None)
+    size = float(catalogue.much(name)) * (ARM if is_arm(machine) else 1.0)
+    if axis is not None and not axis.rotary and not location:
+        return size * max(1.0, _travel_mm(axis) / METRE)
+    if name[1] in "XYZ":
+        return size * max(1.0, reach(machine) / METRE)
+    return size
+
+
+def is_arm(machine: Machine) -> bool:
+    """Whether rotary joints in a row carry the tool or the workpiece, as in a robot."""
+    held = [axis.workpiece_side for axis in machine.axes if axis.rotary]
+    return max(held.count(True), held.count(False)) >= JOINTS
+
+
+def reach(machine: Machine) -> float:
+    """How large a machine is, mm: the diagonal of its travels and the way over its axis points."""
+    travels = [_travel_mm(axis) for axis in machine.axes if not axis.rotary]
+    points = [np.asarray(axis.point) for axis in machine.axes if axis.rotary] + [np.asarray(machine.tool.point)]
+    way = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
+    return float(np.hypot.reduce(travels, initial=0.0)) + min(way, MOST_TRAVEL)
+
+
+def _travel_mm(axis: Axis) -> float:
+    low, high = axis.range
+    return float(high - low) if np.isfinite(high - low) else 2 * UNLIMITED_MM
+
+
+def functions(machine: Machine, effect: Effect) -> Array:
+    """The functions of an effect over what they depend on, (k, n): over the travels of axes, signals one scale about
+    their centre.
+    """
+    signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+    axes = sorted({signal.axis for signal in signals if signal.axis is not None})
+    inputs = sorted({name for signal in signals for name in signal.inputs})
+    courses = [_course(machine, axis, effect) for axis in axes]
+    sides = [np.asarray(_about(effect, name)) for name in inputs]
+    ways = np.array([-1.0, 1.0]) if effect.basis.needs_direction else np.zeros(1)
+    mesh = [each.ravel() for each in np.meshgrid(*courses, *sides, ways)]
+    q = np.zeros((mesh[0].size, len(machine.axes)))
+    q[:, axes] = np.stack(mesh[: len(axes)], axis=-1) if axes else q[:, axes]
+    values = dict(zip(inputs, mesh[len(axes) : -1], strict=True))
+    state = State(values.get("tool_length", 0.0), mesh[-1][:, None], values)
+    _, poses = flatten(q, state, machine.axes, frozenset(inputs))
+    rows: Array = course_of(machine.axes, effect).rows(poses)
+    return np.asarray(rows)
+
+
+def _course(machine: Machine, axis: int, effect: Effect) -> Array:
+    """Positions of an axis to look at, fewer where there are two."""
+    places = travel(machine, axis)
+    if not np.isfinite(places).all():
+        places = np.array([-UNLIMITED_MM, 0.0, UNLIMITED_MM])
+    return places[:: 6 if effect.times is not None else 1]
+
+
+def _about(effect: Effect, name: str) -> tuple[float, float, float]:
+    """A signal at its centre, and one scale to either side."""
+    if name == effect.times:
+        center = effect.center if effect.times_center is None else effect.times_center
+        scale = effect.scale if effect.times_scale is None else effect.times_scale
+    else:
+        center, scale = effect.center, effect.scale
+    return center - scale, center, center + scale
+
+
+def _sizes(machine: Machine) -> Iterator[Fault]:
+    """Errors that are much, by name; functions of the same axes add up."""
+    for name in dict.fromkeys(effect.name for effect in machine.effects):
+        size = max(_largest(machine, group) for group in _alike(machine, name))
+        limit = much(machine, name)
+        if size > limit:
+            yield _said(name, size, limit, catalogue.title(name, _axis(machine, name[-1])))
+
+
+def _axis(machine: Machine, joint: str) -> Axis | None:
+    return next((axis for axis in machine.axes if axis.name == joint), None)
+
+
+def _alike(machine: Machine, name: str) -> list[list[Effect]]:
+    """The effects of a name, those together that depend on the same and on nothing but axes."""
+    groups: dict[object, list[Effect]] = {}
+    for index, effect in enumerate(machine.effects):
+        if effect.name == name:
+            signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
+            plain = len(signals) == 1 and not signals[0].inputs and not effect.basis.needs_direction
+            groups.setdefault(signals[0].axis if plain else (index,), []).append(effect)
+    return list(groups.values())
+
+
+def _largest(machine: Machine, effects: Sequence[Effect]) -> float:
+    """The largest size of the sum, mm or rad; of functions at places of their own the sum of the sizes is taken."""
+    values = [np.asarray(effect.coefficients) @ functions(machine, effect) for effect in effects]
+    together = (
+        sum(values) if len({each.shape for each in values}) == 1 else np.array([sum(np.abs(v).max() for v in values)])
+    )
+    return float(np.abs(together).max(initial=0.0))
+
+
+def _said(name: str, size: float, limit: float, title: str) -> Fault:
+    angle = name[1] in "ABC"
+    impossible = size > BEYOND * limit
+    text = f"{name}, {title}: {sized(size, angle)} is much, and more than {sized(limit, angle)}"
+    if impossible:
+        text = f"{name}, {title}: {sized(size, angle)} is {size / limit:.3g} times what is much, {sized(limit, angle)}"
+    meant = [f"{size:.4g} {unit}" for unit, factor in UNITS[angle] if LEAST * limit <= size * factor <= limit]
+    hint = f"is {' or '.join(meant)} meant? Coefficients are in {'rad' if angle else 'mm'}"
+    hint = hint if impossible and meant else "see the unit, and `center`, `scale` and `range`" if impossible else ""
+    return "NCF320", text, hint, impossible
+
+
+def sized(value: float, angle: bool) -> str:
+    """A length or an angle for people."""
+    if angle:
+        return f"{value:.4g} rad" if value >= 1e-2 else f"{1e6 * value:.4g} urad"
+    return f"{value:.4g} mm" if value >= 1 else f"{1e3 * value:.4g} um"
+
+
+# -- axes --------------------------------------------------------------------------------------------------------------
+
+
+def _span(machine: Machine) -> Iterator[Fault]:
+    """Axes of which one does what others do. U V W and further axes may be parallel to X Y Z."""
+    linear = [axis for axis in machine.axes if not axis.rotary and axis.name in "XYZ"]
+    directions = np.array([axis.direction for axis in linear]).reshape(-1, 3)
+    if len(linear) > 1 and np.linalg.svd(directions, compute_uv=False).min() < PLANE:
+        names = " and ".join(axis.name for axis in _dependent(linear))
+        text = f"{names} do not span {'a plane' if len(_dependent(linear)) == 2 else 'space'}: one moves as others do"
+        yield "NCF321", text, "see their `direction`", True
+    for first, second in pairwise(machine.axes):
+        if (
+            first.rotary
+            and second.rotary
+            and first.workpiece_side == second.workpiece_side
+            and _one_line(first, second)
+        ):
+            text = f"{first.name} and {second.name} turn about the same line, with no axis between them"
+            yield "NCF321", text, "see `direction` and `point` of both", True
+
+
+def _dependent(axes: Sequence[Axis]) -> list[Axis]:
+    """Two that are parallel, else all."""
+    for k, first in enumerate(axes):
+        for second in axes[k + 1 :]:
+            if np.linalg.norm(np.cross(first.direction, second.direction)) < PLANE:
+                return [first, second]
+    return list(axes)
+
+
+def _one_line(first: Axis, second: Axis) -> bool:
+    direction = np.asarray(first.direction)
+    apart = np.cross(np.asarray(second.point) - np.asarray(first.point), direction)
+    return bool(np.linalg.norm(np.cross(direction, second.direction)) < SAME and np.linalg.norm(apart) < SAME_MM)
+
+
+def _travels(machine: Machine) -> Iterator[Fault]:
+    for axis in machine.axes:
+        low, high = (limit / axis.unit for limit in axis.range)
+        if axis.rotary:
+            if np.isfinite(high - low) and _radians((low, high)):
+                text = f"{axis.name}: the range {low:g} ... {high:g} looks like radians: degrees are asked for"
+                yield "NCF322", text, f"is {np.degrees(low):.4g} ... {np.degrees(high):.4g} degrees meant?", True
+        elif np.isfinite(high - low) and not LEAST_TRAVEL <= high - low <= MOST_TRAVEL:
+            meant = "metres" if high - low < LEAST_TRAVEL else "um"
+            text = f"{axis.name}: no axis has a travel of {high - low:g} mm"
+            yield "NCF322", text, f"is it in {meant}? `range` is in mm", True
+        if axis.pitch is not None and not PITCHES[0] <= axis.pitch <= PITCHES[1]:
+            text = f"{axis.name}: no screw and no rack has a pitch of {axis.pitch:g} mm"
+            yield "NCF322", text, "`pitch` is in mm a turn", True
+        if np.abs(axis.point).max() > MOST_TRAVEL:
+            yield "NCF322", f"{axis.name}: its point is {np.abs(axis.point).max():g} mm away", "`point` is in mm", True
+
+
+def _radians(limits: tuple[float, float]) -> bool:
+    """Whether ends of a range are round in radians, and not in degrees."""
+    parts = np.array([limit for limit in limits if limit])
+    uneven = np.abs(parts - np.round(parts, 1)) > 1e-6
+    steps = np.degrees(parts) / 5
+    return bool(np.abs(parts).max(initial=0.0) < TURN_RAD and (uneven & (np.abs(steps - np.round(steps)) < 0.02)).all())
+
+
+def _settings(machine: Machine) -> Iterator[Fault]:
+    """Steps and limits of the control."""
+    for key, values, limits in (
+        ("least_increment", machine.least_increment, COARSEST),
+        ("max_correction", machine.max_correction, MOST_CORRECTION),
+    ):
+        for value, limit, unit in zip((values[0], np.degrees(values[1])), limits, ("mm", "degree"), strict=True):
+            if value > limit:
+                text = f"{key}: {value:.4g} {unit} is more than any machine has"
+                yield "NCF322", text, "it is in mm and degrees: 0.001 is a micrometre", True
+    for name, place in ("workpiece_offset", machine.workpiece_offset), ("tool.point", machine.tool.point):
+        if np.abs(place).max() > MOST_TRAVEL:
+            yield (
+                "NCF322",
+                f"{name}: {np.abs(place).max():g} mm is further than any machine reaches",
+                "it is in mm",
+                True,
+            )
+
+
+# -- positions of tables and curves ------------------------------------------------------------------------------------
+
+
+def _positions(machine: Machine) -> Iterator[Fault]:
+    """Tables and knots in a unit other than that of the axis, or where it never is."""
+    for effect in machine.effects:
+        axis = _axis(machine, effect.input or effect.joint)
+        positions = np.unique(getattr(effect.basis, "positions", ()) or getattr(effect.basis, "knots", ()))
+        if axis is None or effect.joint == SPINDLE or len(positions) < 3:
+            continue
+        places = effect.center + effect.scale * positions
+        low, high = (limit / axis.unit for limit in axis.range)
+        if axis.endless:
+            low, high = 0.0, 360.0
+        if not np.isfinite(high - low):
+            continue
+        shown = f"{effect.name}: its positions, {places[0]:g} ... {places[-1]:g},"
+        if (places[-1] <= low and not axis.endless) or (places[0] >= high and not axis.endless):
+            yield "NCF323", f"{shown} are outside the range of {axis.name}, {low:g} ... {high:g}", "", True
+        elif axis.rotary and high - low > 45 and np.abs(places).max() <= TURN_RAD and _radians((places[0], places[-1])):
+            yield "NCF323", f"{shown} look like radians: {axis.name} is in degrees", "", True
+        elif np.ptp(places) < CORNER * (high - low):
+            text = f"{shown} cover a speck of the range of {axis.name}, {low:g} ... {high:g}"
+            yield "NCF323", text, f"positions are in {'degrees' if axis.rotary else 'mm'}", True
