@@ -27,7 +27,7 @@ from ncfix.program.standstill import jumps, passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target, plane_across
 from ncfix.program.tree import Program, view
 from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone, turns_alone
-from ncfix.program.writer import Edit, Splices, apply
+from ncfix.program.writer import Edit, Splices, overlong
 
 FloatArray = NDArray[np.float64]
 
@@ -157,7 +157,9 @@ class _Emitter:
             row += 1
         self._write_centres()
         splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
-        self._check_lengths(splices)
+        limit = self.program.dialect.line_limit
+        for block, length in overlong(self.program.source, self.program.blocks, splices, limit).items():
+            self.conflicts.setdefault(block, TOO_LONG.format(length, limit))
         return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
 
     @cached_property
@@ -380,21 +382,6 @@ class _Emitter:
         if key not in self.layouts:
             self.layouts[key] = self.language.layout(self.program, block)
         return self.layouts[key]
-
-    def _check_lengths(self, splices: Splices) -> None:
-        """A line that has grown must not be longer than the control takes."""
-        limit, blocks = self.program.dialect.line_limit, self.program.blocks
-        if not limit or not len(splices):
-            return
-        grown = np.zeros(len(blocks), dtype=np.int64)
-        own = np.searchsorted(blocks[:, 0], splices.start, side="right") - 1
-        np.add.at(grown, own, np.maximum(splices.length - (splices.stop - splices.start), 0))
-        for block in np.flatnonzero((grown > 0) & (blocks[:, 1] - blocks[:, 0] + grown > limit)).tolist():
-            start, stop = self.program.blocks[block].tolist()
-            edits = splices.rows(np.flatnonzero(own == block)).moved(-start)
-            longest = max(map(len, apply(self.program.source[start:stop], tuple(edits.edits())).splitlines()))
-            if longest > limit:
-                self.conflicts.setdefault(block, TOO_LONG.format(longest, limit))
 
     # -- the result ---------------------------------------------------------------------------------------------------
 

@@ -134,6 +134,23 @@ def spliced(source: bytes, splices: Splices) -> bytes:
     return _laid_out(begun, others) if FEW * len(other) > len(splices) else _put_in(begun, others)
 
 
+def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: int) -> dict[int, int]:
+    """Blocks (n, 2) that edits make longer than so many characters a line, and how long that would be; 0 is no limit."""
+    if not limit or not len(splices):
+        return {}
+    grown = np.zeros(len(blocks), dtype=np.int64)
+    own = np.searchsorted(blocks[:, 0], splices.start, side="right") - 1
+    np.add.at(grown, own, np.maximum(splices.length - (splices.stop - splices.start), 0))
+    found = {}
+    for block in np.flatnonzero((grown > 0) & (blocks[:, 1] - blocks[:, 0] + grown > limit)).tolist():
+        start, stop = blocks[block].tolist()
+        edits = splices.rows(np.flatnonzero(own == block)).moved(-start)
+        longest = max(map(len, apply(source[start:stop], tuple(edits.edits())).splitlines()))
+        if longest > limit:
+            found[block] = longest
+    return found
+
+
 def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
     """Whether a text that was made by edits is the source, byte for byte, between them: only asked where compiled."""
     from ncfix.program import kernels
