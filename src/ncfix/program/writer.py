@@ -135,7 +135,7 @@ def spliced(source: bytes, splices: Splices) -> bytes:
 
 
 def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: int) -> dict[int, int]:
-    """Blocks (n, 2) that edits make longer than so many characters a line, and how long that would be; 0 is no limit."""
+    """Blocks (n, 2) of which edits make a line of more than `limit` characters, and how many; 0 is no limit."""
     if not limit or not len(splices):
         return {}
     grown = np.zeros(len(blocks), dtype=np.int64)
