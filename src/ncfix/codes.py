@@ -1,4 +1,4 @@
-"""What the message codes of the ground floor mean: files (NCF002 ... NCF007) and plugins (NCF5xx)."""
+"""What the message codes of the ground floor mean: files (NCF002 ... NCF007, NCF023) and plugins (NCF5xx)."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ CODES = {
         "The disk is full, the folder may not be written, or the like. A file that was there before is as it was; "
         "nothing half written is left.",
         "Make room, or choose another `-o`.",
+    ),
+    "NCF023": Code(
+        "a name that no output gets",
+        "Programs are carried to controls, and those run Windows. There `CON.nc` is the console, a full stop or blank "
+        "at the end of a name is dropped, and `\\` or `:` in it make a path of it. A name with a control character, or "
+        "one that leads out of the output folder, is not written either. This holds on all systems.",
+        "Give the program, or the output, another name.",
     ),
     "NCF501": Code(
         "a plugin cannot be imported",

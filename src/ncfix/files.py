@@ -1,7 +1,11 @@
 """Files read and written with care: what is written is whole or not there.
 
-A new file is written beside its target under another name, forced to the disk, and then given its name in one step.
-What stands in a file without a name already (`unnamed`) is given one, and not copied, where the system can do that.
+A new file is written without a name, where the system can do that, or else under another one beside its target; it is
+forced to the disk, and then given its name in one step. So a process that is killed leaves nothing, or a hidden
+`.ncfix-*.tmp`, and never half an output.
+
+Below a folder that the user named, no symbolic link is followed: every folder on the way down is opened from the one
+above it, and what is written is written into the folder that is open, wherever its name may lead by then.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from ncfix.diagnostics import Place, SourceError, UsageError
+from ncfix.ways import check_output, check_own, linked, way_to
 
 READING = {errno.EACCES: "get the right to read it", errno.EISDIR: "name a file, not a folder"}
 WRITING = {
@@ -27,6 +32,16 @@ WRITING = {
 """What to do about what the system says."""
 COPIED = 1 << 20
 """Bytes that are copied at once."""
+PERMISSIONS = 0o777
+"""Bits of a mode that say who may read, write and run a file."""
+FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0)
+UNKNOWN = frozenset(
+    {
+        *(errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EXDEV),
+        *(errno.ENOENT, errno.EISDIR, errno.EINVAL, errno.EACCES),
+    }
+)
+"""What systems and file systems say that have no links, no files without a name, or no way to name one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,28 +140,60 @@ def holds(path: str, data: bytes | Iterable[bytes]) -> bool:
         raise unreadable(path, error) from error
 
 
-def write_whole(path: str, data: bytes | Iterable[bytes], replace: bool = False) -> None:
-    """Write a new file, or with `replace` in place of an existing one, whose mode is kept; NCF004, NCF007 if not."""
-    with _coded(path):
-        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-        with _written_beside(path, data, like=path if os.path.lexists(path) else None) as temporary:
-            if replace or not _link(temporary, path):
-                os.replace(temporary, path)
-        _sync_folder(path)
+def mode_of(path: str) -> int | None:
+    """Who may read, write and run a file, as permission bits; None for what is no ordinary file."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_mode & PERMISSIONS if stat.S_ISREG(found.st_mode) else None
+
+
+def write_whole(
+    path: str, data: bytes | Iterable[bytes], replace: bool = False, root: str | None = None, mode: int | None = None
+) -> None:
+    """Write a new file, or with `replace` in place of an existing one, whose owner and mode are kept.
+
+    root  as in `check_output`
+    mode  permission bits of a new file; None: those that new files get
+
+    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
+    """
+    check_output(path, root, replace)
+    with _coded(path), _folder(path, root) as (folder, name):
+        like = _as_it_is(name, folder)
+        _put(folder, name, data, mode if like is None else like, replace)
+        _sync(folder)
 
 
 def replace_keeping(path: str, backup: str, data: bytes | Iterable[bytes]) -> None:
     """Give `path` new content and keep the old file as `backup`; at every moment both names hold whole files."""
-    with _coded(path):
-        with _written_beside(path, data, like=path) as temporary:
-            if not _link(path, backup):
+    check_output(path)
+    with _coded(path), _folder(path, None) as (folder, name):
+        kept = os.path.basename(backup)
+        like = _as_it_is(name, folder)
+        with _without_a_name(folder, data, like) as handle, _written_beside(folder, data, like, handle) as temporary:
+            if not _link(name, kept, folder):
                 write_whole(backup, Path(path).read_bytes())
             try:
-                os.replace(temporary, path)
+                os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
             except OSError:
-                os.unlink(backup)
+                os.unlink(kept, dir_fd=folder)
                 raise
-        _sync_folder(path)
+        _sync(folder)
+
+
+def append(path: str, data: bytes) -> None:
+    """Write on at the end of a file of ncfix's own, to the disk. Raises `UsageError` NCF005, NCF007."""
+    check_own(path)
+    with _coded(path):
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+        handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
+        try:
+            _fill(handle, data)
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 @contextmanager
@@ -154,88 +201,168 @@ def _coded(path: str) -> Iterator[None]:
     try:
         yield
     except FileExistsError as error:
-        raise exists_already(str(error.filename2 or path)) from error
+        name = os.path.basename(str(error.filename2 or path))
+        raise exists_already(os.path.join(os.path.dirname(path), name)) from error
     except OSError as error:
         raise unwritable(path, error) from error
 
 
+# -- the way there ----------------------------------------------------------------------------------------------------
+
+
 @contextmanager
-def _written_beside(path: str, data: bytes | Iterable[bytes], like: str | None) -> Iterator[str]:
-    """A file with this content, on the disk, in the same folder; gone afterwards if it still has its own name."""
-    temporary = os.path.join(os.path.dirname(path), f".ncfix-{os.urandom(8).hex()}.tmp")
+def _folder(path: str, root: str | None) -> Iterator[tuple[int, str]]:
+    """The folder of an output, opened, and the output's name in it; folders that are missing are made."""
+    top, way = way_to(path, root)
+    *folders, name = way.split(os.sep)
+    os.makedirs(top or ".", exist_ok=True)
+    here, at = os.open(top or ".", FOLDER), top
     try:
-        handle = _filled(temporary, data, like)
+        for each in folders:
+            at = os.path.join(at, each)
+            with suppress(FileExistsError):
+                os.mkdir(each, dir_fd=here)
+            if stat.S_ISLNK(os.stat(each, dir_fd=here, follow_symlinks=False).st_mode):
+                raise linked(at)
+            outer, here = here, os.open(each, FOLDER | os.O_NOFOLLOW, dir_fd=here)
+            os.close(outer)
+        yield here, name
+    finally:
+        os.close(here)
+
+
+def _as_it_is(name: str, folder: int) -> os.stat_result | None:
+    """What the system says of a file in a folder; None if there is none."""
+    try:
+        return os.stat(name, dir_fd=folder, follow_symlinks=False)
+    except FileNotFoundError:
+        return None
+
+
+# -- the file ---------------------------------------------------------------------------------------------------------
+
+
+Like = os.stat_result | int | None
+"""Whose owner and mode a file gets, or which permission bits; None: those of new files."""
+
+
+def _put(folder: int, name: str, data: bytes | Iterable[bytes], like: Like, replace: bool) -> None:
+    """A file with this content, on the disk, under a name in a folder."""
+    with _without_a_name(folder, data, like) as handle:
+        if handle is not None and not replace and _named(handle, name, folder):
+            return
+        with _written_beside(folder, data, like, handle) as temporary:
+            if replace or not _link(temporary, name, folder):
+                os.replace(temporary, name, src_dir_fd=folder, dst_dir_fd=folder)
+
+
+@contextmanager
+def _without_a_name(folder: int, data: bytes | Iterable[bytes], like: Like) -> Iterator[int | None]:
+    """A file with this content and no name, on the disk; None where there is no such thing."""
+    handle = os.dup(data.handle.fileno()) if isinstance(data, Whole) else _new_without_a_name(folder)
+    if handle is None:
+        yield None
+        return
+    try:
+        if not isinstance(data, Whole):
+            _fill(handle, data)
+        _make_like(handle, like)
+        os.fsync(handle)
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _new_without_a_name(folder: int) -> int | None:
+    if hasattr(os, "O_TMPFILE"):
         try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+            return os.open(".", os.O_RDWR | os.O_TMPFILE, 0o666, dir_fd=folder)
+        except OSError as error:
+            if error.errno not in UNKNOWN:
+                raise
+    return None
+
+
+@contextmanager
+def _written_beside(
+    folder: int, data: bytes | Iterable[bytes], like: Like, unnamed: int | None = None
+) -> Iterator[str]:
+    """A file with this content, on the disk, in a folder; gone afterwards if it still has its own name.
+
+    unnamed  a file with this content, owner and mode that has no name yet
+    """
+    temporary = f".ncfix-{os.urandom(8).hex()}.tmp"
+    try:
+        if unnamed is None or not _named(unnamed, temporary, folder):
+            handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666, dir_fd=folder)
+            try:
+                _make_like(handle, like)
+                _fill(handle, data if unnamed is None else _parts(unnamed))
+                os.fsync(handle)
+            finally:
+                os.close(handle)
         yield temporary
     finally:
         with suppress(FileNotFoundError):
-            os.unlink(temporary)
+            os.unlink(temporary, dir_fd=folder)
 
 
-def _filled(path: str, data: bytes | Iterable[bytes], like: str | None) -> int:
-    """A new file with this content, still open."""
-    if isinstance(data, Whole):
-        _like(data.handle.fileno(), like)
-        if _named(data.handle.fileno(), path):
-            return os.dup(data.handle.fileno())
-    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+def _fill(handle: int, data: bytes | Iterable[bytes]) -> None:
+    for part in (data,) if isinstance(data, bytes) else data:
+        rest = memoryview(part)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+
+
+def _parts(handle: int) -> Iterator[bytes]:
+    """What stands in an open file."""
+    at = 0
+    while part := os.pread(handle, COPIED, at):
+        yield part
+        at += len(part)
+
+
+def _named(handle: int, name: str, folder: int) -> bool:
+    """Give a file without a name this one, which must be free; False where the system cannot do that."""
     try:
-        _like(handle, like)
-        for part in (data,) if isinstance(data, bytes) else data:
-            rest = memoryview(part)
-            while rest:
-                rest = rest[os.write(handle, rest) :]
-    except BaseException:
-        os.close(handle)
-        raise
-    return handle
-
-
-def _named(handle: int, path: str) -> bool:
-    """Give a file without a name this one; False where the system cannot do that."""
-    with suppress(OSError):
-        folder = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
-        try:
-            os.link(f"/proc/self/fd/{handle}", path, src_dir_fd=folder)  # without a folder it would not be followed
-            return True
-        finally:
-            os.close(folder)
-    return False
-
-
-def _like(handle: int, like: str | None) -> None:
-    """Give a new file the owner and the mode of another."""
-    if like is not None:
-        before = os.stat(like)
-        if (before.st_uid, before.st_gid) != (os.fstat(handle).st_uid, os.fstat(handle).st_gid):
-            with suppress(PermissionError):
-                os.chown(handle, before.st_uid, before.st_gid)
-        os.chmod(handle, stat.S_IMODE(before.st_mode))
-
-
-def _link(old: str, new: str) -> bool:
-    """Give a file a second name, which must be free; False where the file system has no such thing."""
-    try:
-        os.link(old, new, follow_symlinks=False)
+        os.link(f"/proc/self/fd/{handle}", name, src_dir_fd=folder, dst_dir_fd=folder)  # else it would not be followed
     except FileExistsError:
         raise
     except OSError as error:
-        if error.errno in (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK):
+        if error.errno in UNKNOWN:
             return False
         raise
     return True
 
 
-def _sync_folder(path: str) -> None:
-    """Make the new name last through a power cut, where the file system can."""
-    handle = os.open(os.path.dirname(path) or ".", os.O_RDONLY)
+def _make_like(handle: int, like: Like) -> None:
+    """Give a new file the owner and the mode of another, or a mode."""
+    if isinstance(like, int):
+        os.chmod(handle, like)
+    elif like is not None:
+        if (like.st_uid, like.st_gid) != (os.fstat(handle).st_uid, os.fstat(handle).st_gid):
+            with suppress(PermissionError):
+                os.chown(handle, like.st_uid, like.st_gid)
+        os.chmod(handle, stat.S_IMODE(like.st_mode))
+
+
+def _link(old: str, new: str, folder: int) -> bool:
+    """Give a file of a folder a second name there, which must be free; False where there is no such thing."""
     try:
-        os.fsync(handle)
+        os.link(old, new, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        if error.errno in UNKNOWN:
+            return False
+        raise
+    return True
+
+
+def _sync(folder: int) -> None:
+    """Make the new name last through a power cut, where the file system can."""
+    try:
+        os.fsync(folder)
     except OSError as error:
         if error.errno != errno.EINVAL:
             raise
-    finally:
-        os.close(handle)

@@ -28,9 +28,9 @@ def gathered(given: Iterable[str], apart: str | None = None) -> list[Gathered]:
 
     apart  a folder that is left out: that of the outputs
 
-    A file in a folder is a program if it has a suffix of a dialect. Hidden files and folders, symbolic links and
-    `.orig` files are none. Raises `UsageError` NCF014 for a folder without any, `SourceError` NCF002 for one that
-    cannot be read.
+    A file in a folder is a program if it has a suffix of a dialect. Hidden files and folders, symbolic links, pipes,
+    devices and `.orig` files are none. Raises `UsageError` NCF014 for a folder without any, `SourceError` NCF002 for
+    one that cannot be read.
     """
     found: list[Gathered] = []
     for path in given:
@@ -67,4 +67,4 @@ def _same(here: str, name: str, apart: str | None) -> bool:
 
 
 def _is(path: str, known: Collection[str]) -> bool:
-    return os.path.splitext(path)[1].lower() in known and not os.path.islink(path)
+    return os.path.splitext(path)[1].lower() in known and not os.path.islink(path) and os.path.isfile(path)

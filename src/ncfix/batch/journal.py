@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ncfix import files
+from ncfix import files, ways
 
 NAME = ".ncfix-journal.jsonl"
 SCHEMA = 1
@@ -24,7 +24,9 @@ Find = Callable[[str], bytes | None]
 
 
 def digest_of(path: str) -> str | None:
-    """The SHA-256 of a file; None if it cannot be read."""
+    """The SHA-256 of a file; None if it cannot be read, or not a second time, as a pipe."""
+    if not os.path.isfile(path):
+        return None
     try:
         with open(path, "rb") as handle:
             return hashlib.file_digest(handle, "sha256").hexdigest()
@@ -90,16 +92,13 @@ class Journal:
         return {record.name: record for record in self._lines()}
 
     def add(self, record: Record) -> None:
-        """Note that a program is done. Raises `UsageError` NCF007."""
+        """Note that a program is done. Raises `UsageError` NCF005, NCF007."""
         line = "\n" + json.dumps({"schema": SCHEMA, **asdict(record)})  # a line cut off earlier spoils this one no more
-        try:
-            os.makedirs(self.folder, exist_ok=True)
-            with open(self.path, "a", encoding="utf-8") as handle:
-                handle.write(line)
-                handle.flush()
-                os.fsync(handle.fileno())
-        except OSError as error:
-            raise files.unwritable(self.path, error) from error
+        files.append(self.path, line.encode())
+
+    def check(self) -> None:
+        """Refuse to write into what is not the journal itself: NCF005."""
+        ways.check_own(self.path)
 
     def finish(self) -> None:
         """Take it away: the batch came to its end."""

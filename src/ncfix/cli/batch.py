@@ -30,6 +30,8 @@ class Batch:
     def run(self, jobs: int, make: Staff) -> Iterator[Outcome]:
         """What becomes of them, in their order; each is noted as soon as it is done."""
         journal = Journal(self.folder) if self.folder is not None and len(self.targets) > 1 else None
+        if journal is not None:
+            journal.check()
         done = {} if journal is None or not self.resume else journal.records()
         kept = {target: done[target.name] for target in self.targets if self._holds(target, done.get(target.name))}
         fresh = self._fresh([target for target in self.targets if target not in kept], jobs, make)

@@ -23,13 +23,14 @@ CODES = {
     ),
     "NCF005": Code(
         "an output that must not be written",
-        "The output is an input, a symbolic link, or not an ordinary file. Writing it could destroy what it stands "
-        "for.",
+        "The output is an input, a symbolic link, or not an ordinary file; or its folder below the output folder is a "
+        "symbolic link; or it would be replaced through one. Writing it could destroy what it stands for.",
         "Choose another `-o`; `--in-place` keeps the original; `-o -` is standard output.",
     ),
     "NCF006": Code(
         "two outputs of the same name",
-        "Files of the same name from different folders would overwrite each other in one output folder.",
+        "Files of the same name from different folders would overwrite each other in one output folder. So would files "
+        "whose names differ only in large and small letters, on a computer that does not tell them apart.",
         "Write them into different folders.",
     ),
     "NCF008": Code(
@@ -64,8 +65,8 @@ CODES = {
     ),
     "NCF014": Code(
         "no program in a folder",
-        "Of a folder, the files with a suffix of a dialect are taken, below it too; hidden files, symbolic links and "
-        "`.orig` files are not.",
+        "Of a folder, the files with a suffix of a dialect are taken, below it too; hidden files, symbolic links, "
+        "pipes, devices and `.orig` files are not.",
         "`ncfix dialects` lists the suffixes; files with another one can be named.",
     ),
     "NCF015": Code(

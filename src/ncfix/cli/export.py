@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ncfix import files
+from ncfix import files, ways
 from ncfix.cli import console
 from ncfix.cli.following import Following
 from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option, sound
@@ -140,16 +140,20 @@ def check_folder(folder: str) -> None:
 
 
 def write_folder(folder: str, made: Exported | Written, force: bool) -> None:
-    """Write all files, or none if one is there already or there is no room; raises `UsageError` NCF004 or NCF007."""
+    """Write all files, or none if one is there already or must not be, or there is no room.
+
+    Raises `UsageError` NCF004, NCF005, NCF007, NCF023.
+    """
     check_folder(folder)
     paths = {os.path.join(folder, name): content for name, content in made.files.items()}
     for path in paths:
-        if os.path.lexists(path) and (not force or os.path.islink(path) or not os.path.isfile(path)):
+        ways.check_output(path, folder, force)
+        if os.path.lexists(path) and not force:
             raise files.exists_already(path)
     fresh = [path for path in paths if not os.path.lexists(path)]
     try:
         for path, content in paths.items():
-            files.write_whole(path, content, replace=force)
+            files.write_whole(path, content, force, folder)
     except UsageError:
         for path in fresh:
             with suppress(OSError):

@@ -11,7 +11,7 @@ from functools import cache, partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from ncfix import __version__, fast
+from ncfix import __version__, fast, files
 from ncfix.batch.journal import Find, Noted, digest_of, text_digest
 from ncfix.cli import console
 from ncfix.cli.faults import owned
@@ -162,7 +162,7 @@ def _written(fixed: Fixed, target: Target, options: FixOptions) -> Outcome:
 def _write(fixed: Fixed, target: Target) -> None:
     if target.in_place and not fixed.changed:
         return
-    target.write(fixed.text)
+    target.write(fixed.text, files.mode_of(target.source))
 
 
 def _refusals(source: str, refused: Sequence[dict[str, Any]]) -> list[Message]:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
-from ncfix import files
+from ncfix import files, ways
 from ncfix.batch.gathering import Gathered, gathered
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
@@ -61,6 +60,7 @@ class Target:
     force     an existing output may be replaced
     resume    an existing output is left as it is, if it is what would be written
     name      the output's way down from the output folder; empty if there is none
+    root      the output folder, as the user named it; None if there is none
     """
 
     source: str
@@ -69,6 +69,7 @@ class Target:
     force: bool = False
     resume: bool = False
     name: str = ""
+    root: str | None = None
 
     @property
     def backup(self) -> str:
@@ -80,8 +81,11 @@ class Target:
         """The output's path; None for standard output."""
         return None if self.path == STREAM else self.path
 
-    def write(self, data: bytes | Iterable[bytes]) -> None:
-        """Write the output whole or not at all; raises `UsageError` NCF004 ... NCF008."""
+    def write(self, data: bytes | Iterable[bytes], mode: int | None = None) -> None:
+        """Write the output whole or not at all; raises `UsageError` NCF004 ... NCF008, NCF023.
+
+        mode  permission bits of a new file, as in `files.write_whole`
+        """
         if self.path == STREAM:
             console.put_all((data,) if isinstance(data, bytes) else data)
         elif self.in_place:
@@ -90,7 +94,7 @@ class Target:
             if not files.holds(self.path, data):
                 raise files.exists_already(self.path)
         else:
-            files.write_whole(self.path, data, replace=self.force)
+            files.write_whole(self.path, data, self.force, self.root, mode)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,26 +186,33 @@ def _target(program: Gathered, outputs: Outputs, folder: str | None) -> Target:
             hint = f"-o {os.path.join(folder, 'NAME')}"
             raise UsageError.of("NCF003", "standard input has no name to be written under", Place(folder), hint)
         path = os.path.join(folder, program.name)
-        return Target(program.path, path, force=outputs.force, resume=outputs.resume, name=program.name)
+        return Target(program.path, path, False, outputs.force, outputs.resume, program.name, folder)
     if outputs.output is None and program.path != STREAM:
         raise UsageError.of("NCF003", "no output given", hint="-o FILE, -o DIR, -o - or --in-place")
     return Target(program.path, outputs.output or STREAM, force=outputs.force)
 
 
 def _check_clash(found: Sequence[Target]) -> None:
-    sources = Counter(target.path for target in found)
-    for path, count in sources.items():
-        if count > 1:
-            names = ", ".join(target.source for target in found if target.path == path)
+    """Refuse outputs that are one file, here or on a computer that does not tell large letters from small ones."""
+    same: dict[object, list[Target]] = {}
+    for target in found:
+        same.setdefault((target.in_place and _file(target.path)) or ways.alike(target.path), []).append(target)
+    for group in same.values():
+        if len(group) > 1:
+            sources = ", ".join(target.source for target in group)
+            text = f"is the output of {len(group)} inputs: {sources}"
+            if len({target.path for target in group}) > 1:
+                text = "has the same name as another output, but for large and small letters or how they are composed"
+                text += f"; of these inputs: {sources}"
             hint = "fix them one by one, or into different folders"
-            raise UsageError.of("NCF006", f"is the output of {count} inputs: {names}", Place(path), hint)
+            raise UsageError.of("NCF006", text, Place(group[1].path), hint)
 
 
 def _check_in_place(target: Target) -> None:
     place = Place(target.path)
     if target.path == STREAM:
         raise UsageError.of("NCF005", "standard input cannot be changed in place", hint="-o FILE")
-    _check_regular(target.path)
+    ways.check_output(target.path)
     if os.path.lexists(target.backup):
         hint = "remove it, or bring it back and fix that"
         raise UsageError.of("NCF008", f"was fixed in place before: {target.backup} exists", place, hint)
@@ -209,7 +220,7 @@ def _check_in_place(target: Target) -> None:
 
 def _check_output(target: Target, inputs: Collection[tuple[int, int]]) -> None:
     place = Place(target.path)
-    _check_regular(target.path)
+    ways.check_output(target.path, target.root, target.force)
     if _file(target.path) in inputs:
         raise UsageError.of("NCF005", "is an input too, and inputs are not changed", place, "--in-place, or another -o")
     if os.path.lexists(target.path) and not (target.force or target.resume):
@@ -217,14 +228,6 @@ def _check_output(target: Target, inputs: Collection[tuple[int, int]]) -> None:
     folder = os.path.dirname(target.path) or "."
     if os.path.lexists(folder) and not os.path.isdir(folder):
         raise UsageError.of("NCF007", "is not a folder", Place(folder))
-
-
-def _check_regular(path: str) -> None:
-    if os.path.islink(path):
-        hint = f"name the file itself: {os.path.realpath(path)}"
-        raise UsageError.of("NCF005", "is a symbolic link, which is not written through", Place(path), hint)
-    if os.path.lexists(path) and not os.path.isfile(path):
-        raise UsageError.of("NCF005", "is not an ordinary file", Place(path), "-o - writes to standard output")
 
 
 def _files(paths: Iterable[str]) -> frozenset[tuple[int, int]]:
