@@ -34,11 +34,22 @@ def test_the_built_in_dialects_are_there() -> None:
         (b"(x)\n O100 IF [#1 GT 2]\n O100 ENDIF\n", "part.nc", "linuxcnc"),
         (b"#<depth> = 5\n", "part.tap", "linuxcnc"),
         (b"O1000 (PART)\nG0 X1\n", "part.tap", "iso"),
+        (b"(T# < 2 OR > 5)\n(#<2> is the side)\n(o1 if)\nG0 X1\n", "part.tap", "iso"),
+        (b"G0 X1 ; see #<side> and G65 P1\n", "part.tap", "iso"),
+        (b"(G65 P9832 #<side>)\nIF [#1 GT 2] GOTO 5\nN5\n", "part.tap", "fanuc"),
+        (b";$PATH=/_N_WKS_DIR\nG0 X1\n", "part.nc", "siemens"),
     ],
 )
 def test_detection(source: bytes, path: str, expected: str) -> None:
     assert dialects.detect(source, path).name == expected
     assert read(source, path).dialect.name == expected
+
+
+@pytest.mark.parametrize("name", ["fanuc", "haas", "iso", "siemens"])
+def test_signs_of_another_language_in_a_comment_are_none(name: str) -> None:
+    dialect = dialects.get(name)
+    comment = b"(T# < 2 OR > 5) (G15 H3)" if name != "siemens" else b"; #<side> o<a> call"
+    check_content(b"G0 X1 " + comment + b"\nG1 X2 F100\n", "part.nc", dialect)
 
 
 @pytest.mark.parametrize(

@@ -259,10 +259,10 @@ def test_commands_to_grbl_lose_the_position() -> None:
     assert rules(followed) == [Rule.CORRECT, Rule.PASS, Rule.CORRECT, Rule.CORRECT]
 
 
-def test_axis_words_before_any_code_are_refused() -> None:
-    followed = follow("X1 Y1\nG0 X2\nY2", dialect="iso")
-    assert rules(followed) == [Rule.REFUSE, Rule.PASS, Rule.CORRECT]
-    assert reasons(followed)[0] == "no motion code is in force"
+def test_axis_words_before_any_code_end_where_g0_and_g1_both_would() -> None:
+    followed = follow("G43 H1 Z50.\nX1 Y1\nG0 X2\nY2", dialect="iso", tools={1: Tool(length=100.0)})
+    assert rules(followed) == [Rule.CORRECT, Rule.CORRECT, Rule.CORRECT, Rule.CORRECT]
+    assert ends(followed)[1] == [1, 1, 150]
 
 
 def test_further_work_offsets() -> None:
@@ -298,7 +298,7 @@ def test_a_length_in_the_block_of_such_a_code_may_be_its_own() -> None:
 
 def test_machine_coordinates_need_no_motion_code_on_iso_controls() -> None:
     followed = follow("G53 Z0\nX1\nG0 X1", dialect="iso")
-    assert rules(followed) == [Rule.PASS, Rule.REFUSE, Rule.CORRECT]
+    assert rules(followed) == [Rule.PASS, Rule.CORRECT, Rule.CORRECT]
 
 
 def test_a_rapid_behind_what_is_not_followed_is_refused_and_does_not_pass() -> None:

@@ -194,9 +194,9 @@ class Builder:
         return Assignment(parameter, self.expression(value), self.span(tree))
 
     def flow(self, tree: Branch) -> Flow:
-        """A label, a keyword and its arguments."""
+        """A label, a keyword and its arguments; comments may stand between them."""
         label, keyword, *arguments = tree.children
-        values = tuple(map(self.expression, arguments))
+        values = tuple(self.expression(each) for each in arguments if kind(each) != "ARGUMENT_COMMENT")
         return Flow(self.label(label), str(keyword).lower(), values, self.span(tree))
 
     def program_number(self, tree: Branch) -> Flow:

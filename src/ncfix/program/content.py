@@ -15,6 +15,10 @@ ANOTHER = "--dialect NAME, if it is for another control than the machine's; `ncf
 PROBE_BYTES = 1 << 16
 """How much of a text is looked at to find out what it is."""
 
+COMMENT = re.compile(rb"(?<=\()(?:[^()\r\n]|\([^()\r\n]*\))+|(?<=;)(?![ \t]*\$PATH)[^\r\n]+")
+"""What a comment says, up to its closing bracket or the end of the line; in `;$PATH=` SINUMERIK says where a program
+is kept."""
+
 
 def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     """Refuse what is not text (NCF101), holds nothing (NCF102), or is another family's language (NCF103)."""
@@ -23,11 +27,18 @@ def check_content(source: bytes, path: str, dialect: Dialect) -> None:
     check_zeros(source, path)
     if not source.removeprefix(UTF8_MARK).strip():
         raise SourceError.of("NCF102", "there is no block in the program", Place(path))
+    code = beginning_without_comments(source)
     for family, pattern in dialect.foreign:
-        if found := re.search(pattern, source[:PROBE_BYTES]):
+        if found := re.search(pattern, code):
             text = f"this is {family}, not {dialect.title}"
             place = place_of(source, found.start(found.re.groups and 1), path, "utf-8")
             raise SourceError.of("NCF103", text, place, HINTS.get(family, ANOTHER))
+
+
+def beginning_without_comments(source: bytes) -> bytes:
+    """The first `PROBE_BYTES` of a text with blanks for what its comments say, byte for byte: signs of a language count
+    outside comments only. The brackets of a comment stay, as in other languages they enclose arguments."""
+    return COMMENT.sub(lambda found: b" " * len(found[0]), source[:PROBE_BYTES])
 
 
 def check_zeros(source: bytes, path: str, first_line: int = 1) -> None:

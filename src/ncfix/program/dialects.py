@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from ncfix.diagnostics import UsageError
 from ncfix.plugins import nearest, registry
-from ncfix.program.content import PROBE_BYTES
+from ncfix.program.content import beginning_without_comments
 from ncfix.program.dialect import Dialect
 
 DEFAULT = "iso"
@@ -30,7 +30,7 @@ def get(name: str) -> Dialect:
 def detect(source: bytes, path: str, control: str = "") -> Dialect:
     """The dialect of a text: by its content, else that of the machine's control, else by its file suffix, else ISO."""
     known: dict[str, Dialect] = registry("dialects")
-    head = source[:PROBE_BYTES]
+    head = beginning_without_comments(source)
     ranks = {name: rank for name, dialect in known.items() if (rank := signature_rank(dialect, head)) is not None}
     if ranks:
         shown = min(ranks, key=lambda name: (ranks[name], name))
@@ -43,6 +43,6 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
 
 
 def signature_rank(dialect: Dialect, head: bytes) -> int | None:
-    """Which of the dialect's signatures is found first in the order of their strength; None for none."""
+    """Which of the dialect's signatures is found first in `head`, in the order of their strength; None for none."""
     found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
     return next(found, None)

@@ -21,12 +21,10 @@ AFTER_PROBING = "where the axis {} stands after probing is known only at run tim
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
 AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
 NO_CODE = -2
-"""The motion code of blocks with axis words while none is in force."""
+"""Stands for the motion code of blocks with axis words before any is in force."""
 
 ONE_SHOT_PROBE = 310
 """G31 holds for its block only; the motion code before it stays in force."""
-
-AFTER_NO_CODE = "where the axis {} stands after a motion without a code is not known"
 
 REFUSALS = {
     50: "spline (G5)",
@@ -198,11 +196,13 @@ def turning_cycle(control: Control, block: Block, code: int) -> None:
     control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
 
 
-def undecided(control: Control, block: Block, code: int) -> None:
-    """Axis words while no motion code is in force: what ISO controls do with them differs."""
+def at_power_on(control: Control, block: Block, code: int) -> None:
+    """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
+    (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
     target, unknown = destination(control, block)
-    moved = {index: AFTER_NO_CODE for index in control.machine if block.axes >> index & 1}
-    control.make(Motion(Kind.RAPID, block.axes, target, unknown | moved, code, refusal="no motion code is in force"))
+    whole, control.whole = control.whole, True
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+    control.whole = whole
 
 
 def dwell(control: Control, block: Block, code: int) -> None:

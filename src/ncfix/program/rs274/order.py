@@ -15,6 +15,7 @@ from ncfix.program.rs274.feeds import feed, feed_mode, speed
 from ncfix.program.rs274.lengths import change_tool, select_tool, set_data, tool_offset
 from ncfix.program.rs274.motion import (
     NO_CODE,
+    at_power_on,
     cancel,
     dwell,
     end_spline,
@@ -25,7 +26,6 @@ from ncfix.program.rs274.motion import (
     save_reference,
     straight,
     turning_cycle,
-    undecided,
 )
 from ncfix.program.rs274.settings import (
     arc_distance,
@@ -104,7 +104,7 @@ MOTIONS: Mapping[int, Step] = {
     20: arc,
     30: arc,
     800: cancel,
-    NO_CODE: undecided,
+    NO_CODE: at_power_on,
     **dict.fromkeys(groups.PROBES, probe),
     **dict.fromkeys((*groups.SPLINES, *groups.THREADS), refused),
     **dict.fromkeys(groups.TURNING_CYCLES, turning_cycle),
