@@ -288,6 +288,8 @@ def test_parts_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
         (b"M98 P1000 L2", [Word, Word, Word]),
         (b"#100=[#1+2.5]", [Assignment]),
         (b"M30\x1a", [Word, Opaque]),
+        (b"?", [Opaque]),
+        (b"!G1 X2 ? ~", [Opaque, Word, Word, Opaque, Opaque]),
         (b"", []),
     ],
 )

@@ -14,7 +14,7 @@ from ncfix.program.reader import read
 from ncfix.program.setup import Setup
 from ncfix.program.trace import trace
 from ncfix.program.tree import Program
-from ncfix.program.turns import CRAWLS, UNTIMED
+from ncfix.program.turns import UNTIMED
 from ncfix.program.writer import apply
 
 AXES = ("X", "Y", "Z", "A")
@@ -98,8 +98,21 @@ def test_a_turn_in_inverse_time_keeps_its_time_by_itself() -> None:
     assert corrected("G93 G1 A90 F5\n", "iso") == ("G93 G1 A90 Y0.020 F5\nM2\n", {})
 
 
-def test_a_turn_in_inverse_time_that_linuxcnc_would_hurry_is_not_written() -> None:
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_a_turn_in_inverse_time_that_linuxcnc_would_hurry_has_its_time_by_a_feed_per_minute(pieces: int) -> None:
     """0.02 mm in half a minute is 0.04 mm a minute; LinuxCNC makes that 0.1, and the turn would be over too soon."""
-    _, conflicts = corrected("G93 G1 A90 F2\n", "linuxcnc")
-    assert list(conflicts.values()) == [CRAWLS]
-    assert not corrected("G93 G1 A90 F6\n", "linuxcnc")[1]
+    text = "G93 G1 A90 F2\nX12 F2\n"
+    after, conflicts = corrected(text, "linuxcnc", pieces)
+    assert not conflicts
+    assert minutes(after, "linuxcnc") == pytest.approx(minutes(text, "linuxcnc"), rel=1e-4)  # F has six digits
+    assert corrected("G93 G1 A90 F6\n", "linuxcnc") == ("G93 G1 A90 Y0.020 F6\nM2\n", {})
+
+
+def test_behind_such_a_turn_inverse_time_is_in_force_again() -> None:
+    text, _ = corrected("G93 G1 A90 F0.05\nA0 F0.05 M8\n", "linuxcnc")
+    assert text == "G94 G1 A90 Y0.020 F0.00100000\nG93\nG94 A0 Y0.000 F0.00100000 M8\nG93\nM2\n"
+
+
+def test_a_turn_in_inverse_time_whose_time_is_not_known_is_not_written() -> None:
+    _, conflicts = corrected("F[#5061]\nG93 G1 A90 F[#5399]\n", "linuxcnc")
+    assert list(conflicts.values()) == [UNTIMED]

@@ -26,7 +26,7 @@ from ncfix.program.second_reading import SecondReading
 from ncfix.program.standstill import jumps, passed_through, renamed
 from ncfix.program.target import TANGENTIAL, Rendered, Target, plane_across
 from ncfix.program.tree import Program, view
-from ncfix.program.turns import CRAWLS, UNTIMED, crawls, is_dragged, minutes, turn_alone, turns_alone
+from ncfix.program.turns import UNTIMED, at_their_pace, is_dragged, minutes, turn_alone, turns_alone
 from ncfix.program.writer import Edit, Splices, overlong
 
 FloatArray = NDArray[np.float64]
@@ -287,15 +287,14 @@ class _Emitter:
             return
         rows = slice(self.first_piece[row], self.first_piece[row + 1])
         target = self._target(row, rows)
+        if target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0:
+            target = at_their_pace(target)
         if math.isinf(target.turn_minutes) and is_dragged(target):
             self.conflicts.setdefault(block, UNTIMED)
         rendered = self.language.render(self.program, block, layout, target)
         if rendered.conflict:
             self.conflicts.setdefault(block, rendered.conflict)
         ends, frame = np.array(rendered.ends), self.frames[self.reading.frame[row]]
-        slow = target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0
-        if slow and crawls(target, float(self.moves.feed[row]), ends):
-            self.conflicts.setdefault(block, CRAWLS)
         self.end[rows] = frame.command(ends)
         if rendered.centre is not None:
             self.centre[rows.start] = frame.command_point(rendered.centre)

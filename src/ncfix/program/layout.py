@@ -11,7 +11,9 @@ from ncfix.program.tree import Anchor, Constant, Flow, Literal, Opaque, Program,
 #: In the order in which programs write them.
 AXIS_LETTERS = "XYZABCUVW"
 MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
-PER_MINUTE = frozenset((94.0,))
+CONTROL_CHARACTER = "control character"
+"""The kind of an `Opaque` that moves nothing and may stand anywhere (DC1, Grbl's `?`)."""
+FEED_MODES = frozenset((93.0, 94.0))
 CENTRE_LETTERS = ("I", "J", "K")
 #: M codes that act after the motion of their block: they belong on its last piece.
 CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
@@ -27,7 +29,7 @@ class Layout:
     turns     its P word
     feed      the F word
     motion    the G0..G3 word
-    feed_mode the G94 word
+    feed_mode the G93 or G94 word
     after     words that act after the motion (M0, M1, M2, M30, M60, M99)
     words_at  where a missing axis word goes: after the last axis word
     code_at   where a missing motion code goes: before the first axis word
@@ -110,7 +112,7 @@ def layout_of(program: Program, block: int) -> Layout:
         turns=words.by_address.get("P"),
         feed=words.by_address.get("F"),
         motion=words.first_coded("G", MOTION_CODES),
-        feed_mode=words.first_coded("G", PER_MINUTE),
+        feed_mode=words.first_coded("G", FEED_MODES),
         after=words.coded("M", CODES_AFTER_MOTION),
         words_at=words_at,
         code_at=code_at,
@@ -120,8 +122,11 @@ def layout_of(program: Program, block: int) -> Layout:
 
 
 def has_free_text(program: Program, block: int) -> bool:
-    """Whether the block holds anything but words, comments and block skip (flow, tape marks, opaque text)."""
-    return any(isinstance(item, (Flow, Opaque, Tape)) for item in program.items_of(block))
+    """Whether the block holds what may mean more than words do: flow, tape marks, opaque text."""
+    return any(
+        isinstance(item, (Flow, Tape)) or (isinstance(item, Opaque) and item.kind != CONTROL_CHARACTER)
+        for item in program.items_of(block)
+    )
 
 
 def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | None:

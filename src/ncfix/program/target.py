@@ -62,6 +62,7 @@ class Target:
     feed         the number after F that is in force, NaN where there is none
     turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
     turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
+    back_to_inverse_time   the turn was in inverse time, and is again behind it
     increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
     rotary       (n_axes,) which axes turn
     arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
@@ -95,6 +96,7 @@ class Target:
     feed: float = float("nan")
     turn_minutes: float = float("nan")
     turn_by_feed: bool = False
+    back_to_inverse_time: bool = False
     arcs: NDArray[np.bool_] | None = None
     centres: FloatArray | None = None
     arc_code: int = 0

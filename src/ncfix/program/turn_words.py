@@ -19,20 +19,22 @@ class TurnWriter(WordWriter):
     def _time_of_turn(self, begin: FloatArray, end: FloatArray) -> None:
         """State the time of a turn in its own block."""
         if not self.target.turn_by_feed:
-            self._inverse_time()
+            self._feed_mode(INVERSE_TIME)
+        elif self.target.back_to_inverse_time:
+            self._feed_mode(PER_MINUTE)
         feed, text = self.layout.feed, self._turn_feed(0, begin, end)
         if feed is None:
             self._add("F", text)
         else:
             self.out.edits.append((*self.program.span(self.block, feed.value_span), text))
 
-    def _inverse_time(self) -> None:
+    def _feed_mode(self, number: str) -> None:
         code = self.layout.feed_mode
         if code is not None:
-            self.out.edits.append((*self.program.span(self.block, code.value_span), INVERSE_TIME))
+            self.out.edits.append((*self.program.span(self.block, code.value_span), number))
             return
         at = self.program.position(self.block, self.layout.code_at)
-        self.out.edits.append((at, at, self._cased("G") + INVERSE_TIME + self.layout.blank))
+        self.out.edits.append((at, at, self._cased("G") + number + self.layout.blank))
 
     def _turn_feed(self, piece: int, begin: FloatArray, end: FloatArray) -> str:
         """The number after F with which a piece of a turn takes its share of the time."""
@@ -47,8 +49,10 @@ class TurnWriter(WordWriter):
         return f"{self.target.feed:.6f}".rstrip("0")
 
     def _feed_as_before(self) -> None:
-        """Back to the feed per minute that was in force, for the blocks that follow."""
+        """Back to the feed that was in force, for the blocks that follow; in inverse time each has its own."""
         words = [] if self.target.turn_by_feed else [self._cased("G") + PER_MINUTE]
         words.append(self._cased("F") + self._feed_in_force())
+        if self.target.back_to_inverse_time:
+            words = [self._cased("G") + INVERSE_TIME]
         prefix = self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
         self.out.lines.append(prefix + self.layout.blank.join(words))

@@ -4,10 +4,14 @@ Many controls take F as the speed of the linear axes as soon as one of them move
 correction of some micrometres at 500 mm/min is done in milliseconds, and so would be the turn. A corrected turn is
 therefore given its own time: where the control's rule is known, by the F that makes the little linear motion last as
 long; else in inverse time (G93), which means the same everywhere. What was in force is stated anew after it.
+
+In inverse time LinuxCNC moves linear axes no slower than `LEAST_PACE`. A turn that this would hurry gets the F of its
+little linear motion too, in feed per minute (G94), and G93 again behind it.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -21,8 +25,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-UNTIMED = "rotary axes turn alone, and the time that takes is not known: their feed is not a plain number per minute"
-CRAWLS = "in inverse time LinuxCNC moves linear axes at 0.1 units per minute or faster: a turn so slow would be hurried"
+UNTIMED = "rotary axes turn alone, and the time that takes is not known: their feed is no plain number"
 LEAST_PACE = 0.1
 """Units per minute; what LinuxCNC makes of slower motions in inverse time (`inverse_time_rate_straight`)."""
 FEED_GROUPS = ("XYZ", "UVW", "ABC")
@@ -49,16 +52,18 @@ def turn_alone(moves: Moves, row: int) -> float:
     return float(np.rad2deg(np.linalg.norm(way[moves.rotary])))
 
 
-def crawls(target: Target, feed: float, ends: FloatArray) -> bool:
-    """Whether a turn in inverse time `feed` (1/min) comes out so slow that LinuxCNC would hurry it.
-
-    ends  (k, n_axes) of its pieces, as written
-    """
-    path = np.vstack((target.start, ends))
+def at_their_pace(target: Target) -> Target:
+    """The target; a turn in inverse time that LinuxCNC would hurry as one whose time is kept by a feed per minute."""
+    path = np.vstack((target.start, np.round(target.ends * 10.0**target.decimals) / 10.0**target.decimals))
     linear = [letter not in FEED_GROUPS[-1] for letter in target.letters]
     steps = np.linalg.norm(np.diff(path, axis=0)[:, linear], axis=1)
     ways = np.array([way(target.letters, *pair, target.diameter) for pair in pairwise(path)])
-    return bool(np.any((steps > 0) & (ways * feed / target.shares < LEAST_PACE)))
+    if np.all((steps == 0) | (ways * target.feed / target.shares >= LEAST_PACE)):
+        return target
+    known = target.feed > 0
+    return replace(
+        target, inverse_time=False, turn_minutes=1.0 / target.feed if known else float("inf"), back_to_inverse_time=True
+    )
 
 
 def minutes(moves: Moves, row: int, own_feed: bool) -> float:
