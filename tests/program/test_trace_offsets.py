@@ -189,3 +189,10 @@ def test_impossible_words(text: str) -> None:
     with pytest.raises(SourceError) as caught:
         follow(text, setup=KNOWN)
     assert caught.value.code in ("NCF210", "NCF221", "NCF222", "NCF224")
+
+
+def test_an_axis_whose_datum_a_reset_does_not_move_stays_where_the_program_has_brought_it() -> None:
+    followed = follow("G0 X1 Y2 Z3\nG92 X0\nG1 X4 F1\nG92.1\nG1 Z1\nG1 X2")
+    assert followed.moves.placed is not None
+    assert followed.moves.placed[-2].tolist() == [False, True, True]
+    assert followed.moves.placed[-1].tolist() == [True, True, True]

@@ -35,6 +35,7 @@ def shift_system(control: Control, block: Block, code: int) -> None:
         set_local(control, block, cancelled=code == 920)
     if code == 520 and not control.rules.strict:
         return
+    before, doubtful = control.offsets.shift, set(control.shaky)
     if code in (520, 920):
         set_shift(control, block, from_position=code == 920)
     else:
@@ -47,8 +48,11 @@ def shift_system(control: Control, block: Block, code: int) -> None:
     control.refresh()
     if code == 920:
         control.places.settle(mask_of(words_of(block)))
+    elif code == 520:
+        control.places.shift(mask_of(words_of(block)))
     else:
-        control.places.shift(mask_of(words_of(block) if code == 520 else control.machine))
+        after, doubtful = control.offsets.shift, doubtful | set(control.shaky)
+        control.places.shift(mask_of(i for i in control.machine if before[i] != after[i] or i in doubtful))
 
 
 def set_local(control: Control, block: Block, *, cancelled: bool) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from ncfix.program.layout import (
     CENTRE_LETTERS,
     CODES_AFTER_MOTION,
+    FEED_MODES,
     MOTION_CODES,
-    PER_MINUTE,
     BlockWords,
     Layout,
 )
@@ -65,7 +65,7 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         turns=words.by_address.get("TURN"),
         feed=words.by_address.get("F"),
         motion=words.first_coded("G", MOTION_CODES) or named_motion(program, block),
-        feed_mode=words.first_coded("G", PER_MINUTE),
+        feed_mode=words.first_coded("G", FEED_MODES),
         after=words.coded("M", CODES_AFTER_MOTION | END_OF_SUBPROGRAM),
         words_at=words_at,
         code_at=code_at,
