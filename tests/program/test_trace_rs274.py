@@ -109,6 +109,7 @@ PROGRAMS = (
     "G0 X[2+3*4**2] Y[-7 mod 3] Z[5-3 gt 1 and 2]",
     "G0 Xround[-2.5] Yfix[-2.5] Zatan[1]/[-1]",
     "G43.1 Z3\nG0 Z0\nG49\nG0 Z0",
+    "F9\no1 sub\nG1 X#1 Y#2\no1 endsub\no1 call (first) [1] (second) (of two) [2] (end)\no1 call [3] (y) [4] ; end",
     "F9 M3 S1\nG33 Z-5 K1\nG0 X1",
 )
 
