@@ -21,7 +21,7 @@ KLARTEXT = "L X+40 Y+5\nL X+40 Z-10\nL X+40 Y+5 Z-90\nL IX+0 IZ+20\nL Z-30\nL X+
 TEXTS = {
     "siemens": "G710 G17 G90 G94\nT1 D1 M6\nG54\nG0 X0 Y0 Z50 A0 C0\nG1 G41 X10 Y5 F500\n" + ALIKE + "M30\n",
     "siemens, turned": "G710 G17 G90 G94\nT1 D1 M6\nG54\nROT RPL=30\nG0 X0 Y0 Z50 A0 C0\nG1 G41 X10 Y5 F500\n"
-    + ALIKE
+    + ALIKE.replace("G40 X60.", "G40 X60. Y40.")
     + "M30\n",
     "heidenhain": "BEGIN PGM 1 MM\nTOOL CALL 1 Z S1000\nL X+0 Y+0 Z+50 A+0 C+0 R0 FMAX\nL X+10 Y+5 RL F500\n"
     + KLARTEXT

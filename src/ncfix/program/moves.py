@@ -133,6 +133,7 @@ class Moves:
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
     resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`). None: none
+    passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
     angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
                  may count from 0 to 360 degrees; NaN for others. None: none
     """
@@ -169,6 +170,7 @@ class Moves:
     counted: NDArray[np.bool_] | None = None
     resting: NDArray[np.bool_] | None = None
     angles: NDArray[np.float64] | None = None
+    passing: NDArray[np.int8] | None = None
 
     def __len__(self) -> int:
         return len(self.block)

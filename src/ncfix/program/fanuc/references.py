@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ncfix.program.follow.motion import Motion
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.lengths import tool_offset
@@ -19,7 +20,7 @@ from ncfix.program.rs274.targets import destination
 if TYPE_CHECKING:
     from ncfix.program.fanuc.control import MacroControl
 
-CHECKED = "reference point check (G27)"
+CHECKED = Passing(Pass.REFERENCE_POINT, "reference point check (G27)")
 AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
 SECOND = 2
 NO_LENGTH = 490
@@ -38,7 +39,7 @@ def named(control: Control, block: Block, code: int) -> None:
         go_to_reference(control, block, code)
         return
     unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
-    passing = REFERENCE_POINT.format("G28")
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
     control.make(Motion(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
 
 
@@ -57,7 +58,7 @@ def further(control: Control, block: Block, code: int) -> None:
         go_to_reference(control, block, code)
         return
     way, unknown = destination(control, block)
-    passing = REFERENCE_POINT.format(f"G30 P{number}")
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
     if way != control.position or (block.axes and not control.modal.incremental):
         control.make(Motion(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
     taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]

@@ -25,6 +25,7 @@ from ncfix.program.follow.coordinates import (
 )
 from ncfix.program.follow.motion import Motion
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.settings import unfollowed
 from ncfix.program.rs274.shifts import rotate_system
@@ -45,7 +46,9 @@ LAST = {POINTS: 3, VECTORS: 2}
 DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
 NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
 TURNED_TO = "NCF243"
-ALIGNMENTS = {531: "tool axis alignment (G53.1)", 536: "tool axis alignment (G53.6)"}
+ALIGNMENTS = {
+    code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
+}
 ABOUT_TIP = 536
 
 

@@ -12,6 +12,7 @@ from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.program.follow.rollover import Winding, doubtful, extremes, overturned
 from ncfix.program.follow.stretch import Buffer, Stretch
 from ncfix.program.moves import Frame, Kind, Moves, Rule
+from ncfix.program.passing import Pass
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -33,6 +34,7 @@ class Style(NamedTuple):
     feed_mode: int
     modal: int
     held: bool = False
+    passing: Pass = Pass.NONE
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -44,6 +46,7 @@ DTYPES: dict[str, type[np.generic]] = {
     "tool_length": np.float64,
     "feed_mode": np.int8,
     "modal": np.int16,
+    "passing": np.int8,
 }
 """The types of the columns of `Moves` that styles hold; the others are flags."""
 
@@ -222,7 +225,9 @@ class Builder:
         )
         start, end = _joined_ends(parts, self.columns)
         named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
-        styles = self._style_columns(style)
+        styles: dict[str, Any] = self._style_columns(style)
+        if not styles["passing"].any():
+            styles["passing"] = None
         programmed, counted = (
             named.take(mask, axis=0, mode="clip"),
             self._mask_column(self._counted, styles["incremental"]),

@@ -16,6 +16,7 @@ from ncfix.program.follow.places import mask_of
 from ncfix.program.follow.standing import Standing
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.passing import Pass, Passing, may_pass
 from ncfix.program.pointing import Pointing
 from ncfix.program.recurrence import Budget
 
@@ -119,8 +120,7 @@ class Control(Standing):
         settles = self._settles(motion)
         adrift = self._adrift(settles) | self.still_beside(motion.axes)
         self._note_increments(motion, settles)
-        leaving = not motion.passing and self._leaves_unknown(motion)
-        fate = motion._replace(passing=first_reason(motion.unknown)) if leaving else self._dragged(motion, adrift)
+        fate = self._fate(motion, adrift)
         self._keep_places(motion, settles)
         style = self._style_of(fate)
         self.beside &= ~fate.axes
@@ -174,6 +174,16 @@ class Control(Standing):
             return self.saying[1]
         return tcp.lost_in_frame(self) if motion.kind == Kind.DWELL else tcp.along_frame(self, motion.unknown)
 
+    def ends_in_hole(self, motion: Motion) -> bool:
+        """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
+        return motion.kind == Kind.CYCLE
+
+    def _fate(self, motion: Motion, adrift: int) -> Motion:
+        """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
+        if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
+            return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.unknown)))
+        return self._dragged(motion, adrift)
+
     def _leaves_unknown(self, rapid: Motion) -> bool:
         """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
         if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
@@ -206,7 +216,7 @@ class Control(Standing):
         return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
 
     def _dragged(self, motion: Motion, adrift: int) -> Motion:
-        """The motion, left as it is or refused if it moves an axis that has no word and must get none."""
+        """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
         wordless = adrift & self.places.adrift & ~motion.axes
         if not wordless or motion.passing or motion.refusal or motion.unknown:
             return motion
@@ -217,13 +227,12 @@ class Control(Standing):
         if index is None:
             return motion
         why = ADRIFT.format(LETTERS[index])
-        straight = motion.kind in (Kind.RAPID, Kind.FEED)
-        return motion._replace(passing=why) if straight else motion._replace(refusal=why)
+        if motion.kind == Kind.RAPID and not self.ends_in_hole(motion):
+            return motion._replace(passing=Passing(Pass.UNSAID, why))
+        return motion._replace(refusal=why)
 
-    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
-        """What may be done to the motion, and why."""
-        if passing:
-            return Rule.PASS, passing
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
+        """Why a motion that does not pass is refused; empty if it may be corrected."""
         reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
         if not reason and unknown:
             reason = first_reason(unknown)
@@ -231,20 +240,28 @@ class Control(Standing):
             reason = first_reason(self.unknown)
         if not reason and self.external:
             reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
-        return (Rule.REFUSE, reason) if reason else (Rule.CORRECT, "")
+        return reason
 
     def _style_of(self, motion: Motion) -> int:
         """The style of a motion; behind a contour the one that leads off stays whole."""
-        rule, reason = self._verdict(motion.kind, motion.unknown, motion.refusal, motion.passing)
-        whole, self.whole = self.whole, self.whole or bool(self.beside & motion.axes)
-        style = self._style(motion.kind, rule, reason, motion.code)
+        passing, whole = motion.passing, self.whole
+        self.whole = whole or bool(self.beside & motion.axes)
+        if passing is not None and may_pass(passing, motion.kind):
+            style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
+        else:
+            wrong = motion.refusal if passing is None else passing.words
+            style = self._judged(motion.kind, motion.unknown, wrong, motion.code)
         self.whole = whole
         return style
 
+    def _judged(self, kind: Kind, unknown: Unknown, refusal: str, code: int) -> int:
+        """The style of a motion that does not pass."""
+        reason = self._verdict(kind, unknown, refusal)
+        return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
+
     def style_of(self, kind: Kind, code: int) -> int:
         """The style of motions whose start and end are known and that have no reason of their own."""
-        rule, reason = self._verdict(kind, {}, "", "")
-        return self._style(kind, rule, reason, code)
+        return self._judged(kind, {}, "", code)
 
     def note_foreign(self, letter: str, also: str = "") -> None:
         """The program moves an axis that the machine lacks; `also`: what else it may mean."""
@@ -252,7 +269,7 @@ class Control(Standing):
         text = f"the program moves the axis {letter}, and the machine has only {names}"
         self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), f"is it the right machine file?{also}")
 
-    def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
         modal = self.modal
         tool, length = self.tool_length()
         return self.builder.style(
@@ -270,5 +287,6 @@ class Control(Standing):
                 modal.feed_mode,
                 code,
                 self.tilted,
+                passing,
             )
         )

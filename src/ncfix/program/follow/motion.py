@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ncfix.program.follow.builder import Arc
 from ncfix.program.follow.coordinates import LETTERS, Vector
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Passing
 
 AT_START = "where the axis {} stands when the program starts is not given"
 """Why a position is not known at first; asked of the setup when it matters."""
@@ -23,7 +24,7 @@ class Motion(NamedTuple):
     target   the command at its end, of every letter; a nominal value along `unknown`
     code     the motion code, in tenths
     refusal  why it is refused; empty if it is not
-    passing  why it is passed as it is; empty if it is not
+    passing  why it is passed as it is; None if it is not
     settles  the axes whose words say where they stand afterwards; None: those of absolute words
     """
 
@@ -33,7 +34,7 @@ class Motion(NamedTuple):
     unknown: Unknown
     code: int
     refusal: str = ""
-    passing: str = ""
+    passing: Passing | None = None
     arc: Arc | None = None
     settles: int | None = None
 

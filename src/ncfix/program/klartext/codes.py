@@ -10,6 +10,7 @@ import math
 from ncfix.program.klartext.control import RETRACTED, Control
 from ncfix.program.klartext.step import Step
 from ncfix.program.klartext.targets import Words
+from ncfix.program.passing import Pass, Passing
 
 SUSPENDING = {
     104: "M104: the datum that was set last comes back into force",
@@ -19,7 +20,7 @@ SUSPENDING = {
 ENDING = {115: 114, 145: 144}
 CHOSEN = "M138: the control takes only some of the rotary axes into account"
 UNTILTED = "M130: coordinates of the untilted system in a tilted plane"
-RETRACT = "retract along the tool axis (M140)"
+RETRACT = Passing(Pass.RETRACTION, "retract along the tool axis (M140)")
 COUNTED = "from where the axis {} counts after M126 depends on a parameter of the machine: it went past a turn"
 FULL = 2 * math.pi
 COMPENSATION = {"r0": 0, "rl": 41, "rr": 42, "r+": 41, "r-": 42}

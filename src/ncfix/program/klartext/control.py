@@ -18,7 +18,8 @@ from ncfix.program.klartext.free import Leg
 from ncfix.program.klartext.patterns import Place
 from ncfix.program.klartext.transformations import Transformations
 from ncfix.program.language import Run
-from ncfix.program.moves import Kind, Rule
+from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.setup import Setup, Tool
 
 START = "PRESET"
@@ -204,7 +205,7 @@ class Control(base.Control):
         which further pieces would have to name.
         """
         if motion.kind == Kind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
-            motion = motion._replace(passing=motion.passing or first_reason(motion.unknown))
+            motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.unknown)))
         whole = self.whole
         self.tilted = self.transformations.tilted and not self.m128
         turns = any(motion.axes >> index & 1 for index in self.turning)
@@ -222,11 +223,12 @@ class Control(base.Control):
         if motion.settles is not None:
             return motion.settles
         own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
-        return 0 if self.modal.incremental or motion.passing.startswith("machine") else own
+        machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
+        return 0 if self.modal.incremental or machine else own
 
-    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str, passing: str) -> tuple[Rule, str]:
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
         """As of every control; a cycle begins with a rapid, so it does not matter where from."""
-        return super()._verdict(Kind.RAPID if kind == Kind.CYCLE else kind, unknown, refusal, passing)
+        return super()._verdict(Kind.RAPID if kind == Kind.CYCLE else kind, unknown, refusal)
 
     def is_led(self, unknown: Unknown) -> bool:
         """What is not known is so because the control itself has led the axes somewhere."""
@@ -238,11 +240,11 @@ class Control(base.Control):
         super().make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
         self.path.tangent = None
 
-    def pass_here(self, reason: str, lost: str, letters: str) -> None:
+    def pass_here(self, passing: Passing, lost: str, letters: str) -> None:
         """A motion of the control's own; these axes are not known afterwards."""
         unknown = dict(self.unknown)
         unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
-        super().make(Motion(Kind.RAPID, 0, self.position[:], unknown, 0, passing=reason))
+        super().make(Motion(Kind.RAPID, 0, self.position[:], unknown, 0, passing=passing))
         self.path.tangent = None
 
 

@@ -26,15 +26,19 @@ from ncfix.program.klartext.targets import (
 from ncfix.program.klartext.tilting import check_normal
 from ncfix.program.klartext.transformations import unit
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 
 MACHINE_COORDINATES = "machine coordinates ({})"
 NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
 NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
 ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
-TURNS_UNDER_TILT = "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+TURNS_UNDER_TILT = Passing(
+    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+)
 MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
 FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
-OFF = "a rapid from where the control itself has led the tool"
+OFF = Passing(Pass.LED, "a rapid from where the control itself has led the tool")
+DEPARTURE = Passing(Pass.DEPARTURE, "departure from the contour (DEP)")
 FLAT = 1e-9
 IN_SPACE = 0b111
 """The bits of X, Y and Z."""
@@ -100,7 +104,7 @@ def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: in
     with_increments(control, follows or step.words.incremental)
     code = 0 if step.kind == Kind.RAPID else 10
     refusal = way or check_normal(control) or derived(control, step.words, axes)
-    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else ""))
+    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else None))
     with_increments(control, False)
     keep_tangent(control, *before)
 
@@ -148,7 +152,7 @@ def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unkno
             target[index] = control.position[index]
             unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
     code = 0 if step.kind == Kind.RAPID else 10
-    refusal, passing = (MIXED_UNDER_TILT, "") if linear else ("", TURNS_UNDER_TILT)
+    refusal, passing = (MIXED_UNDER_TILT, None) if linear else ("", TURNS_UNDER_TILT)
     control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing))
     if linear:
         control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
@@ -174,7 +178,8 @@ def at_machine(control: Control, step: Step) -> None:
         target, unknown = in_machine(control, step.words)
     if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
         unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
-    control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=MACHINE_COORDINATES.format(code)))
+    passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
+    control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=passing))
     if was:
         control.switch_tip()
     control.path.tangent = None
@@ -217,6 +222,4 @@ def departure(control: Control, step: Step) -> None:
         target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
         lost = {}
     axes = 1 << plane.first | 1 << plane.second
-    control.make(
-        Motion(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing="departure from the contour (DEP)")
-    )
+    control.make(Motion(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing=DEPARTURE))

@@ -12,8 +12,9 @@ from ncfix.program.klartext.control import AFTER_PROBING, PRESET, Control
 from ncfix.program.klartext.flow import FlowControl
 from ncfix.program.klartext.patterns import pattern_of
 from ncfix.program.klartext.trans import transform
+from ncfix.program.passing import Pass, Passing
 
-PROBING = "probing"
+PROBING = Passing(Pass.PROBING, "probing")
 MEASURED = "TCH PROBE {} makes what it measures the datum, a rotation or the kinematics: that is known only at run time"
 SETTING = frozenset({*range(400, 406), *range(408, 420), 451, 452, 453, *range(1400, 1430)})
 """Probing cycles that do not only measure."""

@@ -19,6 +19,7 @@ from ncfix.program.klartext.posture import NOT_NORMAL, angles_for, apart, normal
 from ncfix.program.klartext.targets import Words
 from ncfix.program.klartext.transformations import euler, from_points, from_vectors, projected, spatial
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 
 BAD_PLANE = "NCF273"
 RETRACTING = "mb max"
@@ -28,7 +29,7 @@ NONE = 1e-9
 """rad; an axis that is said to stand at zero."""
 
 POSITIONED = "where the axis {} stands after PLANE ... TURN or MOVE the control works out"
-TURNED = "the control positions the rotary axes (PLANE)"
+TURNED = Passing(Pass.ALIGNMENT, "the control positions the rotary axes (PLANE)")
 WAY = "NCF279"
 WAY_HINT = "say SEQ+ or SEQ- in the program, or state the rotary axes"
 HOME = "PLANE RESET is taken to turn the rotary axes to zero, their basic position"

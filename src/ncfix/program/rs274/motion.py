@@ -7,15 +7,17 @@ from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Motion, Unknown
 from ncfix.program.moves import FeedMode, Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.rs274.control import Block, Control
 from ncfix.program.rs274.feeds import check_feed
 from ncfix.program.rs274.systems import REFERENCES, is_given, store, stored
 from ncfix.program.rs274.targets import destination, machine_destination
 
 BAD_MOTION = "NCF221"
-MACHINE_COORDINATES = "machine coordinates (G53)"
+MACHINE_COORDINATES = Passing(Pass.MACHINE_COORDINATES, "machine coordinates (G53)")
 REFERENCE_POINT = "reference point ({})"
-PROBING = "probing"
+PROBING = Passing(Pass.PROBING, "probing")
+DWELL = Passing(Pass.DWELL, "dwell")
 AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
 AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
 AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
@@ -80,7 +82,7 @@ def one_way(control: Control, block: Block, code: int) -> None:
 def go_to_reference(control: Control, block: Block, code: int) -> None:
     """G28 and G30: by way of the words to the reference point, along the axes named, or along all."""
     name = f"G{code // 10}"
-    passing = REFERENCE_POINT.format(name)
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
     modal = control.modal.motion
     checked, control.offset_checked = control.offset_checked, True
     way, unknown = destination(control, block)
@@ -209,7 +211,7 @@ def dwell(control: Control, block: Block, code: int) -> None:
     """G4."""
     if control.rules.strict and block.get("P", -1.0) == -1.0:
         raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
-    control.make(Motion(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing="dwell"))
+    control.make(Motion(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing=DWELL))
 
 
 def cancel(control: Control, block: Block, code: int) -> None:

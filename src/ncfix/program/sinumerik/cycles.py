@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.destination import End, Leg, Words, command
 from ncfix.program.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
 from ncfix.program.sinumerik.plans import Calling
@@ -101,7 +102,16 @@ def drill(control: Sinumerik, drilling: Drilling) -> None:
         lost.pop(plane.across, None)
         end = End(command(control, program, {plane.across}), control.unknown_for(lost), lost)
         words = Words(drilling.block, {}, {}, 1 << plane.across)
-        control.go(Leg(kind, words, end, control.modal.motion, passing=DEPTH.format(name), settles=words.axes))
+        control.go(
+            Leg(
+                kind,
+                words,
+                end,
+                control.modal.motion,
+                passing=Passing(Pass.CYCLE_DEPTH, DEPTH.format(name)),
+                settles=words.axes,
+            )
+        )
     control.row_block = before
 
 

@@ -13,6 +13,7 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Passing
 from ncfix.program.sinumerik.increments import unsteady
 from ncfix.program.sinumerik.state import GEOMETRY, Sinumerik
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
@@ -93,7 +94,7 @@ class Leg(NamedTuple):
     end: End
     code: int
     refusal: str = ""
-    passing: str = ""
+    passing: Passing | None = None
     arc: Arc | None = None
     settles: int | None = None
     by_machine: bool = False

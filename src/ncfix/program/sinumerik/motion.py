@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.circles import arc, through_point
 from ncfix.program.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import mind_carried, take_up
@@ -13,9 +14,13 @@ from ncfix.program.sinumerik.tangents import tangential
 from ncfix.program.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
 
 MACHINE = "machine coordinates ({})"
-MEASURING = "measuring (MEAS)"
+MEASURING = Passing(Pass.PROBING, "measuring (MEAS)")
+DWELL = Passing(Pass.DWELL, "dwell")
 AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
-REFERENCE = {740: "reference point (G74)", 750: "fixed point (G75)"}
+REFERENCE = {
+    code: Passing(Pass.REFERENCE_POINT, words)
+    for code, words in ((740, "reference point (G74)"), (750, "fixed point (G75)"))
+}
 AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
 SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
 AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
@@ -96,7 +101,9 @@ def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
     end = machine_destination(control, words)
     code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
     kind = Kind.RAPID if code == 0 else Kind.FEED
-    control.go(Leg(kind, words, end, code, passing=MACHINE.format(name), by_machine=True))
+    control.go(
+        Leg(kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True)
+    )
 
 
 def measure(control: Sinumerik, words: Words) -> None:
@@ -135,4 +142,4 @@ def dwell(control: Sinumerik, words: Words) -> None:
     """G4: F is seconds, S turns of the spindle."""
     still = Words(words.block, {}, {}, 0)
     end = End(control.position, control.unknown, control.lost)
-    control.go(Leg(Kind.DWELL, still, end, control.modal.motion, passing="dwell"))
+    control.go(Leg(Kind.DWELL, still, end, control.modal.motion, passing=DWELL))

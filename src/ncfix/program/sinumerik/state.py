@@ -22,6 +22,7 @@ from ncfix.program.follow.motion import AT_START, Motion, Unknown
 from ncfix.program.follow.places import mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule
+from ncfix.program.passing import Pass
 from ncfix.program.sinumerik import heading
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
@@ -281,8 +282,12 @@ class Sinumerik(Control):
         forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
         return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
 
-    def _style(self, kind: Kind, rule: Rule, reason: str, code: int) -> int:
-        index = super()._style(kind, rule, reason, code)
+    def ends_in_hole(self, motion: Motion) -> bool:
+        """As of every control; a modal cycle (MCALL) drills where motions end."""
+        return super().ends_in_hole(motion) or self.modes.modal_cycle is not None
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
+        index = super()._style(kind, rule, reason, code, passing)
         held = self.modes.swivelled and not self.modes.transformed
         if not held and not self.whole:
             return index

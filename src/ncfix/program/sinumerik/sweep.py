@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.program.moves import Kind, Moves, Rule
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.course import Course
 from ncfix.program.sinumerik.destination import End, Leg, Words
 from ncfix.program.sinumerik.framing import PROGRAMMABLE
@@ -40,7 +41,8 @@ def refuse(control: Sinumerik, plan: Plan, block: int) -> None:
     """Note the motion of a block, if it has one."""
     if not plan.axes or plan.names & PROGRAMMABLE or not NO_MOTIONS.isdisjoint(plan.g):
         return
-    passing = "machine coordinates" if "supa" in plan.names or not MACHINE.isdisjoint(plan.g) else ""
+    machine = "supa" in plan.names or not MACHINE.isdisjoint(plan.g)
+    passing = Passing(Pass.MACHINE_COORDINATES, "machine coordinates") if machine else None
     control.row_block = block
     lost = dict.fromkeys(control.machine, DECIDED_AT_RUNTIME)
     words = Words(block, {}, {}, plan.axes)

@@ -16,6 +16,7 @@ import numpy as np
 from ncfix.program.follow.coordinates import X, Y, Z, angles_in_words, as_rotation
 from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import Kind
+from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
 from ncfix.program.sinumerik.destination import End, Leg, Words
 from ncfix.program.sinumerik.orientation import WAY
@@ -37,7 +38,7 @@ DESELECTED = "0"
 PLACES = {"fr": 0, "st": 2, "mode": 3, "before": 4, "angles": 7, "after": 10, "dir": 13}
 """Where the arguments stand: retraction, state, mode, reference point, angles, zero point, direction."""
 
-SWIVEL = "swivelling (CYCLE800)"
+SWIVEL = Passing(Pass.ALIGNMENT, "swivelling (CYCLE800)")
 UNFOLLOWED = "a tilted plane (CYCLE800{}) is in force, which ncfix does not follow"
 OVER_FRAME = (
     "a programmed frame (TRANS, ROT, ...) was in force at CYCLE800, and whether it stays is for machine data: "
