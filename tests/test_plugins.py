@@ -15,13 +15,13 @@ from ncfix.diagnostics import ExitCode, PluginError
 from ncfix.plugins import PluginWarning, collect
 
 GOOD = """
-from types import SimpleNamespace
 from ncfix.hookspecs import hookimpl
+from ncfix.program.dialect import Dialect
 
 @hookimpl
 def register_dialects(register):
-    register(SimpleNamespace(name="{0}"))
-    register(object(), name="{0}-too")
+    register(Dialect("{0}", "Good", "iso.lark", ()))
+    register(Dialect("other", "Good", "iso.lark", ()), name="{0}-too")
 """
 
 BROKEN = {

@@ -63,4 +63,15 @@ CODES = {
         "The module has no function that is marked as a hook, or one with a hook's name that is not marked.",
         "Mark it with `@ncfix.hookspecs.hookimpl`.",
     ),
+    "NCF507": Code(
+        "a plugin failed",
+        "The code of a plugin raised an exception that is no message of its own: a fault of the plugin, not of the "
+        "input and not of ncfix. Nothing was written.",
+        "Tell its author; `ncfix --debug` shows the traceback. NCFIX_DISABLE_PLUGINS leaves the plugin out.",
+    ),
+    "NCF508": Code(
+        "a plugin brings something of the wrong kind",
+        "What it registered cannot be what the hook is for, and is left out; or what it returned is not what it must.",
+        "Tell its author; `docs/plugins.md` says what each hook registers and what that returns.",
+    ),
 }

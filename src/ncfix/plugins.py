@@ -73,7 +73,8 @@ class Plugins:
 def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Name -> thing of one kind: the built-in ones first, then what the plugins registered.
 
-    A plugin's thing that bears the name of a built-in one is left out with a warning (an error in strict mode).
+    A plugin's thing that bears the name of a built-in one, or is of no use for its kind (NCF508), is left out with a
+    warning (an error in strict mode).
     """
     assert kind in KINDS, f"{kind!r} is none of {KINDS}"
     things = dict(builtin or {})
@@ -81,9 +82,41 @@ def registry(kind: str, builtin: Mapping[str, Any] | None = None) -> dict[str, A
         for name, thing in plugin.things.get(kind, {}).items():
             if name in things:
                 report(taken(plugin.name, kind, name, "ncfix itself"))
+            elif lacks := lacking(kind, thing):
+                leave(plugin.name, plugin.distribution, kind, name, lacks)
             else:
                 things[name] = thing
     return things
+
+
+NEEDS = {
+    "bases": ("rows", "slopes", "feature", "complaints"),
+    "commands": ("main", "get_short_help_str"),
+    "dialects": ("grammar", "suffixes", "signature", "language", "semantics"),
+}
+"""Kind -> what its things have, of those kinds that are not merely called."""
+
+
+def lacking(kind: str, thing: Any) -> str:
+    """Why a thing cannot be one of its kind; empty if it can."""
+    if kind == "effects":
+        return (
+            "" if hasattr(thing, "effects") or hasattr(thing, "candidates") else "it has no effects and no candidates"
+        )
+    if kind == "bases" and not isinstance(thing, type):
+        return "it is no class"
+    if kind not in NEEDS:
+        return "" if callable(thing) else "it cannot be called"
+    absent = [name for name in NEEDS[kind] if not hasattr(thing, name)]
+    return f"it has no {', '.join(absent)}" if absent else ""
+
+
+@cache
+def leave(plugin: str, source: str, kind: str, name: str, why: str) -> None:
+    """Say once that something of a plugin is left out."""
+    of = f" of {source}" if source else ""
+    text = f"{name!r} of plugin {plugin!r}{of} left out of the {kind}: {why}"
+    report(Message("NCF508", text, hint="tell its author; docs/plugins.md says what each hook registers"))
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

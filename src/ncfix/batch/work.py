@@ -7,9 +7,11 @@ it, not the batch.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from ncfix.diagnostics import UsageError
+from ncfix.plugin_faults import called
 from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
@@ -36,7 +38,9 @@ def staff(name: str) -> Staff:
     known: dict[str, Staff] = registry("executors", BUILT_IN)
     if name not in known:
         raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=nearest(name, known))
-    return known[name]
+    from concurrent.futures import Executor
+
+    return partial(called, "executors", name, known[name], gives=Executor)
 
 
 def each(

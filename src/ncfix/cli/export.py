@@ -71,7 +71,8 @@ def export(
     The figures are those of the files: they are read back and run as the control would, over 20000 random poses.
     """
     from ncfix.cli.tabled import along, rewritten_file
-    from ncfix.tables.control import Request, get_control
+    from ncfix.plugin_faults import called
+    from ncfix.tables.control import Request, Written, get_control
     from ncfix.tables.export import export as exported
     from ncfix.tables.poses import ranges_of
 
@@ -85,7 +86,7 @@ def export(
     options = chosen.settings(dict(_pair(each, "--set NAME=VALUE") for each in settings), complete=not probe)
     request = Request(machine, space, tool_length, 1e-3 * target_um, options)
     if probe:
-        found = chosen.probe(request)
+        found = called("controls", chosen.name, chosen.probe, request, gives=Written)
         write_folder(output, found, force)
         _tell_of_probe(found, chosen.name, as_json)
         return ExitCode.DONE

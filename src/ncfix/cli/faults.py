@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from ncfix.cli import console
-from ncfix.diagnostics import FaultError, NcfixError
+from ncfix.diagnostics import FaultError, NcfixError, PluginError
 from ncfix.files import unwritable
+from ncfix.plugin_faults import blamed
 
 DEBUG = "NCFIX_DEBUG"
 """The environment variable that asks for tracebacks; workers inherit it."""
@@ -22,18 +23,31 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def owned(error: Exception) -> NcfixError:
     """An exception as the error that is told: a remedy where there is one, else a fault of ncfix."""
     if isinstance(error, NcfixError):
+        if error.__cause__ is not None and isinstance(error, PluginError):
+            _trace(error.__cause__)
         return error
     if isinstance(error, OSError) and error.errno in FULL:
         return unwritable(str(error.filename or "<stdout>"), error)
+    plugin = blamed(error)
+    if plugin is not None:
+        _trace(error)
+        return plugin
     return fault(error)
+
+
+def _trace(error: BaseException) -> None:
+    """The traceback, if that is asked for."""
+    import traceback
+
+    if os.environ.get(DEBUG, "") not in ("", "0"):
+        console.say("".join(traceback.format_exception(error)))
 
 
 def fault(error: Exception) -> FaultError:
     """Own up to a bug, with its traceback if that is asked for."""
     import traceback
 
-    if os.environ.get(DEBUG, "") not in ("", "0"):
-        console.say("".join(traceback.format_exception(error)))
+    _trace(error)
     where = traceback.extract_tb(error.__traceback__)[-1]
     at = f"{os.path.basename(where.filename)}:{where.lineno}"
     text = f"this is a fault of ncfix: {type(error).__name__}: {error} ({at})"

@@ -23,6 +23,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from ncfix.compensate.before import Before
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
+from ncfix.plugin_faults import blamed
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)
@@ -265,7 +266,7 @@ def _work(worker: Callable[[Read], Worker[Any]], ground: Ground, jobs: int, mine
         except GoneError:
             raise
         except Exception as error:
-            share.fail(number, _portable(error))
+            share.fail(number, _portable(blamed(error) or error))
         while True:
             post.listen()
 

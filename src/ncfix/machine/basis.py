@@ -111,6 +111,15 @@ class Basis(ABC):
         return result
 
 
+def check_shapes(basis: Basis) -> None:
+    """Raise ValueError for a basis whose functions do not come as one row for each coefficient."""
+    u = np.array([-0.5, 0.0, 0.5])
+    for name, function in (("rows", basis.rows), ("slopes", basis.slopes)):
+        shape = np.shape(function(u, np.zeros(3)))
+        if shape != (basis.size, 3):
+            raise ValueError(f"{name} gives shape {shape} for three places and {basis.size} coefficients")
+
+
 @lru_cache(maxsize=1)
 def kinds() -> dict[str, type[Basis]]:
     """Every basis by its name: the built-in ones and those of plugins."""

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from ncfix.machine.axis import Axis
-from ncfix.machine.basis import Basis, kinds
+from ncfix.machine.basis import Basis, check_shapes, kinds
 from ncfix.machine.effect import COMPONENTS, NAME, SPINDLE, Effect, Matrix
 from ncfix.machine.fields import Section, did_you_mean
 from ncfix.machine.library import Named
 from ncfix.machine.named_effect import read_named
+from ncfix.plugin_faults import working
 
 INPUT = re.compile(r"[a-z][a-z0-9_]*")
 SMALLEST_SCALE = 1e-9
@@ -97,8 +98,11 @@ def _basis(section: Section, kind: type[Basis]) -> Basis | None:
     parameters = {each.name: _parameter(section, each) for each in fields(kind)}  # type: ignore[arg-type]
     if any(value is None for value in parameters.values()):
         return None
-    basis = kind(**parameters)
-    faults = basis.complaints()
+    with working("bases", kind.name):
+        basis = kind(**parameters)
+        faults = basis.complaints()
+        if not faults and not kind.__module__.startswith("ncfix."):
+            check_shapes(basis)
     for key, text in faults:
         section.note("NCF316", key, text)
     return None if faults else basis

@@ -8,7 +8,7 @@ section 2.5, rule 1).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Protocol
@@ -19,6 +19,7 @@ from ncfix.machine.axis import Axis
 from ncfix.machine.effect import SPINDLE, Effect
 from ncfix.machine.machine import Machine
 from ncfix.machine.smooth import Backlash, Periodic, Polynomial
+from ncfix.plugin_faults import called, handed
 from ncfix.plugins import registry
 
 WARM = 20.0
@@ -71,9 +72,14 @@ def library(machine: Machine) -> dict[str, Named]:
 
 def _of_plugins(machine: Machine, taken: set[str]) -> Iterator[Named]:
     for name, plugin in registry("effects").items():
-        effects = tuple(plugin.effects(machine)) if hasattr(plugin, "effects") else ()
+        effects = _brought(name, plugin, machine) if hasattr(plugin, "effects") else ()
         if effects and name not in taken:
             yield Named(name, plugin.title, effects, nan, (), tuple(getattr(plugin, "needs", ())))
+
+
+def _brought(name: str, plugin: PluginEffect, machine: Machine) -> tuple[Effect, ...]:
+    found = called("effects", name, plugin.effects, machine, gives=Iterable)
+    return tuple(handed("effects", name, each, Effect) for each in found)
 
 
 def _of_axis(axis: Axis) -> Iterator[Named]:

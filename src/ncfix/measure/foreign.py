@@ -20,6 +20,7 @@ from ncfix.measure import checks
 from ncfix.measure import renishaw as rtl
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.renishaw import number_of
+from ncfix.plugin_faults import called
 from ncfix.plugins import registry
 
 LINEAR = "XYZ"
@@ -114,7 +115,9 @@ def _along(axis: Axis) -> float:
 def _by_plugin(text: str, path: str) -> Measurement | None:
     """What the first reader of a plugin makes of it that knows it."""
     readers: dict[str, Reader] = registry("readers")
-    return next((found for read in readers.values() if (found := read(text, path)) is not None), None)
+    gives = (Measurement, type(None))
+    found = (called("readers", name, read, text, path, gives=gives) for name, read in readers.items())
+    return next((each for each in found if each is not None), None)
 
 
 def _reader(text: str) -> Callable[[str, str], Measurement] | None:

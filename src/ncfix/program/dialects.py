@@ -6,6 +6,7 @@ import re
 from pathlib import PurePath
 
 from ncfix.diagnostics import UsageError
+from ncfix.plugin_faults import working
 from ncfix.plugins import nearest, registry
 from ncfix.program.content import beginning_without_comments
 from ncfix.program.dialect import Dialect
@@ -44,5 +45,6 @@ def detect(source: bytes, path: str, control: str = "") -> Dialect:
 
 def signature_rank(dialect: Dialect, head: bytes) -> int | None:
     """Which of the dialect's signatures is found first in `head`, in the order of their strength; None for none."""
-    found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
-    return next(found, None)
+    with working("dialects", dialect.name):
+        found = (rank for rank, pattern in enumerate(dialect.signature) if re.search(pattern, head))
+        return next(found, None)

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ncfix import caches
+from ncfix.plugin_faults import working
 
 if TYPE_CHECKING:
     from lark import Lark, Token, Tree
@@ -106,4 +107,9 @@ def parser_of(name: str, tables: str | None = None) -> Lark:
 
 def parse(dialect: Dialect, code: str) -> Tree[Token]:
     """The tree of one squeezed block; raises Lark's own `UnexpectedInput`."""
-    return parser(dialect.grammar).parse(code)
+    try:
+        grammar = parser(dialect.grammar)
+    except Exception:
+        with working("dialects", dialect.name):  # a grammar that is missing, or is none, is the fault of whose it is
+            raise
+    return grammar.parse(code)

@@ -12,6 +12,7 @@ from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
+from ncfix.plugin_faults import called
 from ncfix.program.reach import runs_straight_on
 
 if TYPE_CHECKING:
@@ -152,6 +153,6 @@ class Language:
 @lru_cache(maxsize=32)
 def language_of(dialect: Dialect) -> Language:
     """The language of a dialect, imported when it is first needed."""
-    language = resolve_name(dialect.language)
+    language: Language = called("dialects", dialect.name, resolve_name, dialect.language, gives=Language)
     assert isinstance(language, Language), f"{dialect.language} is no Language"
     return language

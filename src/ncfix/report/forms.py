@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 
 from ncfix.diagnostics import Place, UsageError
+from ncfix.plugin_faults import called
 from ncfix.plugins import registry
 from ncfix.report import html, markdown
 from ncfix.report.document import Document
@@ -22,4 +24,5 @@ def form_of(path: str) -> Form:
     known: dict[str, Form] = registry("reporters", BUILT_IN)
     if suffix not in known:
         raise UsageError.of("NCF018", f"a report cannot be a {suffix} file", Place(path), f"one of {' '.join(known)}")
-    return known[suffix]
+    made: Form = partial(called, "reporters", suffix, known[suffix], gives=bytes)
+    return made

@@ -9,12 +9,13 @@ range worked in; running that is the emulation. A plugin registers a function th
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
+from ncfix.plugin_faults import called
 from ncfix.plugins import registry
 from ncfix.tables.grid import Array
 from ncfix.tables.neutral import Tables
@@ -210,7 +211,7 @@ class Control(ABC):
 
 def controls() -> dict[str, Control]:
     """All controls that plugins bring."""
-    return {name: factory() for name, factory in registry("controls").items()}
+    return {name: _made(name, factory) for name, factory in registry("controls").items()}
 
 
 def get_control(name: str) -> Control:
@@ -218,7 +219,11 @@ def get_control(name: str) -> Control:
     found = registry("controls")
     if name not in found:
         raise UsageError.of("NCF480", f"there are no tables for a control {name!r}", hint=f"one of {_listed(found)}")
-    control: Control = found[name]()
+    return _made(name, found[name])
+
+
+def _made(name: str, factory: Callable[[], Control]) -> Control:
+    control: Control = called("controls", name, factory, gives=Control)
     return control
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from ncfix import __version__
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
+from ncfix.plugin_faults import called, handed
 from ncfix.tables import manifest as side
 from ncfix.tables.control import Control, Files, Least, Request, Written
 from ncfix.tables.grid import Array
@@ -66,9 +67,9 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     allows, NCF490 for tables that leave more than there was before.
     """
     _check_finite(request.machine)
-    written = control.write(request)
-    tables = control.read(written.files)
-    messages = control.lint(written.files)
+    written = called("controls", control.name, control.write, request, gives=Written)
+    tables = _read(control, written.files)
+    messages = linted(control, written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
     written = replace(written, notes=(*written.notes, *_remarks(control, request, tables, left, written)))
@@ -104,14 +105,25 @@ def emulate(
     missing = [name for name in made.files if name not in files]
     if missing:
         raise ConfigError.of("NCF486", f"these files are missing: {', '.join(missing)}", Place(folder))
-    tables = control.read(native)
+    tables = _read(control, native)
     if not tables.axes <= set(machine.axis_names):
         odd = ", ".join(sorted(tables.axes - set(machine.axis_names)))
         raise RefusedError.of("NCF487", f"the tables are for axes that the machine does not have: {odd}", Place(folder))
     space = ranges_of(machine, _internal(machine, made.ranges))
     left = residual(machine, tables, space, made.tool_length, poses)
-    messages = (*made.changed(native, folder), *control.lint(native))
+    messages = (*made.changed(native, folder), *linted(control, native))
     return Exported(native, files, tables, left, (), messages)
+
+
+def _read(control: Control, files: Files) -> Tables:
+    tables: Tables = called("controls", control.name, control.read, files, gives=Tables)
+    return tables
+
+
+def linted(control: Control, files: Files) -> tuple[Message, ...]:
+    """What the control's linter says of files."""
+    found = called("controls", control.name, control.lint, files, gives=Iterable)
+    return tuple(handed("controls", control.name, each, Message) for each in found)
 
 
 def _remarks(control: Control, request: Request, tables: Tables, left: Residual, written: Written) -> Iterator[str]:

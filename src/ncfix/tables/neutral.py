@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -46,6 +46,7 @@ class Term:
         return weight
 
 
+@runtime_checkable
 class Tables(Protocol):
     """What a control does with its files: a sum of tables (`Compensation`), or whatever else it works out of them."""
 

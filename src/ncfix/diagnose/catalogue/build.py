@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ncfix.diagnose.catalogue import linear, location, rotary, thermal, weight
 from ncfix.diagnose.catalogue.candidate import Candidate, Reach
+from ncfix.plugin_faults import called, handed
 from ncfix.plugins import registry
 
 
@@ -17,9 +18,10 @@ def catalogue(reach: Reach) -> tuple[Candidate, ...]:
     """
     parts = (linear, rotary, weight, thermal, location)
     found = [each for part in parts for each in part.candidates(reach)]
-    for plugin in registry("effects").values():
+    for name, plugin in registry("effects").items():
         if hasattr(plugin, "candidates"):
-            found += plugin.candidates(reach)
+            brought = called("effects", name, plugin.candidates, reach, gives=Iterable)
+            found += [handed("effects", name, each, Candidate) for each in brought]
     return tuple(found)
 
 
