@@ -209,7 +209,7 @@ def build(libraries: Sequence[Library]) -> None:
 def _started(share: Iterable[Library]) -> subprocess.Popen[bytes]:
     """A process that compiles libraries; it imports from where this one does, and not from the working folder."""
     modules = [TRIAL, *(library.module for library in share)]
-    command = [sys.executable or "", "-P", "-m", "ncfix.kernel_build", *modules]
+    command = [sys.executable or "", "-P", "-m", "ncfix.kernel_build", str(os.getpid()), *modules]
     known = {**os.environ, **LOWERED_ONLY, "PYTHONPATH": os.pathsep.join(sys.path)}
     try:
         return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=known)

@@ -6,7 +6,7 @@ one, then over the module, in which helpers can be called by nobody else: it put
 it, and hands over no more of an array than is looked at. The loops are as fast as with all helpers put into them.
 
 numba takes this from the environment, before it is imported (`kernel.LOWERED_ONLY`), and needs 280 MB: so it runs in a
-process of its own, `python -m ncfix.kernel_build TRIAL MODULE...`, which writes the code to standard output.
+process of its own, `python -m ncfix.kernel_build PARENT TRIAL MODULE...`, which writes the code to standard output.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from itertools import chain
 from typing import Any
 
 from ncfix.kernel import Argument, Kernel, Library, binding, target
+from ncfix.tied import tie_to
 
 OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
@@ -135,8 +136,12 @@ def _type(argument: Argument, types: Any) -> Any:
     return types.Array(names[argument[:2]], dimensions, "C") if dimensions else names[argument[:2]]
 
 
-def main(trial: str, *modules: str) -> None:
-    """Try whether kernels can be trusted; compile those of these modules, and write them to standard output."""
+def main(parent: str, trial: str, *modules: str) -> None:
+    """Try whether kernels can be trusted; compile those of these modules, and write them to standard output.
+
+    parent  number of the process that waits for them: nobody else would
+    """
+    tie_to(int(parent))
     gc.disable()  # next to nothing becomes garbage in circles while numba is imported
     if not import_module(trial).passes():
         sys.exit("this numba passes arguments in another way")

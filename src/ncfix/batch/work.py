@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 from ncfix.diagnostics import UsageError
 from ncfix.plugin_faults import called
 from ncfix.plugins import nearest, registry
+from ncfix.tied import tie
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -24,10 +25,10 @@ Staff: TypeAlias = "Callable[[int], Executor]"
 
 
 def processes(workers: int) -> Executor:
-    """Processes of this machine."""
+    """Processes of this machine; they end with this one."""
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(workers)
+    return ProcessPoolExecutor(workers, initializer=tie)
 
 
 BUILT_IN: Mapping[str, Staff] = {"processes": processes}

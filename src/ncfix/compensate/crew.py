@@ -7,7 +7,7 @@ proved. Texts do not go from one process to another: each reads the program from
 corrected where it belongs (`Ground`); the first process counts, and hands out what comes through a pipe.
 
 Nobody waits for a process that is gone: its lines end (`Post`), and who listens there gets `GoneError`; and when the
-first process leaves the work, whatever the reason, all others are ended.
+first process leaves the work, whatever the reason, all others are ended; and they end by themselves if it is killed.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ncfix.compensate.before import Before
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.post import GoneError, Post, lines_between, own_lines
 from ncfix.plugin_faults import blamed
+from ncfix.tied import tie
 
 Result = TypeVar("Result")
 Made = TypeVar("Made", bound="Done", covariant=True)
@@ -257,6 +258,7 @@ def crew(jobs: int, worker: Callable[[Read], Worker[Made]], ground: Ground | Non
 
 def _work(worker: Callable[[Read], Worker[Any]], ground: Ground, jobs: int, mine: int, lines: Any) -> None:
     """What another process does; it ends when the first one has all it needs, or is gone."""
+    tie()
     with Post(mine, own_lines(lines, mine)).opened(lambda: os._exit(1)) as post, suppress(GoneError, KeyboardInterrupt):
         share, number = Share(jobs, post), mine
         try:

@@ -1,0 +1,144 @@
+"""Whatever ends ncfix, nothing of it goes on: no process, no open pipe, no half of an output.
+
+`NCFIX_MOMENTS=25` kills each kind of run so many times, spread over all that it does; else once.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import NamedTuple
+
+import pytest
+
+MOMENTS = int(os.environ.get("NCFIX_MOMENTS", "1"))
+PATIENCE_S = 20.0
+"""Far more than the others take to notice, on a computer that does much else."""
+MACHINE = """
+ncfix = 1
+topology = "w F X Y Z t"
+axis.X = { type = "linear", direction = [1, 0, 0], range = [0, 500] }
+axis.Y = { type = "linear", direction = [0, 1, 0], range = [0, 400] }
+axis.Z = { type = "linear", direction = [0, 0, 1], range = [-300, 0] }
+effect = [{ name = "EXX", basis = "polynomial", degree = [1], coefficients = [1e-4] }]
+"""
+
+pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/environ"), reason="/proc says which processes are left")
+
+
+class Kind(NamedTuple):
+    """How work is shared out: `programs` of so many `blocks` each, and what is in the environment."""
+
+    programs: int
+    blocks: int
+    environment: dict[str, str]
+
+
+KINDS = {
+    "a batch": Kind(20, 300, {"NCFIX_NO_FAST": "1"}),
+    "one long program": Kind(1, 20000, {"NCFIX_NO_FAST": "1", "NCFIX_PART_BYTES": "20000"}),
+}
+
+
+@cache
+def ground(title: str) -> Path:
+    """A folder with a machine and the programs of a kind of run."""
+    folder, kind = Path(mkdtemp(prefix="ncfix-orphans-")), KINDS[title]
+    (folder / "machine.toml").write_text(MACHINE)
+    (folder / "in").mkdir()
+    for number in range(kind.programs):
+        steps = (f"G1 X{10 + (7 * at + number) % 400}.{at % 10} Y{10 + 13 * at % 300}" for at in range(kind.blocks))
+        (folder / "in" / f"p{number}.ngc").write_text("\n".join(["G21 G90 G94 F600", "G0 Z-1", *steps, "M2", ""]))
+    return folder
+
+
+def started(title: str, out: Path, mark: str) -> subprocess.Popen[bytes]:
+    folder, kind = ground(title), KINDS[title]
+    command = [sys.executable, "-m", "ncfix", "fix", "in", "-m", "machine.toml", "--assume-zero", "--no-figures"]
+    environment = {**os.environ, **kind.environment, "NCFIX_MARK": mark}
+    out.mkdir()
+    return subprocess.Popen(
+        [*command, "-o", str(out / "out"), "--jobs", "3"],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
+
+
+@cache
+def whole(title: str) -> tuple[dict[str, bytes], float]:
+    """The outputs of a run that nobody stops, and how long it takes, s."""
+    before, out = time.monotonic(), ground(title) / "whole"
+    running = started(title, out, uuid.uuid4().hex)
+    said, _ = running.communicate(timeout=300)
+    assert running.returncode == 0, said.decode()
+    return contents(out / "out"), time.monotonic() - before
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.rglob("*") if path.is_file()} if folder.exists() else {}
+
+
+def alive(mark: str) -> Iterator[int]:
+    """The processes that were started with a mark, zombies apart."""
+    for process in Path("/proc").iterdir():
+        if process.name.isdecimal():
+            try:
+                if mark.encode() in (process / "environ").read_bytes():
+                    yield int(process.name)
+            except OSError:
+                pass
+
+
+def gone(mark: str, until: float) -> None:
+    """Wait until none is alive; none is afterwards."""
+    while (left := list(alive(mark))) and time.monotonic() < until:
+        time.sleep(0.05)
+    for process in left:
+        os.kill(process, signal.SIGKILL)
+    assert not left
+
+
+@pytest.mark.parametrize("moment", range(MOMENTS))
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL], ids=lambda how: how.name)
+@pytest.mark.parametrize("title", KINDS)
+def test_nothing_is_left(title: str, how: signal.Signals, moment: int) -> None:
+    expected, lasts = whole(title)
+    mark = uuid.uuid4().hex
+    out = ground(title) / mark
+    running = started(title, out, mark)
+    time.sleep(lasts * (0.2 + 0.8 * (moment + 0.5) / MOMENTS))
+    os.kill(running.pid, how)
+    begun = time.monotonic()
+    try:
+        running.communicate(timeout=PATIENCE_S)  # until the pipe is closed by all who have it
+    finally:
+        gone(mark, begun + PATIENCE_S)
+    found = contents(out / "out")
+    assert {name: found[name] for name in found if not name.startswith(".")}.items() <= expected.items()
+    assert not [name for name in found if name.endswith(".tmp")]
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL], ids=lambda how: how.name)
+def test_what_compiles_kernels_is_not_left(how: signal.Signals, tmp_path: Path) -> None:
+    """One that would take ten minutes for it."""
+    (tmp_path / "slow_trial.py").write_text("import time\n\n\ndef passes():\n    time.sleep(600)\n")
+    code = "from ncfix import kernel; kernel.TRIAL = 'slow_trial'; kernel._started([]).communicate()"
+    mark = uuid.uuid4().hex
+    environment = {**os.environ, "NCFIX_MARK": mark, "PYTHONPATH": str(tmp_path)}
+    running = subprocess.Popen([sys.executable, "-c", code], env=environment)
+    begun = time.monotonic()
+    while len(list(alive(mark))) < 2 and time.monotonic() < begun + PATIENCE_S:
+        time.sleep(0.01)
+    os.kill(running.pid, how)
+    running.wait()
+    gone(mark, begun + 2 * PATIENCE_S)
