@@ -1,7 +1,7 @@
 # Everything here is also a plain command; see README.md and CONTRIBUTING.md.
 PYTHON ?= .venv/bin/python
 
-.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals ci clean
+.PHONY: demo test lint format accuracy bench same-bytes tables study hidden metamorphic refusals inserted-blocks ci clean
 
 demo:            ## fix the shipped five-axis example
 	./try
@@ -46,6 +46,9 @@ metamorphic:     ## 500 pairs of programs for each relation, into docs/dialects.
 
 refusals:        ## what becomes of the motion blocks of the corpus, all folders, also flat (half an hour)
 	NCFIX_CORPUS=1 OMP_NUM_THREADS=1 $(PYTHON) -m pytest -q tests/classes/test_accounting.py tests/classes/test_siemens_account.py
+
+inserted-blocks: ## how many blocks a correction puts into the programs of the corpus, by language (minutes); TOLERANCE=1.9 MOST=20000
+	OMP_NUM_THREADS=1 $(PYTHON) benchmarks/inserted_blocks.py $(if $(TOLERANCE),--tolerance-um $(TOLERANCE)) $(if $(MOST),--most $(MOST))
 
 ci:              ## what the server runs
 	.ci/run

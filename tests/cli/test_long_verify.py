@@ -99,7 +99,8 @@ def test_faults_are_found_in_any_parts(verify: Any, corrected: list[str], reques
 
 @pytest.mark.parametrize("change", ["left out", "exchanged", "said too early", "ends early"])
 def test_faults_of_millimetres_are_found_in_any_parts(verify: Any, corrected: list[str], change: str) -> None:
-    place, wrong = len(corrected) // 2, list(corrected)
+    half, wrong = len(corrected) // 2, list(corrected)
+    place = next(at for at in range(half, len(wrong)) if " Z8." in wrong[at])  # the path turns there
     if change == "left out":
         wrong[place : place + 2] = []
     if change == "exchanged":

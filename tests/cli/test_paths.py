@@ -107,7 +107,7 @@ def test_verify_sees_that_the_original_is_wrong(shop: Any, ncfix: Any) -> None:
     assert result.code == ExitCode.FINDINGS
     before, after, *_, verdict = result.out.decode().splitlines()
     assert before.removeprefix("tip error before: ") == after.removeprefix("tip error after:  ")
-    assert verdict.startswith("NOT within 1 um: lines ")
+    assert verdict.startswith("NOT within 1 um and 0.87 um of the control's digits: lines ")
     loose = ncfix("verify", shop.program, shop.program, "-m", shop.machine, "--assume-zero", "--tolerance-um", "22")
     assert loose.code == ExitCode.DONE
 

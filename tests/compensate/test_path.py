@@ -144,25 +144,25 @@ def test_a_tool_of_unknown_length_stops_what_depends_on_it_only() -> None:
 
 
 @pytest.mark.parametrize("digit", [1e-4, 1e-3])
-def test_rounded_to_the_controls_digits_the_path_keeps_the_tolerance(digit: float) -> None:
-    machine = bent()
+def test_rounded_to_the_controls_digits_the_path_keeps_tolerance_and_half_a_step_in_each_axis(digit: float) -> None:
+    machine, rounding = bent(), 0.5 * digit * np.sqrt(3)
     points = np.round(np.random.default_rng(2).uniform(-200, 200, (8, 3)), 3)
     moves = motions(machine, points[0], points)
-    result = plan(machine, moves, get_strategy("position"), 2e-3, rounding_mm=0.5 * digit * np.sqrt(3))
+    result = plan(machine, moves, get_strategy("position"), 2e-3, rounding_mm=rounding)
     for columns in (result.pieces.end, result.start):
         columns[:] = np.round(columns / digit) * digit
-    assert np.nanmax(dense_errors(machine, moves, result)[result.pieces.move > 0]) < 2e-3
+    assert np.nanmax(dense_errors(machine, moves, result)[result.pieces.move > 0]) < 2e-3 + rounding
     assert not result.findings
 
 
-def test_digits_too_coarse_for_the_tolerance_are_reported_and_half_of_it_is_kept_for_the_path() -> None:
+def test_digits_too_coarse_for_the_tolerance_are_reported_and_take_nothing_of_it() -> None:
     machine = bent()
     moves = motions(machine, (-200, 0, 0), [(-200, 0, 0), (200, 0, 0)])
     strategy = get_strategy("position")
     coarse = plan(machine, moves, strategy, TOLERANCE, rounding_mm=5e-3)
-    half = plan(machine, moves, strategy, TOLERANCE, rounding_mm=TOLERANCE / 2)
+    exact = plan(machine, moves, strategy, TOLERANCE)
     assert [finding.code for finding in coarse.findings] == ["NCF409"]
-    assert len(coarse.pieces) == len(half.pieces)
+    assert len(coarse.pieces) == len(exact.pieces)
 
 
 # -- metamorphic ------------------------------------------------------------------------------------------------------

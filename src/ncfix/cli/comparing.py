@@ -27,11 +27,12 @@ Said = tuple[Sequence[Message], ...]
 class Compared:
     """Two programs on one machine: figures of the original, of the other along its own path, and along the original's.
 
-    beyond       lines of the other with errors larger than the tolerance
+    beyond       lines of the other with errors larger than tolerance and rounding
     not_reached  lines of the original from which the other is farther away
     unseen       lines of the original that cut, nobody knows where
     left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
                  nothing can be corrected along it there
+    rounding_um  what the control's digits may add to the path
     """
 
     before: dict[str, Any]
@@ -41,10 +42,11 @@ class Compared:
     not_reached: list[int]
     unseen: list[int]
     left: dict[str, list[int]]
+    rounding_um: float
 
     @property
     def within(self) -> bool:
-        """Nothing is farther from the intended path than the tolerance."""
+        """Nothing is farther from the intended path than the tolerance and what rounding adds."""
         return not self.beyond and not self.not_reached
 
     @classmethod
@@ -59,6 +61,7 @@ class Compared:
             not_reached=back.lines_beyond,
             unseen=comparison.lines_unseen,
             left=comparison.lines_left,
+            rounding_um=comparison.rounding * 1e3,
         )
 
 
@@ -80,9 +83,8 @@ class Pair:
     def _in_parts(self) -> tuple[SideBySide, Said]:
         """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
         from ncfix.compensate.cuts import Cuts
-        from ncfix.compensate.side_by_side import SideBySide
 
-        found, dialect = SideBySide(self.tolerance_um / 1e3), dialect_in(self.following, self.original)
+        found, dialect = self._side_by_side(), dialect_in(self.following, self.original)
         cuts = []
         for source, beside in ((self.original, ()), (self.fixed, (self.original.path,))):
             task = task_of(self.following, source, dialect, *beside)
@@ -92,9 +94,8 @@ class Pair:
 
     def _as_wholes(self) -> tuple[SideBySide, Said]:
         from ncfix.compensate.cuts import whole
-        from ncfix.compensate.side_by_side import SideBySide
 
-        found = SideBySide(self.tolerance_um / 1e3)
+        found = self._side_by_side()
         original = self._read(self.original)
         meant = self.following.on_machine(original, self.original.path)
         other = self._read(self.fixed, like=original)
@@ -102,6 +103,13 @@ class Pair:
         cuts = whole(meant.machine, original, meant.trace.moves, meant=True)
         found.run(cuts, whole(meant.machine, other, done.trace.moves))
         return found, (meant.trace.messages, done.trace.messages)
+
+    def _side_by_side(self) -> SideBySide:
+        from ncfix.compensate.rounding import rounding
+        from ncfix.compensate.side_by_side import SideBySide
+
+        assert self.following.machine is not None
+        return SideBySide(self.tolerance_um / 1e3, rounding(self.following.machine))
 
     def _read(self, source: Source, like: Program | None = None) -> Program:
         """A program; if its text does not show that it is of another family, in the dialect of another one.

@@ -205,6 +205,8 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
             without += "; without what is left where it stands (NCF439)"
         lines.append(f"  tip error before    {console.error_figures(entry['error_before_um'])}{without}")
         lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
+    if entry["compensated"]:
+        lines.append(f"  rounding            up to {entry['rounding_um']:.2f} um of that are the control's digits")
     if entry["leaves"]:
         lines.append(f"  {entry['strategy']}: {entry['leaves']}")
     return lines

@@ -37,7 +37,7 @@ def verify(
 ) -> int:
     """Compare what this machine cuts with FIXED with what ORIGINAL means, along the whole path.
 
-    Exit code 1 if the tool tip leaves the intended path by more than the tolerance.
+    Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits add.
     """
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
@@ -49,6 +49,7 @@ def verify(
             error_before_um=found.before,
             error_after_um=found.after,
             left_out_um=found.left_out,
+            rounding_um=round(found.rounding_um, 4),
             within=found.within,
             lines_beyond=found.beyond,
             lines_not_reached=found.not_reached,
@@ -64,15 +65,16 @@ def said(found: Compared, tolerance_um: float) -> Iterator[str]:
     """What was found, for people."""
     yield f"tip error before: {console.error_figures(found.before)}"
     yield f"tip error after:  {console.error_figures(found.after)}"
-    if found.left_out["max"] > max(tolerance_um, found.after["max"]):
+    if found.left_out["max"] > max(tolerance_um + found.rounding_um, found.after["max"]):
         yield f"intended path not reached: {console.error_figures(found.left_out)} of the original"
     if found.unseen:
         yield f"not looked at: {lines_said(found.unseen)} of the original; where they cut is not known"
+    limits = f"{tolerance_um:g} um and {found.rounding_um:.2f} um of the control's digits"
     if found.within:
-        yield f"within {tolerance_um:g} um"
+        yield f"within {limits}"
         return
     of = "" if found.beyond else " of the original"
-    yield f"NOT within {tolerance_um:g} um: {lines_said(found.beyond or found.not_reached)}{of}"
+    yield f"NOT within {limits}: {lines_said(found.beyond or found.not_reached)}{of}"
     for axis, lines in found.left.items():
         where = f"{lines_said(lines)} of the original"
         yield f"along {axis} nothing can be corrected in {where}: the program has not said where {axis} stands there"

@@ -13,8 +13,8 @@ from ncfix.compensate.left import Left
 from ncfix.diagnostics import Message, Place
 from ncfix.program.moves import Kind, Moves, Rule
 
-CLEARLY = 1.5
-"""What is left is said to be beyond the tolerance from that many times on: below, it may be the control's digits."""
+SEEN_UM = 0.001
+"""By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,7 @@ class FixReport:
     """What was done to one program, as figures.
 
     error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
+    rounding_um  what the control's digits may add to the path that was planned
     left    axes that had to stay where they stand, since the program has not said where that is
     """
 
@@ -96,6 +97,7 @@ class FixReport:
     strategy: str = ""
     leaves: str = ""
     left: tuple[Left, ...] = ()
+    rounding_um: float = 0.0
 
     def as_dict(self) -> dict[str, object]:
         """The per-file object of `fix --json`."""
@@ -111,6 +113,7 @@ class FixReport:
             "max_correction_um": self.max_correction_um,
             "error_before_um": dict(self.error_before_um),
             "error_after_um": dict(self.error_after_um),
+            "rounding_um": round(self.rounding_um, 4),
             "strategy": self.strategy,
             "leaves": self.leaves,
             "left_where_it_stands": [left.as_dict() for left in self.left],
@@ -120,11 +123,14 @@ class FixReport:
 
 
 def with_what_is_left(report: FixReport, tolerance_um: float) -> FixReport:
-    """The report with a warning (NCF416) if more is left at the tool tip than the tolerance allows."""
+    """The report with a warning (NCF416) if more is left at the tool tip than tolerance and rounding allow."""
     left, line = report.error_after_um.get("max"), report.error_after_um.get("where")
-    if left is None or left <= CLEARLY * tolerance_um:
+    if left is None or left <= tolerance_um + report.rounding_um + SEEN_UM:
         return report
-    text = f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um"
+    text = (
+        f"{left:.2f} um are left here at the tool tip, more than the tolerance of {tolerance_um:g} um "
+        f"and the {report.rounding_um:.2f} um of the control's digits"
+    )
     hint = "the reason is a motion near it that is not corrected, or that the control works out by itself"
     warning = Message("NCF416", text, Place(report.path, int(line or 0)), hint)
     return replace(report, warnings=(*report.warnings, warning))

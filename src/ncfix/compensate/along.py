@@ -36,10 +36,10 @@ Some = TypeVar("Some", bound=Samples)
 class Along:
     """Errors along a path; of as many parts as there may be, the same.
 
-    limit   mm; where the error is larger is noted
+    limit   mm; where the error is larger is noted; may become larger
     max     mm; NaN once one is not known
     where   the line of the largest
-    beyond  lines with errors beyond the limit, by parts; some twice
+    beyond  lines with errors beyond the limit, and the largest there, by parts; some twice
     """
 
     limit: float = np.inf
@@ -49,7 +49,7 @@ class Along:
     way: float = 0.0
     plain_squares: float = 0.0
     count: int = 0
-    beyond: list[Index] = field(default_factory=list)
+    beyond: list[tuple[Index, Array]] = field(default_factory=list)
 
     def add(self, lines: Index, error: Array, weight: Array) -> None:
         """Add errors (k,) mm in lines (k,), with the way (k,) that each stands for."""
@@ -64,8 +64,10 @@ class Along:
         self.plain_squares = _added(self.plain_squares, squares)
         self.count += len(error)
         if self.max > self.limit:
-            beyond = lines[error > self.limit]
-            self.beyond.append(beyond[np.diff(beyond, prepend=-1) != 0])
+            over = np.flatnonzero(error > self.limit)
+            first = np.flatnonzero(np.diff(lines[over], prepend=-1))
+            if over.size:
+                self.beyond.append((lines[over[first]], np.maximum.reduceat(error[over], first)))
 
     @classmethod
     def of(cls, errors: Iterable[Samples]) -> Along:
@@ -90,7 +92,7 @@ class Along:
     @property
     def lines_beyond(self) -> list[int]:
         """The lines with errors beyond the limit, in order."""
-        return lines_of(self.beyond)
+        return lines_of([lines[error > self.limit] for lines, error in self.beyond])
 
 
 def lines_of(parts: list[Index]) -> list[int]:

@@ -1,4 +1,4 @@
-"""How the tolerance is shared out: rounding to the control's digits, sampling, and what is left for the path."""
+"""Two accounts: what was asked of the path before rounding, and what rounding to the control's digits does on top."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Closure:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """A path tolerance and the part of it that rounding takes.
+    """A path tolerance, and what rounding does besides.
 
-    tolerance  what was asked for, mm
+    tolerance  what was asked of the path before rounding, mm
     rounding   how far the tip may be off because commands are rounded: the norm of half output steps, mm
     """
 
@@ -38,10 +38,10 @@ class Budget:
 
     @property
     def path(self) -> float:
-        """What the path between emitted points may use: what rounding leaves, but at least half of the tolerance."""
-        return (1 - SAMPLED) * max(self.tolerance - self.rounding, self.tolerance / 2)
+        """What the path between emitted points may use."""
+        return (1 - SAMPLED) * self.tolerance
 
     @property
-    def met(self) -> bool:
-        """Whether path and rounding together stay within the tolerance."""
+    def fine(self) -> bool:
+        """Whether the control's digits are fine enough for such a tolerance."""
         return self.rounding <= self.tolerance / 2

@@ -55,8 +55,8 @@ CODES = {
     ),
     "NCF409": Code(
         "the control's digits are too coarse for the tolerance",
-        "Commands are rounded to what the control resolves. That alone may move the tool tip by more than half of the "
-        "tolerance, so the tolerance cannot be promised.",
+        "Commands are rounded to what the control resolves. That comes on top of the tolerance, and alone may move the "
+        "tool tip by more than half of it.",
         "Ask for a larger tolerance, or set `least_increment` in the machine file if the control resolves more.",
     ),
     "NCF410": Code(
@@ -95,7 +95,7 @@ CODES = {
     "NCF416": Code(
         "more is left than the tolerance",
         "The program was corrected, and the simulation of the result shows a place where the tool tip is farther off "
-        "than `--tolerance-um`. Where motions are passed by rule or refused, those beside them begin or end on them; "
+        "than `--tolerance-um` and the control's digits allow. Where motions are passed by rule or refused, those beside them begin or end on them; "
         "depths and retract planes of some cycles stay as they are.",
         "`ncfix verify` looks along the whole path and says where; a larger tolerance makes the warning go away, not "
         "the error.",

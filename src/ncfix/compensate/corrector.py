@@ -130,7 +130,7 @@ class Corrector:
         settled = course.settled(plain)
         _check(differences(settled, self._read_again(text, part, plain.splices)))
         tally = Tally(self.machine.least_increment[0])
-        tally.add_plain(part.program, settled, largest_shift(course, plain))
+        tally.add_plain(part.program, settled, largest_shift(course, plain), course.intent)
         if self.task.options.verify:
             _note(tally, figures(course, plain, self.task.options.split_rapids), part.program, moves)
         return Done(text, tally, part.program.first_line + part.program.lines_ended)
@@ -160,7 +160,7 @@ class Corrector:
         own[:1] = unit.head is None
         self._prove(text, settled, own, unit)
         tally = Tally(self.machine.least_increment[0])
-        tally.add(part.program, settled, own, increments(self.machine))
+        tally.add(part.program, settled, own, self.machine)
         if task.options.verify:
             self._look(part, settled, own, unit, tally)
         return Done(text, tally, part.program.first_line + part.program.lines_ended)

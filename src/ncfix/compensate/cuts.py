@@ -15,6 +15,7 @@ from ncfix.compensate.direction import Signs, matters
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.intent import Intent
+from ncfix.compensate.rounding import rounding_of_arcs
 from ncfix.compensate.simulation import actual_tip, unseen
 from ncfix.compensate.stretches import Stretches
 from ncfix.compensate.task import Task
@@ -40,6 +41,7 @@ class Cut:
     unseen    lines of motions that cut nobody knows where
     left      linear axis -> lines of motions that cannot be corrected along it
     last      nothing comes after it
+    rounding  how far the tip may be off because numbers are rounded to the control's digits, mm
     sides     (n, n_axes) of the play on which axes are after each motion, those that do not count, too, if there is any
     """
 
@@ -49,6 +51,7 @@ class Cut:
     unseen: Index
     left: dict[str, Index]
     last: bool
+    rounding: float
     bodies: Bodies | None = None
 
     @classmethod
@@ -78,7 +81,8 @@ class Cut:
         intended = in_lines(Curve.through(stretches, intent.tip)) if meant else None
         flank = Flank.of(bodies, actual).taken(counted(actual)) if bodies else None
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
-        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, bodies)
+        digits = rounding_of_arcs(intent.machine, np.nan_to_num(intent.moves.sweep[rows]))
+        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, digits, bodies)
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:

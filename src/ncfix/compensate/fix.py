@@ -17,15 +17,17 @@ from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_l
 from ncfix.compensate.double import numbers_at_the_beginning, suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
+from ncfix.compensate.intent import Intent
 from ncfix.compensate.left import left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
+from ncfix.compensate.rounding import rounding_along
 from ncfix.compensate.rows import lengths
 from ncfix.compensate.settle import Settled, increments, settle
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.diagnostics import RefusedError
-from ncfix.machine import Machine
+from ncfix.machine import Machine, State
 from ncfix.program import stamp
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves, Trace
@@ -86,7 +88,7 @@ def fix_program(
     errors = _errors(on_machine, proof.settled, options.split_rapids) if options.verify else None
     if errors is not None:
         _check_sane(program, proof.settled, errors)
-    report = _report(program, machine, followed, proof.settled, errors, options)
+    report = _report(program, on_machine, followed, proof.settled, errors, options)
     report = replace(report, warnings=(*suspicion, *report.warnings))
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
@@ -193,6 +195,7 @@ def _report(
         strategy=options.strategy,
         leaves=get_strategy(options.strategy).leaves,
         left=left,
+        rounding_um=rounding_along(Intent(machine, moves, State()), settled.plan.pieces) * 1e3,
     )
     return with_what_is_left(report, options.tolerance_um)
 

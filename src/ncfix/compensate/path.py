@@ -39,7 +39,7 @@ from ncfix.program.moves import Kind, Moves, Rule
 class Demands:
     """What the corrected program has to meet.
 
-    budget        the tolerance, and what rounding takes of it
+    budget        the tolerance, and what rounding does besides
     closure       what the control accepts as an arc
     split_rapids  the tolerance holds along rapids too
     arc_pieces    an arc may be made of several arcs
@@ -67,7 +67,8 @@ def plan(
 ) -> Plan:
     """Correct the motions of a program.
 
-    tolerance_mm  how far the tool tip may leave the intended path, at the emitted points and between them
+    tolerance_mm  how far the tool tip may leave the intended path, at the emitted points and between them, before
+                  rounding
     closure       what the control accepts as an arc; half of it is used
     keep          (n,) motions to leave as they are, besides those that the tracer does not allow to correct
     state         what else the errors depend on: `inputs`, numbers or one number per motion
@@ -241,8 +242,8 @@ def _remarks(
     if over.size:
         remarks.append(not_split(over, deviation[over]))
     done = np.flatnonzero(~kept)
-    if not budget.met and done.size:
-        text = "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um"
+    if not budget.fine and done.size:
+        text = "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, beyond the tolerance"
         remarks.append(Finding("NCF409", done[:1], np.array([budget.rounding * 1e3]), text))
     held = done[~oriented[done]]
     if strategy.corrects_orientation and held.size:

@@ -29,10 +29,11 @@ from ncfix.compensate.partition import Part
 from ncfix.compensate.path import Demands, in_pieces, not_split
 from ncfix.compensate.plain_poses import Poses
 from ncfix.compensate.ragged import distinct, offsets, owners, places
+from ncfix.compensate.rounding import rounding
 from ncfix.compensate.rows import extent, lengths, picked, some
 from ncfix.compensate.sampling import passed
 from ncfix.compensate.segments import Segments
-from ncfix.compensate.settle import Settled, rounding
+from ncfix.compensate.settle import Settled
 from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.compensate.units import Unit
 from ncfix.machine import Machine, State
@@ -113,7 +114,7 @@ class Planner:
         """For a machine and options; None if these need the long way."""
         strategy = get_strategy(options.strategy)
         budget = Budget(options.tolerance_mm, rounding(machine))
-        able = strategy.follows_path and not strategy.corrects_orientation and budget.met
+        able = strategy.follows_path and not strategy.corrects_orientation and budget.fine
         if not able or matters(machine) or machine.inputs or machine.bow is None or machine.linear_ways is None:
             return None
         demands = Demands(budget, Closure(), options.split_rapids, arc_pieces=False)

@@ -23,6 +23,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.limits import findings, led_astray
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.path import plan
+from ncfix.compensate.rounding import rounding
 from ncfix.compensate.rows import picked
 from ncfix.compensate.strategies import get_strategy
 from ncfix.machine import Machine, State
@@ -35,8 +36,6 @@ from ncfix.program.second_reading import SecondReading
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
-ARM_CHANGE_MM = 5.0
-"""By so much the arm between a rotary axis and the tip may change along a piece without being felt."""
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
 
@@ -194,16 +193,6 @@ def increments(machine: Machine) -> Array:
     return np.where(machine.rotary, rotary, linear)
 
 
-def rounding(machine: Machine, turns: bool = False) -> float:
-    """How far the tip may be off because numbers are rounded, mm: the norm of half output steps of the linear axes.
-
-    turns  rotary words are rewritten too: X Y Z take up their rounding where a piece ends, but in between the arm is
-           another by some mm
-    """
-    linear = 0.5 * machine.least_increment[0] * np.sqrt(np.count_nonzero(~machine.rotary))
-    return float(linear + (0.5 * machine.least_increment[1] * ARM_CHANGE_MM if turns else 0.0))
-
-
 def _planned(
     dialect: Dialect,
     moves: Moves,
@@ -213,15 +202,14 @@ def _planned(
     state: State,
     before: Array | None,
 ) -> Plan:
-    strategy = get_strategy(options.strategy)
     return plan(
         machine,
         moves,
-        strategy,
+        get_strategy(options.strategy),
         options.tolerance_mm,
         Closure(dialect.closure_mm, dialect.closure_relative),
         kept,
-        rounding_mm=rounding(machine, strategy.corrects_orientation),
+        rounding_mm=rounding(machine),
         split_rapids=options.split_rapids,
         state=state,
         before=before,

@@ -164,11 +164,13 @@ class Match:
 class SideBySide:
     """Two programs on their way, and what was found so far.
 
-    limit        mm: the tolerance
+    tolerance    of the path before rounding, mm
+    rounding     what the control's digits may add to it, mm; arcs that are met make it more
     unseen, left as `Cut` has them, of the original, by parts
     """
 
-    limit: float
+    tolerance: float
+    rounding: float
     unseen: list[Index] = field(default_factory=list)
     left: dict[str, list[Index]] = field(default_factory=dict)
     intended: Track = field(default_factory=Track.empty)
@@ -182,6 +184,11 @@ class SideBySide:
             Match(self.fixed, self.intended, self.limit, Along(self.limit)),
             Match(self.intended, self.fixed, self.limit, Along(self.limit)),
         )
+
+    @property
+    def limit(self) -> float:
+        """How far the tip may be off, mm."""
+        return self.tolerance + self.rounding
 
     @property
     def lines_unseen(self) -> list[int]:
@@ -202,6 +209,8 @@ class SideBySide:
             else:
                 self._take_other(next(other, None))
             self._go_on()
+        for match in self.matches[1:]:
+            match.along.limit = self.limit
         self._check_alike()
 
     def _check_alike(self) -> None:
@@ -226,6 +235,7 @@ class SideBySide:
             self.fixed.complete = True
         else:
             self.fixed.add(cut.actual, cut.last, cut.flank)
+            self.rounding = max(self.rounding, cut.rounding)
 
     def _go_on(self) -> None:
         for match in self.matches:

@@ -6,18 +6,20 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.double import Numbers, numbers_at_the_beginning, together
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import largest_correction, refusals
+from ncfix.compensate.intent import Intent
 from ncfix.compensate.left import Left, joined, left_where_they_stand
 from ncfix.compensate.notes import Notes
 from ncfix.compensate.options import FixOptions
-from ncfix.compensate.settle import Settled
+from ncfix.compensate.rounding import rounding_along
+from ncfix.compensate.settle import Settled, increments
 from ncfix.compensate.verify import Figures, PathError
 from ncfix.diagnostics import Message
+from ncfix.machine import Machine, State
 from ncfix.program.moves import Moves
 from ncfix.program.tree import Program
 
@@ -53,6 +55,7 @@ class Tally:
     """What has been done to the parts so far.
 
     step     of the control's digits, mm
+    rounding what these add to the path at most, mm
     numbers  those in the first lines, by which a program is known that was corrected before
     """
 
@@ -64,6 +67,7 @@ class Tally:
     inserted: int = 0
     changed: bool = False
     largest: float = 0.0
+    rounding: float = 0.0
     way: float = 0.0
     before: Side = field(default_factory=Side)
     after: Side = field(default_factory=Side)
@@ -73,13 +77,10 @@ class Tally:
     left: dict[str, Left] = field(default_factory=dict)
     numbers: Numbers = field(default_factory=dict)
 
-    def add(self, program: Program, settled: Settled, own: Mask, steps: NDArray[np.float64]) -> None:
-        """Take in a part.
-
-        own    (n,) motions that were not the last of the part before
-        steps  (n_axes,) what the control resolves, mm and rad
-        """
-        moves = settled.moves
+    def add(self, program: Program, settled: Settled, own: Mask, machine: Machine) -> None:
+        """Take in a part; `own` (n,) motions that were not the last of the part before."""
+        moves, steps = settled.moves, increments(machine)
+        self.rounding = max(self.rounding, rounding_along(Intent(machine, moves, State()), settled.plan.pieces, own))
         self.left = joined(self.left, left_where_they_stand(program, settled, steps, own))
         account = Account.of(moves, settled.kept, settled.reasons)
         theirs = set(moves.block[~own].tolist())
@@ -95,11 +96,12 @@ class Tally:
         for finding in settled.plan.findings:
             self.found.add(finding, program, moves, own)
 
-    def add_plain(self, program: Program, settled: Settled, largest: float) -> None:
+    def add_plain(self, program: Program, settled: Settled, largest: float, intent: Intent) -> None:
         """Take in a part of dwells and motions that were corrected, each in a block of its own.
 
         largest  shift of a linear command, mm
         """
+        self.rounding = max(self.rounding, rounding_along(intent, settled.plan.pieces))
         self.moves += len(settled.moves)
         self.compensated += int(np.count_nonzero(~settled.kept))
         self.inserted += settled.emission.added_blocks
@@ -118,6 +120,7 @@ class Tally:
         self.inserted += other.inserted
         self.changed |= other.changed
         self.largest = max(self.largest, other.largest)
+        self.rounding = max(self.rounding, other.rounding)
         self.way += other.way
         self.before.take(other.before)
         self.after.take(other.after)
@@ -158,5 +161,6 @@ class Tally:
             strategy=options.strategy,
             leaves=leaves,
             left=tuple(self.left.values()),
+            rounding_um=self.rounding * 1e3,
         )
         return with_what_is_left(report, options.tolerance_um)
