@@ -106,7 +106,7 @@ def test_faults_of_millimetres_are_found_in_any_parts(verify: Any, corrected: li
     if change == "exchanged":
         wrong[place : place + 2] = wrong[place : place + 2][::-1]
     if change == "said too early":
-        wrong.insert(place - 2, wrong[place])
+        wrong.insert(place - 1, wrong[place + 1])
     if change == "ends early":
         wrong[-6:-3] = []
     whole = verify(1 << 20, lines(), wrong)

@@ -95,8 +95,8 @@ CODES = {
     "NCF416": Code(
         "more is left than the tolerance",
         "The program was corrected, and the simulation of the result shows a place where the tool tip is farther off "
-        "than `--tolerance-um` and the control's digits allow. Where motions are passed by rule or refused, those beside them begin or end on them; "
-        "depths and retract planes of some cycles stay as they are.",
+        "than `--tolerance-um` and the control's digits allow. Where motions are passed by rule or refused, those "
+        "beside them begin or end on them; depths and retract planes of some cycles stay as they are.",
         "`ncfix verify` looks along the whole path and says where; a larger tolerance makes the warning go away, not "
         "the error.",
     ),

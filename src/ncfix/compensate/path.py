@@ -243,7 +243,9 @@ def _remarks(
         remarks.append(not_split(over, deviation[over]))
     done = np.flatnonzero(~kept)
     if not budget.fine and done.size:
-        text = "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, beyond the tolerance"
+        text = (
+            "rounding to the control's digits alone moves the tool tip by up to {value:.2f} um, on top of the tolerance"
+        )
         remarks.append(Finding("NCF409", done[:1], np.array([budget.rounding * 1e3]), text))
     held = done[~oriented[done]]
     if strategy.corrects_orientation and held.size:
