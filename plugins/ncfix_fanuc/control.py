@@ -150,6 +150,10 @@ class Fanuc(Control):
         """Records that do not fit, values beyond the range, and a CSV that says something else."""
         return tuple(message for remarks in _read(files)[2] for message in remarks.messages)
 
+    def knows(self, name: str, content: bytes) -> bool:
+        """Records of the grid as ncfix writes them."""
+        return name.lower() in (NAME, TABLE) or (content.lstrip()[:1] == b"{" and b'"start_no"' in content)
+
 
 def _read(files: Files) -> tuple[Volc | None, Backlash, list[Remarks]]:
     volc, remarks = read_volc(files)

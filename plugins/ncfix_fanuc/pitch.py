@@ -13,10 +13,21 @@ from ncfix.diagnostics import Message
 from ncfix.tables.axes import DEGREE, TURNING, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.least import of_own_axis
+from ncfix.tables.lines import Remarks
 from ncfix.tables.neutral import Compensation
 from ncfix_fanuc.increments import at_zero, curves, pitch_of
 from ncfix_fanuc.pitch_reading import PARAMETERS, SETTINGS, read_pitches
-from ncfix_fanuc.pitch_text import MOST, NUMBERS, Pitch, parameter_text, pitch_text
+from ncfix_fanuc.pitch_text import (
+    MOST,
+    NUMBERS,
+    Pitch,
+    is_increments,
+    is_records,
+    parameter_text,
+    pitch_text,
+    read_increments,
+    read_records,
+)
 from ncfix_fanuc.units import UNITS, sense_of, sign_option, units_of
 
 FIRST_NUMBER = 1
@@ -110,6 +121,20 @@ class FanucPitch(Control):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Values beyond the range, point numbers that do not fit, turns that do not close."""
         return tuple(message for each in read_pitches(files)[1] for message in each.messages)
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """Increments by point number, or records of parameters."""
+        return is_increments(content) or is_records(content)
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same; without what ncfix writes of sign and units, every file by itself."""
+        if SETTINGS in files:
+            return self.lint(files)
+        found = []
+        for name, content in sorted(files.items()):
+            found.append(Remarks.of(name, content, "#"))
+            read_increments(found[-1]) if is_increments(content) else list(read_records(found[-1]))
+        return tuple(message for each in found for message in each.messages)
 
 
 def _said(pitch: Pitch, units: tuple[float, float]) -> str:

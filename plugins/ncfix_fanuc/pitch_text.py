@@ -61,6 +61,18 @@ def pitch_text(pitch: Pitch) -> bytes:
     return "".join(f"{row}\n" for row in [note, HEAD, *rows]).encode()
 
 
+def is_increments(content: bytes) -> bool:
+    """Whether a file holds increments by point number."""
+    rows = (row.split("#", 1)[0].replace(" ", "").lower() for row in content.decode("latin-1").splitlines())
+    return next((row for row in rows if row.strip()), "") == HEAD
+
+
+def is_records(content: bytes) -> bool:
+    """Whether a file is of records between two lines with %, as parameters are punched."""
+    rows = [row.strip() for row in content.decode("latin-1").split("\n") if row.strip()]
+    return len(rows) > 1 and rows[0] == "%" and bool(RECORD.fullmatch(rows[1]) or PLAIN.fullmatch(rows[1]))
+
+
 def read_increments(remarks: Remarks) -> tuple[int, NDArray[np.int64]]:
     """The number of the first point, and the increments."""
     rows = [(line, row) for line, row in enumerate(remarks.rows, 1) if row.split("#", 1)[0].strip()]

@@ -16,12 +16,13 @@ from typing import ClassVar
 import numpy as np
 
 from ncfix.diagnostics import Message, RefusedError
+from ncfix.machine import Machine
 from ncfix.tables.axes import DEGREE, in_order
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import Mesh
-from ncfix.tables.neutral import NOTHING, Compensation
+from ncfix.tables.neutral import NOTHING, Compensation, Tables
 from ncfix.tables.poses import corners
 from ncfix.tables.residual import residual
 from ncfix.tables.reversal import reversal_note
@@ -208,6 +209,15 @@ class FanucRotary(Control):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """Records that do not fit, and values beyond the range."""
         return tuple(message for remarks in _read(files)[2] for message in remarks.messages)
+
+    def reached(self, machine: Machine, tables: Tables) -> str:
+        """Without a lattice over rotary axes, nothing that they do is in it."""
+        both = isinstance(tables, Turning) and tables.table is not None
+        return self.reaches if both else "L-VOL"
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """Records of lengths and angles as ncfix writes them."""
+        return content.lstrip()[:1] == b"{" and b'"lin"' in content
 
 
 def _read(files: Files) -> tuple[list[Lattice], Backlash, list[Remarks]]:

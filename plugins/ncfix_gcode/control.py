@@ -20,6 +20,7 @@ from ncfix.tables.control import Control, Files, Option, Properties, Request, Wr
 from ncfix.tables.exact import exact_correction
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
+from ncfix.tables.neutral import Tables
 
 MACHINE, HOW = "machine.toml", "fix.toml"
 
@@ -105,6 +106,10 @@ class Gcode(Control):
         tolerance = _tolerance(settings["tolerance_um"])
         how = f'strategy = "{strategy.name}"\ntolerance_um = {tolerance:g}\n'
         return Written({MACHINE: dumps(request.machine).encode(), HOW: how.encode()}, (strategy.leaves,))
+
+    def reached(self, machine: Machine, tables: Tables) -> str:
+        """Of rotary axes only where there are some; an orientation that only they could put right, too."""
+        return self.reaches if machine.rotary.any() else "L-VOL"
 
     def read(self, files: Files) -> Rewriting:
         """How programs are rewritten. Raises `ConfigError` NCF491."""

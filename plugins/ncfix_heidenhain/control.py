@@ -6,6 +6,7 @@ is named after is moved as a function of the axis in whose column of the `.CMA` 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
@@ -25,6 +26,7 @@ from ncfix_heidenhain.com import Com, nck_text, old_text, read_com
 
 MOST = 256
 """Entries of a file of the older controls; of the newer ones no number is public."""
+TABLES = re.compile(rb"\s*BEGIN[ \t]+\S+\.(?:COM|CMA)\b", re.IGNORECASE)
 SIGN = "sign.txt"
 SIGNS = ("error", "correction")
 LARGEST = 9.9999
@@ -142,6 +144,19 @@ class Heidenhain(Control):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would misread, and what is rarely meant."""
         return tuple(message for each in self._read(files)[1] for message in each.messages)
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """A `.COM` or a `.CMA`, by the name in its first line."""
+        return TABLES.match(content) is not None
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same without the sign, and `.COM` files by themselves if there is no `.CMA`."""
+        configs = [name for name in files if name.lower().endswith(".cma")]
+        if SIGN in files:
+            return self.lint(files)
+        remarks = [read_cma(files)[2]] if configs else []
+        remarks += [read_com(name, content)[1] for name, content in sorted(files.items()) if name not in configs]
+        return tuple(message for each in remarks for message in each.messages)
 
     def _read(self, files: Files) -> tuple[list[Term], list[Remarks]]:
         axes, tables, config = read_cma(files)

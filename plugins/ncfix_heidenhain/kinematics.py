@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -13,7 +14,7 @@ from ncfix.tables.axes import DEGREE, in_order, unit_of
 from ncfix.tables.control import Assumption, Control, Files, Option, Properties, Request, Written
 from ncfix.tables.grid import Array, Grid
 from ncfix.tables.lines import Remarks
-from ncfix.tables.neutral import Compensation, Term
+from ncfix.tables.neutral import Compensation, Tables, Term
 from ncfix.tables.reversal import reversal_note
 from ncfix.tables.settings import one_of, whole
 from ncfix_heidenhain.chain import LETTERS, Kinematics, Row, kinematics_text, over_limits, read_rows
@@ -24,6 +25,7 @@ from ncfix_heidenhain.described import Component, component, rows
 
 TABLE = "kinematics.tab"
 UNITS = "units.txt"
+CHAIN = re.compile(rb"(?im)^[ \t]*NR\b.*\bCOMPTAB\b")
 ANGLES = {"deg": DEGREE, "rad": 1.0}
 
 
@@ -146,6 +148,23 @@ class KinematicsComp(Control):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would misread, and what is rarely meant."""
         return tuple(message for each in self._read(files)[1] for message in each.messages)
+
+    def reached(self, machine: Machine, tables: Tables) -> str:
+        """Without a rotary axis in the chain there is nothing of theirs in it."""
+        return self.reaches if machine.rotary.any() else "L-VOL"
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """A kinematics table with columns of compensation tables."""
+        return CHAIN.search(content) is not None
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """Kinematics tables by themselves."""
+        if UNITS in files:
+            return self.lint(files)
+        remarks = [Remarks.of(name, content) for name, content in sorted(files.items())]
+        for each in remarks:
+            read_rows(each, files[each.path])
+        return tuple(message for each in remarks for message in each.messages)
 
     def _read(self, files: Files) -> tuple[Kinematics, list[Remarks]]:
         axes, tables, config = read_cma(files)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -21,6 +22,7 @@ TAIL = {
 }
 FORMAT = "ISG_CSV"
 MOST_FILES = 10
+LIST = re.compile(rb"(?im)^[ \t]*(?:workpiece_axes|file(?:_format)?\[\d+\])[ \t]")
 
 
 def config_text(numbers: Mapping[str, int], folder: str, names: Sequence[str], filter_steps: int) -> bytes:
@@ -43,6 +45,11 @@ class Configuration:
 
     files: tuple[str, ...] = ()
     numbers: Mapping[str, str] = field(default_factory=dict)
+
+
+def is_list(content: bytes) -> bool:
+    """Whether a file is the list of VOLCOMP: it names files of grids, or how axes lie."""
+    return LIST.search(content) is not None and MARK not in content
 
 
 def read_configuration(files: Files) -> tuple[Configuration, Remarks]:

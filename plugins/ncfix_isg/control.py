@@ -24,9 +24,9 @@ from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import Reversal, reversal_note, reversals
 from ncfix.tables.settings import one_of, whole, wrong
 from ncfix.tables.volume import Volume, inputs_that_matter
-from ncfix_isg.configuration import LETTERS, config_text, read_configuration
-from ncfix_isg.csv_file import grid_text, parameters, read_grids
-from ncfix_isg.leadscrew import MOST, NAME, list_text, read_leadscrews
+from ncfix_isg.configuration import LETTERS, config_text, is_list, read_configuration
+from ncfix_isg.csv_file import grid_text, is_grid, parameters, read_grids
+from ncfix_isg.leadscrew import MARK, MOST, NAME, list_text, read_leadscrews
 
 TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
@@ -164,6 +164,18 @@ class Isg(Control):
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What the control would report, and what is rarely meant."""
         _, remarks = self._read(files)
+        return tuple(message for each in remarks for message in each.messages)
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """A list of VOLCOMP or of a leadscrew, or a table whose head names positions, then errors."""
+        return MARK in content or is_list(content) or is_grid(content)
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same; grids and lists of axes by themselves if no list of VOLCOMP names them."""
+        if any(is_list(content) for content in files.values()):
+            return self.lint(files)
+        grids = sorted(name for name, content in files.items() if is_grid(content))
+        remarks = [*read_grids(grids, LETTERS, files)[1], *read_leadscrews(files, None)[1]]
         return tuple(message for each in remarks for message in each.messages)
 
     def _read(self, files: Files) -> tuple[Compensation, list[Remarks]]:

@@ -15,6 +15,8 @@ from ncfix_isg.configuration import LETTERS
 
 PARAMETER = re.compile(r"E[XYZABC]0?[XYZABC]")
 POSITION = re.compile(r"E([XYZ])([XYZABC])")
+HEAD_LINES = 100
+"""Among which the names are looked for."""
 LARGE = 1.0
 """mm: no machine is that wrong; most likely the unit is."""
 STEEP = 0.01
@@ -44,6 +46,13 @@ def grid_text(grid: Grid, owner: str = "") -> bytes:
 
 def _six(values: Sequence[float]) -> list[str]:
     return [f"{value:.6f}" for value in values]
+
+
+def is_grid(content: bytes) -> bool:
+    """Whether the first line that is no comment names positions, then errors."""
+    parts = _parts(content.decode("latin-1").splitlines()[:HEAD_LINES])
+    words = [word.upper() for word in parts[0][0][1]] if parts else []
+    return len(words) > 1 and words[0] in LETTERS and PARAMETER.fullmatch(words[-1]) is not None
 
 
 def read_grids(names: Sequence[str], axes: Collection[str], files: Files) -> tuple[list[Grid], list[Remarks]]:

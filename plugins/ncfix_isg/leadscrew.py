@@ -51,8 +51,11 @@ def list_text(reversal: Reversal, number: int) -> bytes:
     return "".join(f"{name:<32}{value}\n" for name, value in entries.items()).encode()
 
 
-def read_leadscrews(files: Files, numbers: Mapping[str, str]) -> tuple[list[Term], list[Remarks]]:
-    """What the axis lists among the files do, with remarks on each; numbers: axis -> number in VOLCOMP's list."""
+def read_leadscrews(files: Files, numbers: Mapping[str, str] | None) -> tuple[list[Term], list[Remarks]]:
+    """What the axis lists among the files do, with remarks on each.
+
+    numbers: axis -> number in VOLCOMP's list; None if there is none.
+    """
     terms: list[Term] = []
     remarks = []
     for name, content in sorted(files.items()):
@@ -71,7 +74,7 @@ def bare(row: str) -> str:
     return NOTE.sub("", row)
 
 
-def _terms(remarks: Remarks, numbers: Mapping[str, str]) -> Iterator[Term]:
+def _terms(remarks: Remarks, numbers: Mapping[str, str] | None) -> Iterator[Term]:
     entries = _entries(remarks)
     axis = _axis(remarks, entries, numbers)
     for name, (default, allowed) in HEAD.items():
@@ -103,10 +106,12 @@ def _entries(remarks: Remarks) -> dict[str, tuple[int, str]]:
     return found
 
 
-def _axis(remarks: Remarks, entries: Mapping[str, tuple[int, str]], numbers: Mapping[str, str]) -> str:
+def _axis(remarks: Remarks, entries: Mapping[str, tuple[int, str]], numbers: Mapping[str, str] | None) -> str:
     """The letter of the axis: the name may say more than that, `Y-ACHSE`, and the number decides."""
     line, name = entries.get("kopf.log_achs_name", (0, ""))
     axis = name[:1].upper() if LETTER.fullmatch(name) else ""
+    if numbers is None:
+        return axis
     if axis not in numbers or axis not in "XYZ":
         remarks.refuse(line, f"kopf.log_achs_name is {name or 'missing'}", "a linear axis of the configuration list")
     line, number = entries.get("kopf.achs_nr", entries.get("kopf.log_achs_nr", (0, "")))

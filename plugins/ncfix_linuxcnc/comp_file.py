@@ -95,6 +95,39 @@ def read_joints(files: Files) -> tuple[list[Joint], list[Remarks]]:
     return joints, remarks
 
 
+LOADS = re.compile(rb"(?im)^[ \t]*COMP_FILE[ \t]*=")
+
+
+def is_ini(content: bytes) -> bool:
+    """Whether a file is an ini file that loads tables."""
+    return LOADS.search(content) is not None
+
+
+def is_table(content: bytes) -> bool:
+    """Whether a file begins as a table does: three numbers, and nothing else, in its first line."""
+    first = content.decode("latin-1").lstrip().split("\n", 1)[0].strip()
+    match = TRIPLE.fullmatch(first)
+    return match is not None and not match[4].strip()
+
+
+def look_at(files: Files) -> list[Remarks]:
+    """Remarks on an ini file with its tables, and on tables that it does not load: of the type with less to say."""
+    inis = {name: content for name, content in files.items() if is_ini(content)}
+    found = [remarks for name in inis for remarks in read_joints({**_others(files, inis), name: inis[name]})[1]]
+    loaded = {remarks.path for remarks in found}
+    for name in _others(files, inis).keys() - loaded:
+        kinds = []
+        for measured in (False, True):
+            kinds.append(Remarks.of(name, files[name]))
+            _table(kinds[-1], 0, "X", measured, 1.0)
+        found.append(min(kinds, key=lambda remarks: (len(remarks.wrong), len(remarks.doubtful))))
+    return sorted(found, key=lambda remarks: remarks.path)
+
+
+def _others(files: Files, inis: Files) -> dict[str, bytes]:
+    return {name: content for name, content in files.items() if name not in inis}
+
+
 Entries = dict[str, tuple[int, str]]
 
 

@@ -17,7 +17,7 @@ from ncfix.tables.least import of_own_axis
 from ncfix.tables.neutral import Compensation
 from ncfix.tables.positioning import positioning
 from ncfix.tables.settings import one_of, whole, wrong
-from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, read_joints
+from ncfix_linuxcnc.comp_file import MOST, Joint, comp_text, ini_text, is_ini, is_table, look_at, read_joints
 
 
 class LinuxCnc(Control):
@@ -94,6 +94,14 @@ class LinuxCnc(Control):
         """What would stop LinuxCNC's reader early, and what is rarely meant."""
         _, remarks = read_joints(files)
         return tuple(message for each in remarks for message in each.messages)
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """An ini file that names tables, or a table: numbers by threes in the first line that has anything."""
+        return is_ini(content) or is_table(content)
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same, and of tables that no ini file loads what is wrong in them under either type."""
+        return tuple(message for each in look_at(files) for message in each.messages)
 
 
 def _joints(tables: Compensation, letters: str) -> list[Joint]:

@@ -7,6 +7,7 @@ whether factors of a product are added by themselves, too, is in no public text:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
@@ -32,6 +33,7 @@ from ncfix_siemens.reading import as_corrections, read_folder, reading_of
 from ncfix_siemens.table import Table
 
 CEC = "NC_CEC.INI"
+TABLES = re.compile(rb"(?im)^[^;\n]*\$(?:AN_CEC|AA_ENC_COMP)(?:_\w+)?[ \t]*\[")
 ROOM = 1.5
 """MD32720 as a multiple of the largest correction."""
 WORTH = 0.9
@@ -108,6 +110,15 @@ class Siemens(Control):
         folder = read_folder(files)
         _, unsaid = reading_of(folder)
         return tuple(message for each in (*folder.remarks, unsaid) for message in each.messages)
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """Assignments to values of tables."""
+        return TABLES.search(content) is not None
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """The same, but for sign, products and letters of axes, which only comments of ncfix say."""
+        folder = read_folder(files)
+        return self.lint(files) if folder.said else tuple(each for one in folder.remarks for each in one.messages)
 
 
 def _scheme(request: Request, settings: Settings) -> Scheme:

@@ -74,4 +74,10 @@ CODES = {
         "What it registered cannot be what the hook is for, and is left out; or what it returned is not what it must.",
         "Tell its author; `docs/plugins.md` says what each hook registers and what that returns.",
     ),
+    "NCF509": Code(
+        "a file of no known form",
+        "`ncfix lint` knows tables by what they hold: no control of a plugin, and none of the forms of other controls "
+        "that are known, has lines like these; or a damaged line hides which it is.",
+        "`--control NAME` says whose tables they are; `ncfix plugins` lists the controls.",
+    ),
 }

@@ -61,7 +61,7 @@ def row(name: str, machine: Machine, control: str, more: dict[str, str]) -> tupl
     sizes = [f"{figures[when]['max']:.2f} / {figures[when]['rms']:.2f}" for when in ("before", "after")]
     at = " ".join(f"{axis}{value:g}" for axis, value in figures["after"]["at"].items())
     least = f"{1e3 * made.least.value:.2f}" if made.least else ""
-    return (name, title, chosen.reaches, str(limits["tables"]), str(limits["points"]), *sizes, least, at)
+    return (name, title, made.reaches, str(limits["tables"]), str(limits["points"]), *sizes, least, at)
 
 
 def rows() -> Iterator[tuple[str, ...]]:

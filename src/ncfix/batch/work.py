@@ -39,9 +39,14 @@ def staff(name: str) -> Staff:
     known: dict[str, Staff] = registry("executors", BUILT_IN)
     if name not in known:
         raise UsageError.of("NCF015", f"there is no executor {name!r}", hint=nearest(name, known))
+    return partial(_made, name, known[name])
+
+
+def _made(name: str, make: Staff, workers: int) -> Executor:
     from concurrent.futures import Executor
 
-    return partial(called, "executors", name, known[name], gives=Executor)
+    executor: Executor = called("executors", name, make, workers, gives=Executor)
+    return executor
 
 
 def each(

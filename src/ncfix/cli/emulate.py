@@ -50,7 +50,7 @@ def emulate(
     following = Following.of(machine_path, dialect, given)
     assert following.machine is not None
     content = read_folder(folder)
-    more: dict[str, Any] = {}
+    more: dict[str, Any] = {"assumptions": chosen.described()["assumptions"]}
     with console.busy("running the tables"):
         try:
             found = emulated(chosen, content, following.machine, folder.rstrip(os.sep), other_machine)
@@ -61,7 +61,7 @@ def emulate(
             more["program"] = along(following, chosen, found.tables, made.settings, program, made.tool_length)
     found = replace(found, messages=_below(folder, found.messages, content))
     console.tell_some(found.messages)
-    tell(found, as_json, control=chosen.name, reaches=chosen.reaches, **more)
+    tell(found, as_json, control=chosen.name, reaches=found.reaches, **more)
     return ExitCode.FINDINGS if found.messages else ExitCode.DONE
 
 

@@ -99,7 +99,7 @@ def export(
             made = replace(made, files={**made.files, **rewritten_file(following, options, program)})
     write_folder(output, made, force)
     console.tell_some(made.messages)
-    tell(made, as_json, control=chosen.name, reaches=chosen.reaches, **more)
+    tell(made, as_json, control=chosen.name, reaches=made.reaches, **more)
     return ExitCode.DONE
 
 

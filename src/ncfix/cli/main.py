@@ -29,6 +29,7 @@ VERBS = {
     "diagnose": "Name the effect that the model of a machine lacks.",
     "export": "Write compensation tables for a control.",
     "emulate": "Say what the tables in a folder leave.",
+    "lint": "Say what is wrong in tables from elsewhere.",
     "report": "Put machines and results on a page.",
     "derive": "Derive the formulas of a machine and of its errors.",
     "machine": "Check or show a machine file.",

@@ -17,8 +17,9 @@ from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
 from ncfix.plugin_faults import called
 from ncfix.plugins import registry
+from ncfix.tables.classes import of_terms
 from ncfix.tables.grid import Array
-from ncfix.tables.neutral import Tables
+from ncfix.tables.neutral import Compensation, Tables
 from ncfix.tables.settings import Form
 
 Files = Mapping[str, bytes]
@@ -133,7 +134,7 @@ class Control(ABC):
 
     name         as in `ncfix export NAME`
     title        for people
-    reaches      ISO/TR 16907 class of what the tables can correct
+    reaches      ISO/TR 16907 class of what the tables can correct at best; see `reached`
     properties   of the format
     assumptions  that the files rest on
     options      `--set`
@@ -165,6 +166,22 @@ class Control(ABC):
     @abstractmethod
     def lint(self, files: Files) -> tuple[Message, ...]:
         """What is wrong or doubtful in these files, each with its place; empty if nothing is."""
+
+    def reached(self, machine: Machine, tables: Tables) -> str:
+        """The class of what was written: of sums and products of tables it shows in them, of others it is `reaches`."""
+        rotary = [axis.name for axis in machine.axes if axis.rotary]
+        return of_terms(tables, rotary) if isinstance(tables, Compensation) else self.reaches
+
+    def knows(self, name: str, content: bytes) -> bool:
+        """Whether a file from elsewhere is of a form of this control, by what it holds; see `look`."""
+        return False
+
+    def look(self, files: Files) -> tuple[Message, ...]:
+        """What is wrong or doubtful in files from elsewhere, all of forms that it knows.
+
+        There may be only some of a set, and nothing of what ncfix writes beside its own files.
+        """
+        return self.lint(files)
 
     def probe(self, request: Request) -> Written:
         """Small files that settle on the machine what must be said in options; raises `UsageError` NCF485 if none do.

@@ -40,6 +40,7 @@ class Exported:
     native  the control's own files
     files   all: also the side file and the hand-over sheet
     least   what no tables of this kind could do better, if that is known
+    reaches  the class of what was written
     """
 
     native: Files
@@ -49,6 +50,7 @@ class Exported:
     notes: tuple[str, ...]
     messages: tuple[Message, ...]
     least: Least | None = None
+    reaches: str = ""
 
     def limits(self) -> dict[str, Any]:
         """How much of what the control can hold is used."""
@@ -76,12 +78,16 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     made = _manifest(control, request, written.files)
     sheet = as_markdown(control, request, tables, left, written)
     said = {"ncfix": __version__, **control.described(), "residual_um": left.figures(), "notes": written.notes}
+    if written.least:
+        said["least_um"] = {"max": 1e3 * written.least.value, "why": written.least.why}
     more = {
         side.NAME: made.as_bytes(**said),
         f"{SHEET}.md": sheet.encode(),
         f"{SHEET}.html": as_html(sheet).encode(),
     }
-    return Exported(written.files, {**written.files, **more}, tables, left, written.notes, messages, written.least)
+    reaches = control.reached(request.machine, tables)
+    files = {**written.files, **more}
+    return Exported(written.files, files, tables, left, written.notes, messages, written.least, reaches)
 
 
 def emulate(
@@ -112,7 +118,9 @@ def emulate(
     space = ranges_of(machine, _internal(machine, made.ranges))
     left = residual(machine, tables, space, made.tool_length, poses)
     messages = (*made.changed(native, folder), *linted(control, native))
-    return Exported(native, files, tables, left, (), messages)
+    same = made.hash == machine.hash and not made.changed(native, folder)
+    notes, least = side.said(files[side.NAME]) if same else ((), None)
+    return Exported(native, files, tables, left, notes, messages, least, control.reached(machine, tables))
 
 
 def _read(control: Control, files: Files) -> Tables:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 from ncfix.diagnostics import ConfigError, Message, Place
 
+AGAIN = "export again"
+"""What helps with a file that ncfix has written."""
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 ALONE = re.compile(r"\r(?!\n)")
 BYTE_ORDER = "\u00ef\u00bb\u00bf"
@@ -48,7 +50,7 @@ class Remarks:
                 break
         return remarks
 
-    def refuse(self, line: int, text: str, hint: str = "export again") -> None:
+    def refuse(self, line: int, text: str, hint: str = AGAIN) -> None:
         """NCF491: the control would not load this, or read it otherwise than it looks."""
         self.wrong.append(Message("NCF491", text, self._place(line), hint))
 

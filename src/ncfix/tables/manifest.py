@@ -10,6 +10,7 @@ from typing import Any
 
 from ncfix.diagnostics import ConfigError, Message, Place, RefusedError
 from ncfix.machine import Machine
+from ncfix.tables.control import Least
 
 NAME = "ncfix-tables.json"
 SCHEMA = 1
@@ -66,6 +67,17 @@ def loads(data: bytes, path: str) -> Manifest:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         text = f"is not the side file of exported tables: {error}"
         raise ConfigError.of("NCF486", text, Place(path), "export again") from error
+
+
+def said(data: bytes) -> tuple[tuple[str, ...], Least | None]:
+    """What export remarked on the tables, and how little such tables could leave; nothing where it does not say so."""
+    found = json.loads(data)
+    notes, least = found.get("notes"), found.get("least_um")
+    texts = tuple(str(note) for note in notes) if isinstance(notes, list) else ()
+    try:
+        return texts, Least(float(least["max"]) / 1e3, str(least["why"])) if least else None
+    except (KeyError, TypeError, ValueError):
+        return texts, None
 
 
 def _texts(record: Mapping[str, Any]) -> dict[str, str]:

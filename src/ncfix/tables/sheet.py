@@ -21,6 +21,7 @@ CLASSES = {
     "L-ANG": "what the angular errors of linear axes do to the tip.",
     "L-VOL": "the position of the tip over all linear axes together.",
     "L-VOL+": "the same, and the direction of the tool.",
+    "R-RAX": "how far each rotary axis turns, about itself.",
     "R-VOL": "the position of the tip over linear and rotary axes together.",
     "R-VOL+": "the same, and the direction of the tool.",
 }
@@ -54,8 +55,9 @@ def _lines(control: Control, request: Request, tables: Tables, left: Residual, w
     yield f"- Machine file: {machine.hash}; the tables hold for these errors only. Made by ncfix {__version__}."
     yield f"- Tip error: max {before['max']:.2f} um, rms {before['rms']:.2f} um without the tables;"
     yield f"  max {after['max']:.2f} um, rms {after['rms']:.2f} um with them, most at {_pose(after['at'])}."
-    yield f"- Class (ISO/TR 16907): {control.reaches}. Tables: {len(tables.grids)}, points: {tables.points}."
-    yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in _words(control.reaches))
+    reached = control.reached(machine, tables)
+    yield f"- Class (ISO/TR 16907): {reached}. Tables: {len(tables.grids)}, points: {tables.points}."
+    yield from (f"- {name}: {meaning}" for name, meaning in CLASSES.items() if name in _words(reached))
     if control.any_tool:
         yield f"- They hold for tools of any length; the figures are those of {request.tool_length:g} mm."
     else:
