@@ -129,8 +129,7 @@ FLOW = [
     case("a subprogram in the text", "SUB1\nM30\n%_N_SUB1_SPF\nG1 X5 F100\nM17", L6=R),
     case("a cycle nobody knows", "HEAD_CLEAN\nG1 X5 F100\nG0 X1 Y1 Z1\nX3", L4=N, L5=R, L6=R),
     case("a block nobody understands", 'OTHER "x" 5\nG1 X5 F100', L4=N),
-    case("drilling cycle", "CYCLE81(50,0,2,-20)\nG0 X5", L3=P, L4=R),
-    case("modal drilling cycle", "MCALL CYCLE81(50,0,2,-20)\nX5 Y5\nX9\nMCALL\nG0 X1", L3=P, L4=R, L5=R, L7=R),
+    case("drilling cycle", "CYCLE81(50,0,2,-20)\nG0 X5", L3=R, L4=R),
     case(
         "a modal subprogram",
         "MCALL SUB1\nX5\nMCALL\nX7\nG0 X1 Y1 Z1\nM30\n%_N_SUB1_SPF\nG91 G1 Z-5 F100\nM17",
@@ -147,12 +146,13 @@ FLOW = [
     case("a subprogram that only the control knows", "L=R5\nG0 X1 Y1 Z1", L4=N),
     case("a modal pocket", "MCALL POCKET3(50,0,2,-20)\nX5 Y5\nMCALL\nG1 X7 F100\nG0 X1 Y1 Z1", L4=N, L6=N, L7=R),
     case("a row of holes", "HOLES1(0,0,0,10,10,5)\nG0 X5 Y5 Z5", L3=N, L4=R),
-    case("holes on a circle", "MCALL CYCLE81(50,0,2,-5)\nHOLES2(0,0,9,0,0,5)\nMCALL\nG0 X5 Y5 Z5", L3=P, L4=N, L6=R),
+    case("holes on a circle", "MCALL CYCLE81(50,0,2,-5)\nHOLES2(0,0,9,0,0,5)\nMCALL\nG0 X5 Y5 Z5", L4=N, L6=R),
     case("a synchronized action", "WHEN TRUE DO $A_OUT[1]=1\nG1 X5 F100\nID=1 DO POS[X]=5\nX7", L4=R, L6=N),
 ]
 
 
 FLAT = [
+    Case("modal drilling cycle", f"{HEAD}MCALL CYCLE81(50,0,2,-20)\nX5 Y5\nX9\nMCALL\nG0 X1\nM30\n", {0: R}, flat=True),
     Case("a loop", f"{HEAD}FOR R1=1 TO 3\nG1 X=R1*2 Y=IC(R1) F100\nENDFOR\nX9\nM30\n", {0: R}, flat=True),
     Case("a section repeated", f"{HEAD}G91\nMARK: G1 X1 F100\nREPEATB MARK P=3\nG90 X9\nM30\n", {0: R}, flat=True),
     Case(
@@ -162,7 +162,7 @@ FLAT = [
         flat=True,
     ),
 ]
-"""What is executed several times, with --flatten."""
+"""What is executed several times, with --flatten, and what gets lines of its own: judged motion by motion."""
 
 
 @pytest.mark.parametrize("each", FLAT, ids=lambda each: each.name)

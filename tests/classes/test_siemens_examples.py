@@ -11,6 +11,7 @@ from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
 from ncfix.machine import load
 from ncfix.program.dialects import detect
+from ncfix.program.moves import Kind
 from ncfix.program.reader import read
 from ncfix.program.setup_file import load as load_setup
 
@@ -50,6 +51,6 @@ def test_in_the_tilted_plane_the_drill_stands_on_its_holes(root: Path) -> None:
     setup = load_setup(str(root / "examples/programs/siemens.setup.toml"))
     program = read((root / "examples/programs/siemens_swivel.mpf").read_bytes(), "siemens_swivel.mpf", "siemens")
     moves = follow(program, machine, setup).trace.moves
-    passed = [row for row, reason in enumerate(moves.reason) if "depth" in moves.reasons[reason]]
-    hole = moves.end[passed[0]][[moves.axes.index(letter) for letter in "XYZ"]]
+    holes = np.flatnonzero(moves.kind == Kind.CYCLE)
+    hole = moves.end[holes[0]][[moves.axes.index(letter) for letter in "XYZ"]]
     assert hole == pytest.approx([30.0, -30 + 10 * 3**0.5 / 2 + 6, 60 + 5 + 5 - 12 * 3**0.5 / 2])

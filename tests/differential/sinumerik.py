@@ -28,6 +28,9 @@ WORD = re.compile(
 )
 
 
+DRILLING = {f"CYCLE{number}" for number in (*range(81, 90), 840)}
+
+
 class Control(Standing):
     """Executes programs."""
 
@@ -153,10 +156,12 @@ class Control(Standing):
         values = [self.value(part) if part.strip() else None for part in (arguments or "()")[1:-1].split(",")]
         if name == "CYCLE800":
             self.tilt([value or 0.0 for value in values])
-        elif name == "CYCLE81" and modal:
-            self.modes["drill"] = values[0], values[3]
-        elif name == "CYCLE81":
-            self.drill(values[0], values[3])
+        elif name in DRILLING:
+            depth = values[3] if values[3] is not None else values[1] - values[4]
+            if modal:
+                self.modes["drill"] = values[0], depth
+            else:
+                self.drill(values[0], depth)
         elif name in ("HOLES1", "HOLES2"):
             self.holes(name, values)
         else:
@@ -190,6 +195,9 @@ class Control(Standing):
             p = frame.back(self.base)
             p[across] = height * self.modes["unit"]
             self.base = frame.of(p)
+            if height == depth:
+                q = self.axes(self.base[None], self.rotary())
+                self.paths.append(Path(self.mark, self.line, "hole", q, self.real_length))
 
     # -- frames -------------------------------------------------------------------------------------------------------
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from differential import errors, fanuc, sinumerik, test_fanuc_control, test_siemens, test_tnc_swivel
 from differential.sinumerik_frames import Floats
+from differential.sinumerik_motions import Path as Way
 from differential.test_siemens import apart
 from differential.test_tnc import PRESETS
 from differential.test_tnc_five import LENGTHS
@@ -198,7 +199,12 @@ class LinedSwivel(Swivel):
 def by_cradle(module: ModuleType, text: str, actual: bool) -> list[Step]:
     """What the second Fanuc or SINUMERIK makes of a program; the radius of the cutter is zero."""
     found = module.by_mark(CRADLE, re.sub(r"G4[12] D\d", "", text), actual)
-    return [Step(mark[1], ways[0].line, ways[0].sort, points) for mark, (ways, points) in found.items()]
+    return [Step(mark[1], ways[0].line, sort_of(ways), points) for mark, (ways, points) in found.items()]
+
+
+def sort_of(ways: list[Way]) -> str:
+    """The sort of the motions of a block: a hole if they end in one."""
+    return "hole" if any(way.sort == "hole" for way in ways) else ways[0].sort
 
 
 def by_tnc(text: str, actual: bool) -> list[Step]:
@@ -338,7 +344,7 @@ class Claims:
         return "corrected"
 
 
-LAWFUL = {Pass.MACHINE_COORDINATES, Pass.ROTARY_ALONE, Pass.CYCLE_DEPTH}
+LAWFUL = {Pass.MACHINE_COORDINATES, Pass.ROTARY_ALONE}
 """Rules by which something else than a rapid may pass in these programs."""
 
 

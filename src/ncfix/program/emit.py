@@ -358,6 +358,7 @@ class _Emitter:
             rotation=frame.frame.rotation,
             offset=frame.frame.offset,
             wordless=tuple(wordless.tolist()),
+            call=moves.call_of(row),
             level=self.levels.wanted(
                 row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position
             ),
@@ -390,9 +391,10 @@ class _Emitter:
         for block in sorted(self.latest):
             rendered = self.written[block]
             edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
-            if rendered.lines:
+            lines = rendered.lines_before(self.written.get(block + 1))
+            if lines:
                 at = int(self.program.blocks[block, 1])
-                edits.append(Edit(at, at, "".join(end_of_line + line for line in rendered.lines).encode("latin-1")))
-                self.added += len(rendered.lines)
+                edits.append(Edit(at, at, "".join(end_of_line + line for line in lines).encode("latin-1")))
+            self.added += len(lines) + rendered.opens
         self.latest = []
         return edits

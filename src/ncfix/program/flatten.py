@@ -27,6 +27,9 @@ RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
 LINES = 500_000
 """A flat program has no more lines."""
 
+LEADING = (Kind.RAPID, Kind.CYCLE)
+"""Motions that lead somewhere, wherever they begin."""
+
 ROUNDINGS = 2.0
 """By so many least increments an end may be off: numbers are rounded to them, and several may add up."""
 
@@ -108,7 +111,8 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     """What is different between the motions of a program and those of its flat form; empty if nothing is.
 
     A refused arc without an angle stands in for a curve of any kind that is not followed. Where an axis stands at the
-    end of a rapid the flat form may tell, and the program not: holes that the control would make up lead it there.
+    end of a rapid, or at a hole, the flat form may tell, and the program not: holes that the control would make up lead
+    it there.
     """
     rows, flat = (np.flatnonzero(moves.kind != Kind.DWELL) for moves in (before, after))
     if len(rows) != len(flat):
@@ -117,7 +121,7 @@ def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
     size = np.where(before.rotary, np.radians(size), size)
     ends, flat_ends = before.end[rows], after.end[flat]
     other = (np.abs(ends - flat_ends) > ROUNDINGS * size).any(axis=1)
-    told = (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) & (before.kind[rows] != Kind.RAPID)
+    told = (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) & ~np.isin(before.kind[rows], LEADING)
     other |= told | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
     stands_in = (before.kind == Kind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
     other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])

@@ -96,6 +96,26 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class CycleCall:
+    """The call of a drilling cycle in a block by itself: what it takes to give one hole a depth of its own.
+
+    name       as it is written
+    arguments  their values when it was called; None where one is left out
+    depths     (place, sense): the arguments that say how deep the hole is, 1 for heights, -1 for ways down
+    across     the letter of the axis along which it drills
+    modal      it stands before the motion to the hole, and holds for others, too; else it drills where the axes stand
+    fixed      why no other call may be written in its place, or beside it; empty: it may
+    """
+
+    name: str
+    arguments: tuple[float | str | None, ...]
+    depths: tuple[tuple[int, int], ...]
+    across: str
+    modal: bool
+    fixed: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Moves:
     """The motions of a program, struct of arrays; n rows, one per motion, in order of execution.
 
@@ -136,6 +156,9 @@ class Moves:
     passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
     angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
                  may count from 0 to 360 degrees; NaN for others. None: none
+    call         (n,) of canned cycles whose depth stands in a call of its own: index into `calls`; -1 of others.
+                 None: of none
+    calls        the calls that occur
     """
 
     axes: tuple[str, ...]
@@ -171,6 +194,8 @@ class Moves:
     resting: NDArray[np.bool_] | None = None
     angles: NDArray[np.float64] | None = None
     passing: NDArray[np.int8] | None = None
+    call: NDArray[np.int32] | None = None
+    calls: tuple[CycleCall, ...] = ()
 
     def __len__(self) -> int:
         return len(self.block)
@@ -199,6 +224,10 @@ class Moves:
             return self.arc_absolute
         fixed: NDArray[np.bool_] = self.arc_absolute | self.fixed_centre
         return fixed
+
+    def call_of(self, row: int) -> CycleCall | None:
+        """The call with which the cycle of a motion is called, if that has a block of its own."""
+        return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
 
     @property
     def cuts(self) -> NDArray[np.bool_]:

@@ -21,7 +21,7 @@ from ncfix.program.moves import Moves
 from ncfix.program.reader import Reading
 from ncfix.program.tree import Program, Skip, Template
 
-TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles"})
+TABLES = frozenset({"axes", "rotary", "frames", "reasons", "pointing", "angles", "calls"})
 """The fields of `Moves` that are the same for all rows."""
 
 
@@ -222,6 +222,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
+    "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),
 }
 """What columns of `Moves` mean that are left out."""

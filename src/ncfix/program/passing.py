@@ -30,7 +30,6 @@ class Pass(IntEnum):
     ROTARY_ALONE = 8
     RETRACTION = 9
     DEPARTURE = 10
-    CYCLE_DEPTH = 11
 
 
 class PassRule(NamedTuple):
@@ -105,12 +104,6 @@ PASS_RULES: Mapping[Pass, PassRule] = {
         frozenset({Kind.FEED}),
         True,
         "The control goes on from the corrected end of the contour (DEP); no word says where that leads.",
-    ),
-    Pass.CYCLE_DEPTH: PassRule(
-        "depth of a drilling cycle",
-        STRAIGHT,
-        True,
-        "The cycle says the depth in words that other holes have too; the place of the hole is corrected.",
     ),
 }
 """The list: nothing else may pass."""

@@ -31,6 +31,7 @@ CLOSED, EXACT = 1e-6, 1e-9
 NEAR = 3.0
 """Half output steps: no more lies between the ends of a full circle, which are one point before they are rounded."""
 
+FROM_NOWHERE = "an increment in turned coordinates, while where one of their axes stands is not known"
 NO_TIME = "the block would become several, and in G93 no number behind its own F says how long it takes"
 
 
@@ -79,13 +80,19 @@ class BlockRenderer(TurnWriter):
         return position
 
     def _present_axis(self, position: FloatArray, column: int, end: float, word: Word) -> None:
-        base = position[column] if self.target.incremental else 0.0
+        base = self._counted_from(position, column) if self.target.incremental else 0.0
         original = self._value(word, self.target.original[column])
         value = end - base
         whole = len(self.target.ends) == 1
         if np.isfinite(value) and (not whole or abs(value - original) >= self.half[column]):
             original = self._rewrite(word, value, int(self.target.decimals[column]))
         position[column] = base + original
+
+    def _counted_from(self, position: FloatArray, column: int) -> float:
+        """Where an increment counts from; in turned coordinates one axis that stands nowhere known hides them all."""
+        if not np.isfinite(position[column]):
+            self.out.conflict = self.out.conflict or FROM_NOWHERE
+        return float(position[column])
 
     def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
         still = not np.isfinite(end) or abs(end - position[column]) < self.half[column]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.program.moves import CycleCall
 from ncfix.program.pointing import Pointing
 
 FloatArray = NDArray[np.float64]
@@ -72,6 +73,7 @@ class Target:
     offset       (n_axes,) of the frame, mm and rad
     level        of a canned cycle whose R is to be written: what it shall be
     wordless     (n_axes,) axes that have no word and must get none; empty: no axis
+    call         of a canned cycle whose depth stands in a call of its own
     """
 
     letters: tuple[str, ...]
@@ -107,6 +109,7 @@ class Target:
     offset: FloatArray | None = None
     level: Level | None = None
     wordless: tuple[bool, ...] = ()
+    call: CycleCall | None = None
 
     def may_name(self, column: int) -> bool:
         """Whether an axis has a word, or may get one."""
@@ -114,7 +117,9 @@ class Target:
 
     @property
     def last_code(self) -> int:
-        """The motion code that is in force after the pieces, in tenths."""
+        """The motion code in force after the pieces, in tenths; behind a call in a block of its own as before."""
+        if self.call is not None and not self.call.modal:
+            return self.active_code
         if self.arcs is None:
             return TANGENTIAL.get(self.code, self.code)
         return self.arc_code if self.arcs[-1] else LINE
@@ -127,6 +132,8 @@ class Rendered:
     centre, centres  of the first piece if it is an arc, and of further ones by their number
     level            the R that is in force behind the block, if that is known
     conflict         why the motion cannot be written after all; empty if it is
+    opens            what is written begins with a call of a cycle, which replaces the one in force
+    closing          the line behind it with which the call before comes back, unless the next block opens with its own
     """
 
     edits: list[tuple[int, int, str]] = field(default_factory=list)
@@ -136,11 +143,18 @@ class Rendered:
     centres: dict[int, FloatArray] = field(default_factory=dict)
     level: float | None = None
     conflict: str = ""
+    opens: bool = False
+    closing: str = ""
+
+    def lines_before(self, next_block: Rendered | None) -> list[str]:
+        """The lines to put after the block, where that is what is written of the next one; None: nothing."""
+        called = next_block is not None and next_block.opens
+        return [*self.lines, self.closing] if self.closing and not called else self.lines
 
     @property
     def text(self) -> tuple[object, ...]:
         """What the control reads; two executions of a block agree when this is equal."""
-        return (tuple(self.edits), tuple(self.lines))
+        return (tuple(self.edits), tuple(self.lines), self.closing)
 
 
 def plane_across(normal: FloatArray) -> tuple[int, int, int]:

@@ -280,8 +280,13 @@ def test_machine_coordinates_do_not_ask_for_the_work_offset(text: str, count: in
 
 
 def test_a_modal_cycle_drills_behind_machine_positions_too() -> None:
-    assert xs("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3\nMCALL\nG0 X4") == pytest.approx([0, 3, 3, 3, 4])
-    assert last(follow("G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3"))[2] == pytest.approx(5)
+    """The position passes; the hole is at a place that is not corrected, and is refused."""
+    text = "G0 Z9\nMCALL CYCLE81(5,0,1,-2)\nSUPA G0 X3\nMCALL\nG0 X4"
+    assert xs(text) == pytest.approx([0, 3, 3, 4])
+    moves = follow(text).moves
+    assert moves.rule.tolist() == [Rule.CORRECT, Rule.PASS, Rule.REFUSE, Rule.CORRECT]
+    assert moves.end[2, 2] == pytest.approx(-2)
+    assert moves.end[3, 2] == pytest.approx(5)
 
 
 def test_an_axis_that_the_machine_lacks_is_named() -> None:

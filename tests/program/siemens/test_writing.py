@@ -54,7 +54,14 @@ def written(body: str) -> str:
         ("G700\nG1 X1", "G700\nG1 X0.99951 Y0.07958 Z1.96884"),
         ("SUPA G0 Z0", "SUPA G0 Z0"),
         ("LABEL: G1 X5 M8", "LABEL: G1 X4.988 M8"),
-        ("MCALL CYCLE81(50,0,2,-20)\nX5\nMCALL", "MCALL CYCLE81(50,0,2,-20)\nX4.988\nMCALL"),
+        (
+            "MCALL CYCLE81(50,0,2,-20)\nX5\nMCALL",
+            "MCALL CYCLE81(50,0,2,-20)\nMCALL CYCLE81(50,0,2,-19.991)\nX4.988\nMCALL CYCLE81(50,0,2,-20)\nMCALL",
+        ),
+        ("CYCLE82(50,0,2,-20.5,,0.3)", "CYCLE82(50,0,2,-20.491,,0.3)"),
+        ("CYCLE82(50,0,2,,20)", "CYCLE82(50,0,2,,19.991)"),
+        ("R1=-20\nCYCLE82(50,0,2,R1,,0.3)", "R1=-20\nCYCLE82(50,0,2,-19.991,,0.3)"),
+        ("CYCLE83(50,0,2,-20,,-5,,2,0,0,1,0)", "CYCLE83(50,0,2,-19.991,,-4.991,,2,0,0,1,0)"),
     ],
 )
 def test_a_corrected_block_keeps_its_manner(body: str, expected: str) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Rotation, Vector
 from ncfix.program.follow.rollover import Winding, doubtful, extremes, overturned
 from ncfix.program.follow.stretch import Buffer, Stretch
-from ncfix.program.moves import Frame, Kind, Moves, Rule
+from ncfix.program.moves import CycleCall, Frame, Kind, Moves, Rule
 from ncfix.program.passing import Pass
 
 FloatArray = NDArray[np.float64]
@@ -99,6 +99,8 @@ class Builder:
         self._arcs: dict[int, Arc] = {}
         self._circles: list[Circles] = []
         self._approaches: dict[int, Vector] = {}
+        self._calls: dict[CycleCall, int] = {}
+        self._called: dict[int, int] = {}
         self._counted: dict[int, int] = {}
         self._resting: dict[int, int] = {}
         self.rolls: NDArray[np.bool_] | None = None
@@ -169,6 +171,10 @@ class Builder:
     def approach(self, command: Vector) -> None:
         """The command at the level R of the canned cycle that is added next."""
         self._approaches[self.count] = command
+
+    def called(self, call: CycleCall) -> None:
+        """The call of the canned cycle that is added next."""
+        self._called[self.count] = self._calls.setdefault(call, len(self._calls))
 
     def counted(self, axes: int) -> None:
         """The motion that is added next has words that count from where it starts for these axes, and only these."""
@@ -254,12 +260,14 @@ class Builder:
             counted=counted,
             angles=angles,
             resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
+            call=self._call_column(len(block)),
+            calls=tuple(self._calls),
             **styles,
         )
 
     def clear(self) -> None:
-        """Forget the motions so far; styles, reasons and frames keep their numbers."""
-        self.count = 0
+        """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
+        self.count, self._called = 0, {}
         self.overturned = self.brought_back = None
         self._said, self._resting, self._circles = [], {}, []
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
@@ -317,6 +325,13 @@ class Builder:
             return None
         column = np.full((count, len(self.columns)), np.nan)
         column[list(self._approaches)] = np.array(list(self._approaches.values()))[:, self.columns]
+        return column
+
+    def _call_column(self, count: int) -> NDArray[np.int32] | None:
+        if not self._called:
+            return None
+        column = np.full(count, -1, dtype=np.int32)
+        column[list(self._called)] = list(self._called.values())
         return column
 
     def _fixed_column(self, count: int) -> NDArray[np.bool_] | None:

@@ -232,11 +232,14 @@ class Control(Standing):
         return motion._replace(refusal=why)
 
     def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
-        """Why a motion that does not pass is refused; empty if it may be corrected."""
+        """Why a motion that does not pass is refused; empty if it may be corrected.
+
+        A canned cycle begins with a rapid, so it does not matter where from.
+        """
         reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
         if not reason and unknown:
             reason = first_reason(unknown)
-        if not reason and kind != Kind.RAPID and self.unknown:
+        if not reason and kind not in (Kind.RAPID, Kind.CYCLE) and self.unknown:
             reason = first_reason(self.unknown)
         if not reason and self.external:
             reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"

@@ -226,10 +226,6 @@ class Control(base.Control):
         machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
         return 0 if self.modal.incremental or machine else own
 
-    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
-        """As of every control; a cycle begins with a rapid, so it does not matter where from."""
-        return super()._verdict(Kind.RAPID if kind == Kind.CYCLE else kind, unknown, refusal)
-
     def is_led(self, unknown: Unknown) -> bool:
         """What is not known is so because the control itself has led the axes somewhere."""
         return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())

@@ -19,12 +19,12 @@ from ncfix.program.reach import whole_text
 from ncfix.program.shapes import split_blocks
 from ncfix.program.sinumerik.blocks import parse_block
 from ncfix.program.sinumerik.following import SinumerikFollower, runs_straight_on
+from ncfix.program.sinumerik.hole_text import render
 from ncfix.program.sinumerik.interpreter import Interpreter
 from ncfix.program.sinumerik.layout import SinumerikLayout, layout_of
 from ncfix.program.sinumerik.numbering import renumbered
 from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.plans import fixed_centre
-from ncfix.program.sinumerik.render import render
 from ncfix.program.sinumerik.scanning import scan
 from ncfix.program.sinumerik.state import Sinumerik
 from ncfix.program.sinumerik.unroll import Recorder

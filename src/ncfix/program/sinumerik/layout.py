@@ -15,8 +15,21 @@ from ncfix.program.layout import (
 from ncfix.program.sinumerik.circles import VIA
 from ncfix.program.sinumerik.orientation import ANGLES, VECTOR
 from ncfix.program.sinumerik.poles import has_partial
-from ncfix.program.sinumerik.vocabulary import HARMLESS, MOTIONS, POLAR
-from ncfix.program.tree import Command, Constant, Flow, Opaque, Program, Tape, Word
+from ncfix.program.sinumerik.vocabulary import DRILLING, HARMLESS, MOTIONS, POLAR
+from ncfix.program.tree import (
+    Anchor,
+    Command,
+    Comment,
+    Constant,
+    Flow,
+    Item,
+    Opaque,
+    Program,
+    Skip,
+    Span,
+    Tape,
+    Word,
+)
 
 END_OF_SUBPROGRAM = frozenset({17.0})
 """M17."""
@@ -32,6 +45,8 @@ class SinumerikLayout(Layout):
     partial_polar  blocks of the program rely on such a word of a block before
     vector  A3 B3 C3 by address
     angles  A2 B2 C2 by address
+    cycle   the call of a drilling cycle, where the block holds nothing else
+    begins  where its words begin, behind block skip, number and label
     """
 
     via: dict[str, Word]
@@ -40,6 +55,8 @@ class SinumerikLayout(Layout):
     partial_polar: bool
     vector: dict[str, Word]
     angles: dict[str, Word]
+    cycle: Span | None
+    begins: Anchor
 
     @property
     def points(self) -> bool:
@@ -50,13 +67,17 @@ class SinumerikLayout(Layout):
 def layout_of(program: Program, block: int) -> SinumerikLayout | None:
     """The layout of a motion block; None for control structures, calls, and what is not understood."""
     words = BlockWords(program, block)
-    if not all((isinstance(item, Command) and is_quiet(item)) or may_stay(item) for item in words.items):
+    cycle = drilling_call(words)
+    if cycle is None and not all(
+        (isinstance(each, Command) and is_quiet(each)) or may_stay(each) for each in words.items
+    ):
         return None
     numbered = [word for word in words.words if word.address not in ("N", ":")]
     anchors = list(words.axes.values()) or numbered or words.words
-    if not anchors:
+    content = [item.span for item in words.items if not is_prefix(item)]
+    if not (anchors or cycle) or not content:
         return None
-    words_at, code_at, blank = words.beside(anchors)
+    words_at, code_at, blank = words.beside(anchors) if anchors else (content[0].stop, content[0].start, " ")
     polar = words.some(sorted(POLAR))
     return SinumerikLayout(
         axes=words.axes,
@@ -77,7 +98,24 @@ def layout_of(program: Program, block: int) -> SinumerikLayout | None:
         partial_polar=bool(polar) and has_partial(program),
         vector=words.some(VECTOR),
         angles=words.some(ANGLES),
+        cycle=cycle,
+        begins=min((span.start for span in content), key=lambda anchor: program.position(block, anchor)),
     )
+
+
+def drilling_call(words: BlockWords) -> Span | None:
+    """The call of a drilling cycle, if that is all that a block holds besides its number."""
+    items = [item for item in words.items if not (is_prefix(item) or isinstance(item, Comment))]
+    match items:
+        case [Command(name) as call] if name in DRILLING:
+            return call.span
+    return None
+
+
+def is_prefix(item: Item) -> bool:
+    """Block skip, block number, or label."""
+    numbered = isinstance(item, Word) and item.address in ("N", ":")
+    return numbered or isinstance(item, Skip) or (isinstance(item, Flow) and item.keyword == "label")
 
 
 def is_quiet(item: Command) -> bool:

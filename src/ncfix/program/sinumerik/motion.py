@@ -6,6 +6,7 @@ from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.moves import Kind
 from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.circles import arc, through_point
+from ncfix.program.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix.program.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import mind_carried, take_up
 from ncfix.program.sinumerik.orientation import oriented
@@ -28,6 +29,8 @@ CORNERS = frozenset({"RND", "CHF", "CHR"})
 """Words with which the control rounds or breaks the corner at the end of the block."""
 
 CIP, CT = MOTIONS["cip"], MOTIONS["ct"]
+OTHER_WAYS = UNFOLLOWED_MOTIONS.keys() | {20, 30, CIP, CT}
+"""Motion codes with which an axis word is no straight motion."""
 
 
 def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
@@ -43,6 +46,21 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     control.at_corner = not machine and (corner or control.cornered)
     words.whole = control.at_corner or is_one_piece(control, words)
     oriented(control, words)
+    drilling = control.modes.modal_cycle
+    if drilling is not None and not special and code not in OTHER_WAYS:
+        control.settle_all()
+        drill(control, words, destination(control, words), drilling, refusal=refusal_of(control, words), modal=True)
+    else:
+        words.refusal = words.refusal or (TO_A_HOLE if drilling is not None else "")
+        by_itself(control, words, special, machine)
+        if drilling is not None:
+            hole_after(control, words)
+    control.wrap()
+    control.cornered, control.at_corner = corner, False
+
+
+def by_itself(control: Sinumerik, words: Words, special: frozenset[str], machine: str) -> None:
+    """A motion with which nothing is drilled; `machine` says by which name it is in machine coordinates."""
     if machine:
         to_machine_position(control, words, machine.upper())
     elif "meas" in special:
@@ -50,9 +68,7 @@ def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
     elif "soft" in special:
         soft_approach(control, words)
     else:
-        as_coded(control, words, code)
-    control.wrap()
-    control.cornered, control.at_corner = corner, False
+        as_coded(control, words, control.modal.motion)
 
 
 def straight(control: Sinumerik, words: Words, code: int) -> None:
@@ -62,9 +78,9 @@ def straight(control: Sinumerik, words: Words, code: int) -> None:
 
 
 def is_one_piece(control: Sinumerik, words: Words) -> bool:
-    """Whether a motion must not be split: its time is another block's, REPEAT would miss lines, a hole follows."""
+    """Whether a motion must not be split: its time is another block's, or REPEAT would miss lines."""
     timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
-    return timed or words.block in control.solitary or control.modes.modal_cycle is not None
+    return timed or words.block in control.solitary
 
 
 def as_coded(control: Sinumerik, words: Words, code: int) -> None:

@@ -11,8 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ncfix.program.moves import Kind
-from ncfix.program.sinumerik.destination import End, Leg, Words, command
+from ncfix.program.sinumerik.destination import End, Words, command
 from ncfix.program.sinumerik.values import number
 
 if TYPE_CHECKING:
@@ -78,13 +77,12 @@ def is_nearer(control: Sinumerik, last: tuple[float, float], first: tuple[float,
     return math.dist(here, last) < math.dist(here, first)
 
 
-def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> None:
-    """The rapid to a place."""
+def lead_to(control: Sinumerik, block: int, point: tuple[float, float], name: str) -> tuple[Words, End, str]:
+    """The words that lead to a place, where that is, and why its hole is not corrected."""
     plane, program, lost = control.modal.plane, control.program_position(), dict(control.lost)
     moved = {plane.first, plane.second}
     for index, value in zip((plane.first, plane.second), point, strict=True):
         program[index] = control.stretch * value
         lost.pop(index, None)
     end = End(command(control, program, moved), control.unknown_for(lost), lost)
-    words = Words(block, {}, {}, 1 << plane.first | 1 << plane.second)
-    control.go(Leg(Kind.RAPID, words, end, 0, refusal=WRITE_OUT.format(name), settles=words.axes))
+    return Words(block, {}, {}, 1 << plane.first | 1 << plane.second), end, WRITE_OUT.format(name)

@@ -17,8 +17,8 @@ from ncfix.program.sinumerik.destination import turned
 from ncfix.program.sinumerik.layout import SinumerikLayout
 from ncfix.program.sinumerik.orientation import VECTOR
 from ncfix.program.sinumerik.vocabulary import ABSOLUTE, FORMS, INCREMENTAL, MOTIONS
-from ncfix.program.target import TANGENTIAL, Rendered, Target
-from ncfix.program.tree import Call, Literal, Program, Word
+from ncfix.program.target import TANGENTIAL
+from ncfix.program.tree import Call, Literal, Word
 
 FloatArray = NDArray[np.float64]
 
@@ -27,11 +27,6 @@ CIP = MOTIONS["cip"]
 ARCS = frozenset({20, 30})
 VECTOR_DECIMALS = 7
 """Of components of a direction: 1e-7 rad is 6e-6 degrees."""
-
-
-def render(program: Program, block: int, layout: SinumerikLayout, target: Target) -> Rendered:
-    """The text of a corrected motion."""
-    return SinumerikRenderer(program, block, layout, target).render()
 
 
 class SinumerikRenderer(BlockRenderer):
@@ -84,7 +79,9 @@ class SinumerikRenderer(BlockRenderer):
     def _formed(self, position: FloatArray, column: int, end: float, word: Word, turns: float) -> None:
         """A word that says how it is meant; `turns`, in degrees, are not written."""
         incremental = self._form(word) == INCREMENTAL
-        base = position[column] if incremental else turns
+        base = self._counted_from(position, column) if incremental else turns
+        if not np.isfinite(base):
+            return
         value, written = end - base, self._value(word, np.nan if incremental else self.target.nominal[column] - turns)
         if len(self.target.ends) > 1 or not abs(value - written) < self.half[column]:
             written = self._rewrite(word, value, int(self.target.decimals[column]))

@@ -250,7 +250,7 @@ class Sinumerik(Control):
         words, end = leg.words, leg.end
         axes, settles = self._axes_of(words), leg.settles
         if settles is None:
-            settles = 0 if leg.passing else axes & ~mask_of(self._counted(words))
+            settles = 0 if leg.passing else axes & ~mask_of(self.counted_words(words))
         self.lost, self.fresh_tool = end.lost, False
         refusal, self.whole = leg.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
         sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
@@ -277,7 +277,7 @@ class Sinumerik(Control):
         """As for all controls; whether it is a rapid, the program has to have said."""
         return self.stated and super()._leaves_unknown(rapid)
 
-    def _counted(self, words: Words) -> list[int]:
+    def counted_words(self, words: Words) -> list[int]:
         """The axes whose words count from where they stand."""
         forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
         return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
@@ -297,7 +297,7 @@ class Sinumerik(Control):
     def _passes_zero(self, words: Words, target: Vector) -> bool:
         """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
         turn, endless = 2 * math.pi, self.builder.endless
-        steps = [] if self.modal.incremental else [index for index in self._counted(words) if endless >> index & 1]
+        steps = [] if self.modal.incremental else [index for index in self.counted_words(words) if endless >> index & 1]
         places = ((self.position[index], target[index]) for index in (*self.over, *steps))
         return any(not 0 <= place < turn for pair in places for place in pair)
 

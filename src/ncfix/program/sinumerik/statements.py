@@ -10,7 +10,7 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
-from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle, drill
+from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
 from ncfix.program.sinumerik.plans import LISTS, Calling, Plan, evaluates
@@ -143,7 +143,7 @@ def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
     elif name == "cycle800":
         swivel(control, turn.words.block, step)
     elif name in DRILLING or name in MADE_BY_THE_CONTROL:
-        cycle(control, turn.words.block, step, modal=turn.modal)
+        cycle(control, turn.words, step, modal=turn.modal)
     else:
         subprogram(control, turn, step, find)
 
@@ -281,8 +281,6 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         return
     if plan.axes or words.values.keys() & MOVING or is_circle(control, words):
         motion.moved(control, words, frozenset(turn.special))
-        if control.modes.modal_cycle is not None:
-            drill(control, control.modes.modal_cycle)
     elif "soft" in turn.special:
         control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
 

@@ -1,0 +1,105 @@
+"""Holes of SINUMERIK, where they really are: each is corrected, at its bottom, or refused; none is passed in silence.
+
+Judged by an interpreter and a model of the machine that share nothing with the product.
+`NCFIX_SIEMENS_HOLES=20 pytest tests/differential/test_siemens_holes.py -s` takes as many programs of each kind.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from differential import errors, sinumerik
+from differential.sinumerik_frames import Floats
+from differential.sinumerik_holes import COMBINATIONS, program
+from differential.test_siemens import AT_ENDS, LENGTHS, MACHINE, OFFSETS, SETUP, START
+from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.machine import Machine, load
+from ncfix.program.reader import read
+
+EACH = int(os.environ.get("NCFIX_SIEMENS_HOLES", "1"))
+FIGURE = 0.1e-3
+"""mm: two models of a machine, and figures with four decimals of a micrometre."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """What became of holes, and the worst of those that were corrected, mm."""
+
+    holes: Counter[str] = field(default_factory=Counter)
+    reasons: Counter[str] = field(default_factory=Counter)
+    wrong: list[str] = field(default_factory=list)
+    worst: float = 0.0
+    before: float = 0.0
+
+
+def bottoms(model: errors.Machine, text: str, actual: bool) -> tuple[Floats, list[int]]:
+    """The bottoms of the holes of a program, (k, 3), in the order in which they are drilled, and their lines."""
+    ways = sinumerik.control_of(model, START, offsets=OFFSETS, tools=LENGTHS).run(text)
+    holes = [way for way in ways if way.sort == "hole"]
+    tips = sinumerik.tips(model, holes, actual)
+    return np.array([tip[-1] for tip in tips]).reshape(-1, 3), [way.line for way in holes]
+
+
+def judged(text: str, strategy: str, model: errors.Machine, machine: Machine, tally: Tally) -> Fixed:
+    """Correct a program, and see where its holes are."""
+    fixed = fix_program(read(text.encode(), "part.mpf", "siemens"), machine, SETUP, FixOptions(strategy=strategy))
+    report = fixed.report
+    (meant, lines), (raw, _) = (bottoms(model, text, actual) for actual in (False, True))
+    done, _ = bottoms(model, fixed.text.decode(), True)
+    if len(meant) != len(done):
+        tally.wrong.append(f"{len(meant)} holes became {len(done)}")
+        return fixed
+    refused = {each.line: each.reason for each in report.refused}
+    left: dict[int, float] = {}
+    for axis in report.left:
+        for first, last in axis.stretches:
+            left |= {line: left.get(line, 0.0) + axis.most for line in range(first, last + 1)}
+    seen = {"before": 0.0, "after": 0.0}
+    for line, aim, old, new in zip(lines, meant, raw, done, strict=True):
+        before, after = float(np.linalg.norm(old - aim)), float(np.linalg.norm(new - aim))
+        if line in refused:
+            tally.holes["refused"] += 1
+            tally.reasons[refused[line]] += 1
+            continue
+        tally.holes["left in part, and said" if line in left else "corrected"] += 1
+        tally.before = max(tally.before, before)
+        if line not in left:
+            tally.worst = max(tally.worst, after)
+            seen = {"before": max(seen["before"], before), "after": max(seen["after"], after)}
+        if after > AT_ENDS + left.get(line, 0.0):
+            tally.wrong.append(f"line {line} is {after * 1e3:.2f} um off, and was {before * 1e3:.2f}")
+    for name, said in (("before", report.error_before_um), ("after", report.error_after_um)):
+        if seen[name] > float(said.get("max") or 0.0) / 1e3 + FIGURE:
+            tally.wrong.append(f"figures say {said.get('max')} um {name}, and it is {seen[name] * 1e3:.2f}")
+    return fixed
+
+
+def taken(strategy: str, root: Path, each: int) -> Tally:
+    """What becomes of programs of every kind."""
+    model, machine, tally = errors.load(root / MACHINE), load(str(root / MACHINE)), Tally()
+    for number, kind in enumerate(COMBINATIONS):
+        for seed in range(each):
+            text = program(1000 * number + seed, *kind)
+            wrong = len(tally.wrong)
+            judged(text, strategy, model, machine, tally)
+            tally.wrong[wrong:] = [f"{kind} {seed}: {fault}\n{text}" for fault in tally.wrong[wrong:]]
+    return tally
+
+
+def test_every_hole_is_corrected_or_refused(root: Path, figures: Callable[[str], None]) -> None:
+    for strategy in ("rotary-then-linear", "full"):
+        tally = taken(strategy, root, EACH)
+        assert not tally.wrong, "\n".join(tally.wrong)
+        assert tally.holes["corrected"] > 3 * tally.holes["refused"]
+        counts = ", ".join(f"{count} {what}" for what, count in sorted(tally.holes.items()))
+        why = "".join(f"\n    {count} {reason}" for reason, count in tally.reasons.most_common())
+        figures(
+            f"siemens holes, {strategy}: {counts}, silently wrong 0; worst {tally.worst * 1e3:.3f} um, "
+            f"before {tally.before * 1e3:.1f} um{why}"
+        )
