@@ -7,7 +7,8 @@ from ncfix.diagnostics import Code
 CODES = {
     "NCF002": Code(
         "an input file cannot be read",
-        "The file does not exist, is a folder, or may not be read; the message says what the system says. Or a "
+        "The file does not exist, is a folder, or may not be read; the message says what the system says. Devices are "
+        "not read, nor pipes into which nobody writes, nor more than 1 GB as a whole or through a pipe. Or a "
         "long program was changed while it was corrected, so that its parts need not fit together.",
         "Check the path and the permissions.",
     ),

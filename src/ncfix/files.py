@@ -19,10 +19,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from ncfix import inputs
 from ncfix.diagnostics import Place, SourceError, UsageError
 from ncfix.ways import check_output, check_own, linked, way_to
 
-READING = {errno.EACCES: "get the right to read it", errno.EISDIR: "name a file, not a folder"}
+READING = {
+    errno.EACCES: "get the right to read it",
+    errno.EISDIR: "name a file, not a folder",
+    errno.ENXIO: "give an ordinary file, or - for standard input",
+    errno.EFBIG: "no file of this kind is so long; a long program can be given as a file",
+}
 WRITING = {
     errno.EACCES: "another -o, or the right to write there",
     errno.EROFS: "another -o",
@@ -65,11 +71,10 @@ class Whole:
             yield part
 
 
-def read_bytes(path: str) -> bytes:
-    """The content of a file; raises `SourceError` NCF002."""
+def read_bytes(path: str, most: int = inputs.MOST) -> bytes:
+    """The content of a file of at most so many bytes; raises `SourceError` NCF002."""
     try:
-        with open(path, "rb") as handle:
-            return handle.read()
+        return inputs.taken(path, most)
     except OSError as error:
         raise unreadable(path, error) from error
 

@@ -96,11 +96,11 @@ def test_tables_are_written_all_or_not_at_all(shop: Shop, ncfix: Ncfix, monkeypa
 
     write, left = files.write_whole, [1, 2]
 
-    def full(path: str, data: bytes, replace: bool = False) -> None:
+    def full(path: str, data: bytes, *more: object) -> None:
         if not left:
             raise files.unwritable(path, OSError(28, "No space left on device"))
         left.pop()
-        write(path, data, replace)
+        write(path, data, *more)  # type: ignore[arg-type]
 
     monkeypatch.setattr(files, "write_whole", full)
     result = ncfix("export", "linuxcnc", "-m", shop.machine, "-o", shop.folder / "tables")

@@ -106,4 +106,10 @@ CODES = {
         "`-` stands for standard input, and what has been read from it is gone.",
         "Give one of the inputs as a file.",
     ),
+    "NCF024": Code(
+        "not enough memory",
+        "The system gave ncfix no more memory. Long programs are corrected in parts, in bounded memory, as far as they "
+        "can be; what has to be looked at as a whole takes many times the memory of its text.",
+        "Do it on a computer with more memory, or in smaller pieces; `--jobs 1` takes the least.",
+    ),
 }

@@ -32,6 +32,9 @@ def owned(error: Exception) -> NcfixError:
     if plugin is not None:
         _trace(error)
         return plugin
+    if isinstance(error, MemoryError):
+        hint = "leave out what is not needed, or do it on a computer with more memory"
+        return FaultError.of("NCF024", "there is not enough memory for this", hint=hint)
     return fault(error)
 
 

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING
 
-from ncfix import files
+from ncfix import files, inputs
 from ncfix.cli import console
 from ncfix.cli.targets import STREAM, Target, shown, stdin
 from ncfix.diagnostics import Place, RefusedError, SourceError, UsageError
@@ -56,7 +56,7 @@ def source_of(path: str) -> Iterator[Source]:
             yield Source(path, stdin(), kept)
         return
     try:
-        handle = open(path, "rb")  # noqa: SIM115
+        handle = inputs.opened(path)
     except OSError as error:
         raise files.unreadable(shown(path), error) from error
     began = os.fstat(handle.fileno())
@@ -141,6 +141,10 @@ class Source:
             with files.said_of(None):
                 files.put_at(self.kept.fileno(), self.taken, part)
             self.taken += len(part)
+            try:
+                inputs.check_size(self.taken)
+            except OSError as error:
+                raise files.unreadable(shown(self.path), error) from error
         return part
 
     def everything(self) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,6 +15,9 @@ from ncfix.diagnostics import Place, SourceError
 
 if TYPE_CHECKING:
     from ncfix.report.document import Section
+
+DEEPEST = 64
+"""How deep the lists and objects of a result lie in one another at most."""
 
 
 @click.command()
@@ -53,10 +57,28 @@ def _sections(path: str) -> list[Section]:
 def _result(text: bytes, path: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
+        _check_depth(found)
     except ValueError as error:
         hint = "give what a verb printed with --json, or a machine file"
         raise SourceError.of("NCF019", f"is not a result: {error}", Place(shown(path)), hint) from error
+    except RecursionError as error:
+        hint = "give what a verb printed with --json"
+        raise SourceError.of("NCF019", "is no result: it is nested too deeply", Place(shown(path)), hint) from error
     if not isinstance(found, dict) or found.get("schema") != console.SCHEMA:
         problem = f'is JSON, but no result: it has no "schema": {console.SCHEMA}'
         raise SourceError.of("NCF019", problem, Place(shown(path)), "give what a verb printed with --json")
     return found
+
+
+def _check_depth(found: Any) -> None:
+    """Raise RecursionError if lists and objects lie deeper in one another than those of any result."""
+    level = [found]
+    for _ in range(DEEPEST):
+        level = [item for each in level if isinstance(each, (dict, list)) for item in _items(each)]
+        if not level:
+            return
+    raise RecursionError
+
+
+def _items(nested: dict[str, Any] | list[Any]) -> Iterable[Any]:
+    return nested.values() if isinstance(nested, dict) else nested

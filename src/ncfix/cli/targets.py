@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import IO
 from weakref import WeakSet
 
-from ncfix import files, ways
+from ncfix import files, inputs, ways
 from ncfix.batch.gathering import Gathered, gathered
 from ncfix.cli import console
 from ncfix.diagnostics import Place, UsageError
@@ -28,7 +28,7 @@ def read(path: str) -> bytes:
     if path != STREAM:
         return files.read_bytes(path)
     try:
-        return stdin().read()
+        return inputs.content(stdin())
     except OSError as error:
         raise files.unreadable(shown(path), error) from error
 
@@ -38,6 +38,10 @@ def stdin() -> IO[bytes]:
     if sys.stdin is None:
         raise files.unreadable(shown(STREAM), OSError(errno.EBADF, "it is closed"))
     stream = sys.stdin.buffer
+    try:
+        inputs.check(stream)
+    except OSError as error:
+        raise files.unreadable(shown(STREAM), error) from error
     if stream in _TAKEN:
         text = "standard input is to be two inputs, and can only be read once"
         raise UsageError.of("NCF022", text, hint="give one of them as a file")

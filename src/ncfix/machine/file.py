@@ -13,6 +13,7 @@ import numpy as np
 
 from ncfix.diagnostics import ConfigError, Place
 from ncfix.files import READING
+from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine import topology
 from ncfix.machine.axis import BASE_AXES, ORIGIN, Axis, Tool, Triad, Vector
 from ncfix.machine.effect import Effect
@@ -39,8 +40,7 @@ TILTED = 1e-6
 def load(path: str | Path) -> Machine:
     """The machine that a file describes. Raises `ConfigError` with every fault found (NCF300 to NCF319)."""
     try:
-        with open(path, "rb") as handle:
-            source = handle.read()
+        source = taken(str(path), MOST_SAID)
     except OSError as error:
         text = f"cannot read the machine file: {error.strerror}"
         hint = READING.get(error.errno or 0, "give an existing file's path")

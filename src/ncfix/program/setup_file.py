@@ -11,6 +11,7 @@ from typing import Any
 
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
+from ncfix.inputs import MOST_SAID
 from ncfix.program.setup import CALCULATOR, POINTLESS, Setup, Tool
 from ncfix.program.tool_table import load_tool_table
 from ncfix.toml_text import Path, decoded, key_lines, parsed, place_of
@@ -43,7 +44,7 @@ TOOL = re.compile(r"\d{1,9}$|(?!T\d+$|\d+$).{2,}")
 
 def load(path: str) -> Setup:
     """The setup in a file. Raises SourceError NCF002, ConfigError NCF38x with all that is wrong in it."""
-    return loads(decoded(read_bytes(path), path, NOT_TOML), path)
+    return loads(decoded(read_bytes(path, MOST_SAID), path, NOT_TOML), path)
 
 
 def loads(text: str, path: str = "<setup>") -> Setup:

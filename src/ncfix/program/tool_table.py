@@ -14,6 +14,7 @@ from pathlib import PurePath
 
 from ncfix.diagnostics import ConfigError, Message, Place
 from ncfix.files import read_bytes
+from ncfix.inputs import MOST_SAID
 from ncfix.program.setup import Tool
 from ncfix.program.tool_t import is_tool_t, tool_t_rows
 
@@ -30,7 +31,7 @@ def load_tool_table(path: str) -> dict[int, Tool]:
 
     Raises SourceError NCF002, ConfigError NCF385 with every line that is wrong.
     """
-    text = read_bytes(path).decode("utf-8-sig", "replace")
+    text = read_bytes(path, MOST_SAID).decode("utf-8-sig", "replace")
     reader = csv_rows if PurePath(path).suffix.lower() == ".csv" else linuxcnc_rows
     if is_tool_t(text):
         reader = tool_t_rows

@@ -15,6 +15,7 @@ from typing import Any
 import sympy as sp
 
 from ncfix.diagnostics import ConfigError, NcfixError, Place
+from ncfix.inputs import MOST_SAID, taken
 from ncfix.machine.fields import Report, Section, did_you_mean
 from ncfix.machine.symbolic.chain import Chain
 from ncfix.machine.symbolic.steps import UNITS, Expr, Rotation, Step, Translation, Vector
@@ -40,8 +41,7 @@ UNIT_TO = 1e-9
 def load_chain(path: str | Path) -> Chain:
     """The chain that a file describes; raises `ConfigError` with every fault found (NCF302 ... NCF305, NCF391)."""
     try:
-        with open(path, "rb") as handle:
-            source = handle.read()
+        source = taken(str(path), MOST_SAID)
     except OSError as error:
         raise ConfigError.of("NCF300", f"cannot read the chain file: {error.strerror}", Place(str(path))) from error
     return loads_chain(decoded(source, str(path), "NCF301"), str(path))
