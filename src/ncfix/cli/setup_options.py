@@ -141,6 +141,12 @@ OPTIONS = (
         metavar="DIR",
         help="Where subprograms are that are not beside the program (repeatable).",
     ),
+    click.option(
+        "--probed",
+        type=Position(),
+        multiple=True,
+        help="Where probing ends nominally, coordinates of the program: its results count as known (repeatable).",
+    ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
 )
 
@@ -158,6 +164,7 @@ class SetupOptions:
     no_point: str | None = None
     assume_zero: bool = False
     subprograms: tuple[str, ...] = ()
+    probed: tuple[dict[str, float], ...] = ()
 
     @property
     def files(self) -> tuple[str | None, str | None]:
@@ -181,6 +188,7 @@ class SetupOptions:
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}
         tools |= {int(key): tool for key, tool in given.items() if key.isdecimal()}
         named = {key: tool for key, tool in given.items() if not key.isdecimal()}
+        probed = {axis: value for given in self.probed for axis, value in given.items()}
         return replace(
             setup,
             work_offsets={**setup.work_offsets, **dict(self.offsets)},
@@ -191,6 +199,7 @@ class SetupOptions:
             no_point=self.no_point or setup.no_point,
             assume_zero=setup.assume_zero or self.assume_zero,
             subprograms=(*self.subprograms, *setup.subprograms),
+            probed={**(setup.probed or {}), **probed} if self.probed else setup.probed,
         )
 
 

@@ -75,8 +75,13 @@ class WordWriter(BlockWriter[Layout]):
         return self.target.increments[0] if word.address in LENGTHS else 1.0
 
     def _rewrite(self, word: Word, value: float, decimals: int) -> float:
-        """Give a word another value in its own style; an expression gives way to a number. Returns what is written."""
+        """Give a word another value in its own style; an expression gives way to a number, unless it is computed from
+        what was measured. Returns what is written."""
         start, stop = self.program.span(self.block, word.value_span)
+        if self.target.measured and word.address in self.target.letters:
+            column = self.target.letters.index(word.address)
+            if self.target.measured[column]:
+                return float(self.target.original[column])
         literal = isinstance(word.value, (Literal, Constant))
         style = NumberStyle.of(self.program.source[start:stop].decode("latin-1")) if literal else NumberStyle()
         increment = self._increment(word)

@@ -359,6 +359,7 @@ class _Emitter:
             offset=frame.frame.offset,
             wordless=tuple(wordless.tolist()),
             call=moves.call_of(row),
+            measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
             level=self.levels.wanted(
                 row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position
             ),

@@ -154,6 +154,8 @@ class Moves:
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
     resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`). None: none
     passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
+    measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
+                 and the words stay as they are, since what was measured has the machine's error in it. None: none
     angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
                  may count from 0 to 360 degrees; NaN for others. None: none
     call         (n,) of canned cycles whose depth stands in a call of its own: index into `calls`; -1 of others.
@@ -191,6 +193,7 @@ class Moves:
     placed: NDArray[np.bool_] | None = None
     fixed_centre: NDArray[np.bool_] | None = None
     counted: NDArray[np.bool_] | None = None
+    measured: NDArray[np.bool_] | None = None
     resting: NDArray[np.bool_] | None = None
     angles: NDArray[np.float64] | None = None
     passing: NDArray[np.int8] | None = None

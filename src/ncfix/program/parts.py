@@ -220,6 +220,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "approach": lambda moves: np.full(moves.end.shape, np.nan),
     "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
     "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
+    "measured": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),

@@ -56,6 +56,8 @@ class Setup:
     most_blocks       blocks that may be executed beyond those of the text; with more the program counts as endless
     passed_codes      G codes of the machine's builder that move nothing and change no coordinates, in tenths (G5.3: 53)
     subprograms       folders in which subprograms are looked for that are not beside the program
+    probed            where probing ends, if its results count as nominal: axis letter -> position in the program's
+                      coordinates, mm or degree; axes that are not in it: the end of the motion. None: at run time only
     block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
     """
 
@@ -74,3 +76,4 @@ class Setup:
     passed_codes: frozenset[int] = frozenset()
     named_tools: Mapping[str, Tool] = field(default_factory=dict)
     subprograms: tuple[str, ...] = ()
+    probed: Mapping[str, float] | None = None

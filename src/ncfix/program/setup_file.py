@@ -100,6 +100,7 @@ class Reading:
             "most_blocks": self.count,
             "passed_codes": self.codes,
             "subprograms": self.folders,
+            "probed": self.position,
         }
         if key not in readers:
             close = get_close_matches(key, readers, 1)

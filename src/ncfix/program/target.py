@@ -72,6 +72,7 @@ class Target:
     rotation     (3, 3) how the frame is turned
     offset       (n_axes,) of the frame, mm and rad
     level        of a canned cycle whose R is to be written: what it shall be
+    measured     (n_axes,) axes whose words are computed at run time, and must be; empty: no axis
     wordless     (n_axes,) axes that have no word and must get none; empty: no axis
     call         of a canned cycle whose depth stands in a call of its own
     """
@@ -110,6 +111,7 @@ class Target:
     level: Level | None = None
     wordless: tuple[bool, ...] = ()
     call: CycleCall | None = None
+    measured: tuple[bool, ...] = ()
 
     def may_name(self, column: int) -> bool:
         """Whether an axis has a word, or may get one."""

@@ -48,6 +48,11 @@ class MacroControl(Control):
         self.dynamic = False
         self.vectors = False
 
+    @property
+    def probes_nominally(self) -> bool:
+        """Never: variables hold where the machine stands, besides what a probe finds."""
+        return False
+
     def stands_square(self) -> bool:
         """Whether the tool is known to lie along Z of a tilted plane that is in force."""
         return self.tilted and stands_square(self)

@@ -103,6 +103,7 @@ class Builder:
         self._called: dict[int, int] = {}
         self._counted: dict[int, int] = {}
         self._resting: dict[int, int] = {}
+        self._measured: dict[int, int] = {}
         self.rolls: NDArray[np.bool_] | None = None
         self.winding: Winding | None = None
         self._said: list[tuple[int, int, int]] = []
@@ -179,6 +180,11 @@ class Builder:
     def counted(self, axes: int) -> None:
         """The motion that is added next has words that count from where it starts for these axes, and only these."""
         self._counted[self.count] = axes
+
+    def measures(self, axes: int) -> None:
+        """The motion that is added next has words for these axes that are computed from what has been measured."""
+        if axes:
+            self._measured[self.count] = axes
 
     def rests(self, axes: int) -> None:
         """The motion that is added next must leave these axes where they stand, though it names some of them."""
@@ -258,6 +264,7 @@ class Builder:
             placed=(~named).take(adrift, axis=0, mode="clip") if adrift.any() else None,
             fixed_centre=self._fixed_column(len(block)),
             counted=counted,
+            measured=self._mask_column(self._measured, np.zeros(len(block), dtype=np.bool_)),
             angles=angles,
             resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
             call=self._call_column(len(block)),
@@ -269,7 +276,7 @@ class Builder:
         """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
         self.count, self._called = 0, {}
         self.overturned = self.brought_back = None
-        self._said, self._resting, self._circles = [], {}, []
+        self._said, self._resting, self._circles, self._measured = [], {}, [], {}
         self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
 
     def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:

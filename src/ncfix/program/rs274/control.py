@@ -79,6 +79,11 @@ class Control(shared.Control):
         """As of every control, but for LinuxCNC's."""
         return not self.rules.strict
 
+    @property
+    def probes_nominally(self) -> bool:
+        """Whether what is known at run time only is what probing finds, and the setup says where it ends."""
+        return self.setup.probed is not None and not self.parameters.inputs
+
     def anchors(self) -> list[Hashable]:
         """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
         offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool

@@ -6,6 +6,7 @@ from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import INDEX, N_LETTERS, Vector, rotated
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Motion, Unknown
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.passing import Pass, Passing
 from ncfix.program.rs274.control import Block, Control
@@ -45,8 +46,28 @@ def straight(control: Control, block: Block, code: int) -> None:
     control.modal.motion = control.modal.straight = code
     if not block.axes:
         return
+    kind = Kind.FEED if code else Kind.RAPID
+    computed = block.runtime & INDEX.keys()
+    if computed and control.probes_nominally:
+        measured(control, block, computed, kind, code)
+        return
     target, unknown = destination(control, block)
-    control.make(Motion(Kind.FEED if code else Kind.RAPID, block.axes, target, unknown, code))
+    control.make(Motion(kind, block.axes, target, unknown, code))
+
+
+def measured(control: Control, block: Block, computed: frozenset[str], kind: Kind, code: int) -> None:
+    """A straight motion to a place of which some words are computed from what nominal probing has found.
+
+    The control goes on computing them. A block put in would have to do so too, and so would a word for such an axis in
+    a later block: neither is written.
+    """
+    axes = mask_of(INDEX[letter] for letter in computed)
+    target, unknown = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
+    whole, control.whole = control.whole, True
+    control.builder.measures(axes)
+    control.make(Motion(kind, block.axes, target, unknown, code))
+    control.whole = whole
+    control.places.lose(axes)
 
 
 def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
@@ -148,6 +169,9 @@ def probe(control: Control, block: Block, code: int) -> None:
     if code != ONE_SHOT_PROBE:
         control.modal.motion = code
     target, unknown = destination(control, block)
+    if control.probes_nominally:
+        probe_nominally(control, block, target, unknown, code)
+        return
     moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
     if control.rules.strict and code % 2 == 0 and not moved:
         raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
@@ -159,6 +183,21 @@ def probe(control: Control, block: Block, code: int) -> None:
     for index in range(N_LETTERS):
         control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
     control.parameters.assign(5070, 1.0, runtime=True)
+
+
+def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unknown, code: int) -> None:
+    """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
+    touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
+    if touched:
+        values = {letter: value / control.unit_of(INDEX[letter]) for letter, value in touched.items()}
+        incremental, control.modal.incremental = control.modal.incremental, False
+        target, unknown = destination(control, Block(block.index, values, frozenset(), block.axes))
+        control.modal.incremental = incremental
+    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, passing=PROBING))
+    program = control.program_position()
+    for index in range(N_LETTERS):
+        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
+    control.parameters.assign(5070, 1.0, runtime=False)
 
 
 # -- followed only as far as their end --------------------------------------------------------------------------------

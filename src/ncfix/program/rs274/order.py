@@ -57,6 +57,7 @@ def read_input(control: Control, block: Block, code: int) -> None:
     """M66 reads an input: the value is known only at run time."""
     if code == 660:
         control.parameters.assign(INPUTS, 0.0, runtime=True)
+        control.parameters.inputs = True
 
 
 M_STEPS: tuple[tuple[str, Step], ...] = (

@@ -61,6 +61,7 @@ class Parameters:
     persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
     returned    value of the last `return`, and whether it gave one
     touched     a value known only at run time has been read since this was last cleared
+    inputs      a pin of the machine or an input (M66) has been read: what is computed may depend on it
     changes     how often a parameter has got another value, or one has been read that the control computes
     """
 
@@ -71,6 +72,7 @@ class Parameters:
     persistent: Callable[[int], None] = lambda index: None
     returned: tuple[float, bool] = (0.0, False)
     touched: bool = False
+    inputs: bool = False
     changes: int = 0
 
     # -- reading ------------------------------------------------------------------------------------------------------
@@ -96,7 +98,7 @@ class Parameters:
             return self.predefined[name]()
         scope = self.scope_of(name)
         if name not in scope.values and name.startswith(OF_THE_MACHINE):
-            self.touched = True
+            self.touched = self.inputs = True
             return 0.0
         if name not in scope.values:
             hint = f'if the control has it: variables."#<{name}>" in the setup file'

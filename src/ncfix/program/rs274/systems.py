@@ -147,6 +147,8 @@ def turn_of(control: Control, system: int) -> Rotation:
 
 def mark_shaky(control: Control) -> None:
     """Note which letters have an offset that is known only at run time."""
+    if control.probes_nominally:
+        return
     runtime = control.parameters.numbers.runtime
     first = first_parameter(control.modal.system)
     marked = {index for index in control.machine if first + index in runtime or SHIFT + index in runtime}
