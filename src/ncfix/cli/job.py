@@ -115,7 +115,9 @@ class Job:
         if source.size is None or source.size >= part_bytes():
             fast.engage(console.forewarn)
         path = shown(source.path)
-        with outlet_for(target, not self.setup.assume_zero, lambda: bool(stream.stamped)) as outlet:
+        with outlet_for(
+            target, not self.setup.assume_zero and self.setup.probed is None, lambda: bool(stream.stamped)
+        ) as outlet:
             task = Task(self.machine, self.setup, self.options, find, path, dialect, part_bytes(), source.head)
             stream = Stream(task, source.read, outlet.put, jobs, source.ground(outlet.kept.fileno()))
             yield stream, outlet

@@ -29,6 +29,7 @@ from ncfix.compensate.verify import Figures, PathError, path_error
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, State
 from ncfix.program import stamp
+from ncfix.program.follow.knowledge import PROBED
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves, Trace
 from ncfix.program.second_reading import SecondReading
@@ -124,8 +125,10 @@ def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: t
     words = (
         f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
     )
-    if assumed:
-        words += f", assumed zero: {', '.join(assumed)}"
+    if PROBED in assumed:
+        words += ", nominal probing"
+    if zeros := [each for each in assumed if each != PROBED]:
+        words += f", assumed zero: {', '.join(zeros)}"
     return words[: min(program.dialect.line_limit or SHORT_LINE, SHORT_LINE) - 10]
 
 

@@ -60,10 +60,13 @@ class Settled:
     rounds: tuple[Round, ...] = ()
 
     def shown(self, rapids: bool) -> Mask:
-        """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them."""
+        """(n,) motions that figures are of: corrected ones that cut, and `rapids` if the tolerance holds along them.
+
+        Not those to a place that the machine measures itself: what it finds has its error in it.
+        """
         wanted = self.moves.cuts | (self.moves.kind == Kind.RAPID) if rapids else self.moves.cuts
         shown: Mask = wanted & ~self.kept
-        return shown
+        return shown if self.moves.measured is None else shown & ~self.moves.measured.any(axis=1)
 
     @property
     def shift(self) -> Array:

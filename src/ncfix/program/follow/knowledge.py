@@ -13,6 +13,8 @@ TOOL_LENGTH = "NCF202"
 START_POSITION = "NCF203"
 REFERENCE_POINT = "NCF204"
 ASSUMED = "NCF205"
+PROBED = "results of probing"
+"""What `Knowledge.assumed` calls them where they count as nominal; all else in it was taken as zero."""
 
 
 @dataclass(slots=True)
@@ -21,7 +23,7 @@ class Knowledge:
 
     place    where in the program we are, for messages
     missing  what was not given, by name
-    assumed  what was taken as zero because the setup says so, by name
+    assumed  what was taken as zero because the setup says so, by name; and `PROBED`
     """
 
     setup: Setup
@@ -67,6 +69,11 @@ class Knowledge:
     def start_position(self, letter: str) -> None:
         """The start position of an axis matters and is not given."""
         self.lack(START_POSITION, f"start position of {letter}", "matters", f"--initial {letter}=...")
+
+    def probing(self) -> None:
+        """The program goes on with what probing has found, which counts as nominal."""
+        text = "probing counts as ending where the setup says; what is computed from its results stays as it is"
+        self.assumed.setdefault(PROBED, Message(ASSUMED, text, self.place(), "without --probed this is refused"))
 
     def reference_point(self, code: str) -> None:
         """The position of a reference point is used as a number and not given."""

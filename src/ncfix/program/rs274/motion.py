@@ -187,6 +187,7 @@ def probe(control: Control, block: Block, code: int) -> None:
 
 def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unknown, code: int) -> None:
     """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
+    control.knowledge.probing()
     touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
     if touched:
         values = {letter: value / control.unit_of(INDEX[letter]) for letter, value in touched.items()}
