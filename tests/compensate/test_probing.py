@@ -55,10 +55,14 @@ def test_what_is_computed_from_probing_is_refused_unless_the_setup_says_where_it
 
 def test_words_computed_from_probing_stay_and_the_others_are_corrected() -> None:
     lines = fixed(LEVELLED).text.decode().splitlines()[1:]
-    assert lines[9].startswith("G1 X10.01") and lines[9].endswith("Z[#100 - 0.1] F200")
-    assert lines[10].startswith("X40.01") and lines[10].endswith("Z[[#100+#101]/2-0.1]")
-    assert lines[11].startswith("Y29.99") and "Z#101" in lines[11]
-    assert lines[14].startswith("G1 X0.01") and "Z4.99" in lines[14]
+    assert lines[9].startswith("G1 X10.01")
+    assert lines[9].endswith("Z[#100 - 0.1] F200")
+    assert lines[10].startswith("X40.01")
+    assert lines[10].endswith("Z[[#100+#101]/2-0.1]")
+    assert lines[11].startswith("Y29.99")
+    assert "Z#101" in lines[11]
+    assert lines[14].startswith("G1 X0.01")
+    assert "Z4.99" in lines[14]
 
 
 def test_an_axis_that_has_gone_to_a_measured_place_gets_no_word_of_its_own() -> None:
