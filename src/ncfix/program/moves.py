@@ -152,7 +152,8 @@ class Moves:
                  only then may it get a word that its block lacks (see `rs274.places`). None: all are
     fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
-    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`). None: none
+    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`), or that have no
+                 words in such a block: rotary axes in many cycles. None: none
     passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
     measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
                  and the words stay as they are, since what was measured has the machine's error in it. None: none

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from ncfix.program.follow.coordinates import X, Y, Z
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Motion
+from ncfix.program.follow.places import mask_of
 from ncfix.program.klartext import trans_cycles
 from ncfix.program.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
 from ncfix.program.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
@@ -121,6 +122,8 @@ def call(control: Control, step: Step) -> None:
         refusal = refusal or FROM_INCREMENT
     if by_height and not old:
         bottom, clear = bottom + height, clear + height
+    if by_height or step.name == "cycl call":
+        control.builder.rests(mask_of(control.turning))
     drill(control, where, axes, (bottom, clear, refusal))
 
 

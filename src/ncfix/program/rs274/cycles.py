@@ -12,6 +12,7 @@ from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import LETTERS, Plane, Vector, X, Y, dot
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.motion import Motion, Unknown
+from ncfix.program.follow.places import mask_of
 from ncfix.program.moves import FeedMode, Kind
 from ncfix.program.rs274.arithmetic import whole
 from ncfix.program.rs274.control import Block, Control
@@ -130,6 +131,8 @@ def drill(control: Control, block: Block, code: int, program: Vector, depth: flo
     program[across] = depth
     bottom, adrift = command(control, block, program), control.places.adrift
     settles = 0 if control.modal.incremental else block.axes | 1 << across
+    if control.rules.strict:
+        control.builder.rests(mask_of(control.turning))
     control.make(Motion(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
     if not control.modal.retract_to_r:
         control.places.lose(adrift & 1 << across)

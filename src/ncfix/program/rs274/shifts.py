@@ -96,6 +96,7 @@ def rotate_system(control: Control, block: Block, code: int) -> None:
         control.unnamed = frozenset((control.modal.plane.first, control.modal.plane.second))
     turned_back(control)
     control.refresh()
+    control.places.shift(mask_of(control.unnamed))
 
 
 def uncertain(control: Control, block: Block) -> str:
