@@ -112,6 +112,13 @@ FRAMES = [
     case("CYCLE800 over a programmed frame", "TRANS X5\nCYCLE800()\nG1 X5 F100\nTRANS\nX7", L5=N, L7=R),
     case("CYCLE800 deselected", 'CYCLE800(1,"0",0,57,0,0,0,0,0,0,0,0,0,-1)\nG0 X5\nG0 X5 Y5 Z60', L4=P, L5=R),
     case("CYCLE800 that aligns the tool", 'CYCLE800(0,"T",100,57,0,0,0,9,0,0,0,0,0,-1)\nG0 X1 Y1 Z60', L4=N),
+    case(
+        "CYCLE800 at zero that turns nothing",
+        'CYCLE800(0,"T",0,57,1,2,0,0,0,0,0,0,0,0)\nG0 X1 Y1 Z60\nG1 X5',
+        L4=R,
+        L5=R,
+    ),
+    case("CYCLE800 that turns nothing", 'CYCLE800(0,"T",0,57,0,0,0,9,0,0,0,0,0,0)\nG0 X1 Y1 Z60', L4=N),
     case("CYCLE800 without rotary axes", "CYCLE800()\nG1 X5 F100", L4=R),
 ]
 FLOW = [

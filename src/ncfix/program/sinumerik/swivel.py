@@ -15,6 +15,7 @@ import numpy as np
 
 from ncfix.program.follow.coordinates import X, Y, Z, angles_in_words, as_rotation
 from ncfix.program.follow.places import mask_of
+from ncfix.program.follow.tcp import rotary_at_zero
 from ncfix.program.moves import Kind
 from ncfix.program.passing import Pass, Passing
 from ncfix.program.sinumerik.affine import WORLD, Affine, shifted, turned
@@ -44,6 +45,7 @@ OVER_FRAME = (
     "a programmed frame (TRANS, ROT, ...) was in force at CYCLE800, and whether it stays is for machine data: "
     "take it out before"
 )
+STILL = ", without turning the rotary axes"
 AFTER_SWIVEL = "where the axis {} stands after swivelling (CYCLE800) is not followed"
 
 
@@ -69,7 +71,10 @@ def swivel(control: Sinumerik, block: int, step: Calling) -> None:
         control.suspended["tilt"] = UNFOLLOWED.format(plane.fault)
         control.lose_all(AFTER_SWIVEL)
         return
-    tilted(control, block, plane)
+    if plane.direction:
+        tilted(control, block, plane)
+    else:
+        level(control, plane)
 
 
 class Plane:
@@ -77,7 +82,7 @@ class Plane:
 
     frame      of the plane
     adds       it is added to the plane in force
-    direction  -1 or 1: which of two ways the rotary axes take
+    direction  -1 or 1: which of two ways the rotary axes take; 0: they stand still
     retracts   the axes retract before they turn
     fault      why it is not followed, empty if it is
     """
@@ -99,8 +104,8 @@ class Plane:
         fault = f", mode {mode}" if turn is None else ""
         if table // 100 % 10:
             fault = fault or ", which aligns the tool"
-        if direction not in (-1, 1):
-            fault = fault or ", without turning the rotary axes"
+        if direction not in (-1, 0, 1) or (direction == 0 and turn is not None and turn.rotation != WORLD.rotation):
+            fault = fault or STILL
         frame = shifted(dict(enumerate(before))).then(turn or WORLD).then(shifted(dict(enumerate(after))))
         return cls(frame, table % 10 == 1, direction, round(values[PLACES["fr"]]) != 0, fault)
 
@@ -162,6 +167,21 @@ def tilted(control: Sinumerik, block: int, plane: Plane) -> None:
     mask = mask_of(control.turning)
     end = End(target, control.unknown_for(lost), lost)
     control.go(Leg(Kind.RAPID, Words(block, {}, {}, mask), end, control.modal.motion, passing=SWIVEL))
+
+
+def level(control: Sinumerik, plane: Plane) -> None:
+    """A plane that is not turned, while the rotary axes stand still: as they stand, the tool has to be square to it."""
+    control.settle(control.turning)
+    whole = control.frames.swivel.then(plane.frame) if plane.adds else plane.frame
+    if whole.rotation != WORLD.rotation or not rotary_at_zero(control, control.position, control.unknown):
+        control.suspended["tilt"] = UNFOLLOWED.format(STILL)
+        control.lose_all(AFTER_SWIVEL)
+        return
+    control.frames.swivel, control.frames.program = whole, WORLD
+    control.modes.swivelled = True
+    control.switch_tcp()
+    if plane.retracts:
+        control.lose_axes(GEOMETRY, AFTER_SWIVEL)
 
 
 def turn_square(control: Sinumerik, plane: Plane) -> dict[int, float]:
