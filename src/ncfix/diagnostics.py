@@ -6,6 +6,7 @@ stays an ordinary exception, and the command line reports it as a fault of ncfix
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
@@ -24,8 +25,32 @@ class Code:
     hint: str = ""
 
 
+_BIDI = "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+"""Characters that turn the direction of writing round, or end a line, and are not seen themselves."""
+_UNSEEN = rf"\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f{_BIDI}\ud800-\udfff"
+_IN_A_LINE = re.compile(rf"[\t\n\r{_UNSEEN}]")
+_IN_LINES = re.compile(rf"\r\n?|[{_UNSEEN}]")
 EXCERPT = 100
 """Characters of a source line that a message shows."""
+
+
+def visible(text: str, lines: bool = False) -> str:
+    """A text in which nothing steers a terminal: control characters as they are written in Python, `\\x1b` for one.
+
+    So are those that turn the direction of writing round, and bytes of a name that are no characters.
+
+    lines  the text has several lines, which may end in any way, and tabs
+    """
+    return (_IN_LINES if lines else _IN_A_LINE).sub(_escaped, text)
+
+
+def _escaped(found: re.Match[str]) -> str:
+    if found[0] == "\r\n":
+        return "\n"
+    number = ord(found[0])
+    if 0xDC80 <= number <= 0xDCFF:  # a byte, as Python has it in the name of a file
+        return f"\\x{number - 0xDC00:02x}"
+    return {9: "\\t", 10: "\\n", 13: "\\r"}.get(number, f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}")
 
 
 class ExitCode(IntEnum):
@@ -49,7 +74,7 @@ class Place:
     text: str = ""
 
     def __str__(self) -> str:
-        parts = [self.path or "''"]
+        parts = [visible(self.path) or "''"]
         if self.line:
             parts.append(str(self.line))
             if self.column:
@@ -68,11 +93,11 @@ class Message:
 
     def __str__(self) -> str:
         head = f"{self.place}: " if self.place else ""
-        lines = [f"{head}{self.code}: {self.text}"]
+        lines = [f"{head}{self.code}: {visible(self.text)}"]
         if self.place and self.place.text:
             lines += [f"    {line}" for line in _excerpt(self.place.text, self.place.column)]
         if self.hint:
-            lines.append(f"  hint: {self.hint}")
+            lines.append(f"  hint: {visible(self.hint)}")
         return "\n".join(lines)
 
     @property

@@ -211,8 +211,10 @@ def test_messages_are_plain_where_no_terminal_is_or_no_colour_is_wanted(
     assert console.colour() is None
     monkeypatch.setenv("NO_COLOR", "1")
     assert console.colour() is False
+    console.say("part.ngc: NCF002: in bold on a terminal")
+    assert capsys.readouterr().err == "part.ngc: NCF002: in bold on a terminal\n"
     console.say(click.style("red", fg="red"))
-    assert capsys.readouterr().err == "red\n"
+    assert capsys.readouterr().err == "\\x1b[31mred\\x1b[0m\n"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")

@@ -11,7 +11,7 @@ from ncfix.cli import console
 from ncfix.cli.job import Job, Outcome
 from ncfix.cli.options import subprograms
 from ncfix.cli.targets import STREAM, Target, shown
-from ncfix.diagnostics import ExitCode, FaultError, Place
+from ncfix.diagnostics import ExitCode, FaultError, Place, visible
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Batch:
 
 
 def _kept(target: Target, record: Record) -> Outcome:
-    console.say(f"{shown(target.source)} -> {target.path}: done before")
+    console.say(f"{visible(shown(target.source))} -> {visible(target.path)}: done before")
     return Outcome(ExitCode.DONE, {**record.entry, "resumed": True}, record.called)
 
 

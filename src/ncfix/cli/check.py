@@ -14,7 +14,7 @@ from ncfix.cli.options import dialect_option, json_option, optional_machine_opti
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.surveying import looked_at
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import ExitCode, Message, NcfixError
+from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
 
 
 @click.command()
@@ -59,7 +59,7 @@ def _outcome(following: Following, path: str) -> Outcome:
     count = len(checked.findings)
     said = console.counted(count, "finding") if count else "nothing found"
     size = f"{console.counted(checked.blocks, 'block')}, {console.counted(checked.moves, 'motion')}"
-    console.say(f"{shown(path)}: {size}, {dialect}: {said}")
+    console.say(f"{visible(shown(path))}: {size}, {dialect}: {said}")
     entry |= {"dialect": dialect, "blocks": checked.blocks, "moves": checked.moves}
     return Outcome(ExitCode.FINDINGS if count else ExitCode.DONE, {**entry, "findings": _as_dicts(checked.findings)})
 

@@ -1,10 +1,16 @@
-"""The two streams: data on standard output, messages on standard error, nothing else on either."""
+"""The two streams: data on standard output, messages on standard error, nothing else on either.
+
+Whatever goes to a terminal goes through here, and nothing in it steers the terminal: names, programs and machine files
+come from anywhere. Text for people is made visible (`diagnostics.visible`) wherever it goes; data is left as it is, but
+where it goes to a terminal.
+"""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,12 +23,13 @@ from typing import Any, TextIO
 import click
 
 from ncfix.cli.alike import gathered
-from ncfix.diagnostics import Message, Place, UsageError
+from ncfix.diagnostics import Message, Place, UsageError, visible
 from ncfix.files import unwritable
 
 SCHEMA = 1
 """Version of the objects that `--json` prints."""
 
+CODE = re.compile(r"\bNCF\d{3}:")
 MOST = 20
 """Messages of one code that are written out."""
 
@@ -38,13 +45,14 @@ _kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
 
 
 def say(text: str) -> None:
-    """A line for people, on standard error."""
+    """A line for people, on standard error; the first code of a message in it is bold on a terminal."""
     kept = _kept.get()
     if kept is not None:
         kept.append(text)
         return
+    seen = CODE.sub(lambda found: click.style(found[0], bold=True), visible(text, lines=True), count=1)
     with suppress(OSError, AttributeError):  # nobody can be told that nobody can be told; exit codes still say it
-        click.echo(text, err=True, color=colour())
+        click.echo(seen, err=True, color=colour())
 
 
 def forewarn(text: str) -> None:
@@ -73,7 +81,7 @@ def tell(*messages: Message) -> None:
     """Coded messages, on standard error; one without a hint of its own points to the explanation of its code."""
     for plain in messages:
         message = replace(plain, hint=plain.advice)
-        say(str(message).replace(f"{message.code}:", click.style(f"{message.code}:", bold=True), 1))
+        say(str(message))
 
 
 def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iterable[Message]] = list) -> None:
@@ -94,11 +102,13 @@ def tell_some(messages: Iterable[Message], shown: Callable[[list[Message]], Iter
 
 
 def put(data: str | bytes) -> None:
-    """Data on standard output, as it is, at once."""
+    """Text for people on standard output, made visible, or data as it is, but for a terminal; at once."""
     if sys.stdout is None:
         raise UsageError.of("NCF007", "is closed", Place("<stdout>"), "-o FILE")
     try:
-        click.echo(data, nl=False, color=colour())
+        if isinstance(data, bytes) and sys.stdout.isatty():
+            data = data.decode("utf-8", "surrogateescape")
+        click.echo(visible(data, lines=True) if isinstance(data, str) else data, nl=False, color=colour())
         sys.stdout.flush()
     except BrokenPipeError as error:
         abandon_stdout()
@@ -120,8 +130,9 @@ def put_json(**content: object) -> None:
 
 
 def json_text(**content: object) -> str:
-    """One JSON object with its schema version; numbers that are not finite become null."""
-    return json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1) + "\n"
+    """One JSON object with its schema version, in visible ASCII; numbers that are not finite become null."""
+    text = json.dumps({"schema": SCHEMA, **{key: _plain(value) for key, value in content.items()}}, indent=1)
+    return text.replace("\x7f", "\\u007f") + "\n"
 
 
 def _plain(value: Any) -> Any:
@@ -150,6 +161,7 @@ def error_figures(error: Mapping[str, Any]) -> str:
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table on standard output: plain columns, or a drawn table on a terminal."""
+    header, *rows = (tuple(map(visible, row)) for row in (header, *rows))
     if sys.stdout is not None and sys.stdout.isatty():
         _drawn(header, rows)
         return
@@ -177,8 +189,9 @@ def busy(what: str) -> Iterator[None]:
         yield
         return
     from rich.console import Console
+    from rich.text import Text
 
-    status = Console(stderr=True).status(what)
+    status = Console(stderr=True).status(Text(visible(what)))
     timer = Timer(BUSY_AFTER_S, status.start)
     timer.daemon = True
     timer.start()

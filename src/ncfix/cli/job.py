@@ -18,7 +18,7 @@ from ncfix.cli.faults import owned
 from ncfix.cli.options import dialect_of, subprograms
 from ncfix.cli.parts import Fixed, Outlet, Source, outlet_for, part_bytes, source_of
 from ncfix.cli.targets import STREAM, Target, shown
-from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place
+from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, visible
 
 if TYPE_CHECKING:
     from ncfix.compensate.options import FixOptions
@@ -197,7 +197,7 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
     output = "nothing written" if refused else "<stdout>" if entry["output"] == STREAM else entry["output"]
     counts = f"{entry['compensated']} corrected, {entry['passed']} passed by rule, {len(entry['refused'])} refused"
     lines = [
-        f"{entry['path']} -> {output}",
+        f"{visible(entry['path'])} -> {visible(output)}",
         f"  motion blocks       {counts}; {entry['inserted_blocks']} inserted",
         f"  largest correction  {entry['max_correction_um']:.1f} um",
     ]

@@ -9,7 +9,7 @@ import click
 from ncfix.cli import console
 from ncfix.cli.options import json_option, load_machine
 from ncfix.cli.targets import shown
-from ncfix.diagnostics import ExitCode, Message, Place
+from ncfix.diagnostics import ExitCode, Message, Place, visible
 from ncfix.plugins import nearest, registry
 
 if TYPE_CHECKING:
@@ -36,15 +36,16 @@ def check(file: str, as_json: bool) -> int:
     impossible = sum(doubt.impossible for doubt in odd)
     remarks = [*(doubt.message for doubt in odd), *_remarks(found, shown(file))]
     console.tell(*remarks)
+    name = f"{visible(shown(file))}: {visible(found.name)}"
     if as_json:
         said = [message.as_dict() for message in remarks]
         console.put_json(path=shown(file), ok=not impossible, name=found.name, hash=found.hash, remarks=said)
     elif impossible:
-        console.say(f"{shown(file)}: {found.name}: {console.counted(impossible, 'fault')}: no machine is like this one")
+        console.say(f"{name}: {console.counted(impossible, 'fault')}: no machine is like this one")
     else:
         axes = "1 axis" if len(found.axes) == 1 else f"{len(found.axes)} axes"
         effects = console.counted(len(found.effects), "effect")
-        console.say(f"{shown(file)}: {found.name}: in order, {axes}, {effects}")
+        console.say(f"{name}: in order, {axes}, {effects}")
     return ExitCode.FINDINGS if impossible else ExitCode.DONE
 
 

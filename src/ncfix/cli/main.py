@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from importlib import import_module
+from io import TextIOWrapper
 
 import click
 
@@ -98,6 +99,8 @@ def main() -> None:
     of whole numbers, which is below what a line of a program may have.
     """
     sys.set_int_max_str_digits(MOST_DIGITS)
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name may have bytes that are no characters
     if not sys.warnoptions and "--debug" not in sys.argv:
         warnings.simplefilter("ignore", RuntimeWarning)
     code = run(sys.argv[1:])

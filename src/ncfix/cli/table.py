@@ -164,7 +164,7 @@ BEFORE, POINTED, BEHIND = _tables()
 
 
 def _quoted(word: str) -> str:
-    return '"' + word.replace('"', '""') + '"' if any(mark in word for mark in ',"\n') else word
+    return '"' + word.replace('"', '""') + '"' if any(mark in word for mark in ',"\n\r') else word
 
 
 def _shortest(value: float) -> str:
@@ -177,7 +177,7 @@ JSON = Form(
     b",\n  [\n   ",
     b",\n   ",
     b"\n  ]",
-    json.dumps,
+    lambda word: json.dumps(word).replace("\x7f", "\\u007f"),
     lambda value: _shortest(value) if math.isfinite(value) else "null",
 )
 
