@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from differential import errors, sinumerik
 from differential.sinumerik_frames import Floats
-from differential.sinumerik_holes import COMBINATIONS, program
+from differential.sinumerik_holes import COMBINATIONS, HEAD, program
 from differential.test_siemens import AT_ENDS, LENGTHS, MACHINE, OFFSETS, SETUP, START
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.machine import Machine, load
@@ -103,3 +104,25 @@ def test_every_hole_is_corrected_or_refused(root: Path, figures: Callable[[str],
             f"siemens holes, {strategy}: {counts}, silently wrong 0; worst {tally.worst * 1e3:.3f} um, "
             f"before {tally.before * 1e3:.1f} um{why}"
         )
+
+
+ARCS = (
+    "G2 X10 Y0 I5 J0\nCYCLE81(40,0,2,-8)\nX0 Y0 I-5 J0\nG1 X3",
+    "G2 X10 Y0 I5 J0\nCYCLE81(40,0,2,-8)\nG93\nG1 X5 F2\nCYCLE81(40,0,2,-9)\nX7 F3\nG94\nG1 F500",
+    "ROT X20 Y10\nG0 X0 Y0 Z50\nG2 X10 Y0 I5 J0\nCYCLE81(40,0,2,-8)\nG2 X0 Y0 I-5 J0",
+    "MCALL CYCLE81(40,0,2,-8)\nX10 Y10\nTRANS X5 Y5\nX10 Y10\nROT Z30\nX20 Y5\nTRANS\nMCALL",
+    "MCALL CYCLE81(40,0,2,-8)\nG111 X0 Y0\nAP=30 RP=20\nAP=60\nAP=90\nMCALL",
+    "MCALL CYCLE81(40,0,2,-8)\nX10 Y10\nC90\nA10 C=DC(100)\nMCALL",
+    "TRAORI\nG54\nG0 X0 Y0 Z50 A3=0.1 B3=0.1 C3=1\nMCALL CYCLE81(40,0,2,-8)\nX10 Y10 A3=0.2 B3=0.1 C3=1\nX20\nMCALL",
+)
+"""What the generator does not have: codes other than G0 and G1 in force at a call, frames and turns under MCALL."""
+
+
+@pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
+@pytest.mark.parametrize("body", ARCS)
+def test_none_is_refused(body: str, strategy: str, root: Path) -> None:
+    text = "\n".join([*HEAD, body, "G0 X1 Y2 Z60", "M30"]) + "\n"
+    tally = Tally()
+    judged(text, strategy, errors.load(root / MACHINE), load(str(root / MACHINE)), tally)
+    assert not tally.wrong
+    assert tally.holes.keys() == {"corrected"}

@@ -304,7 +304,7 @@ class _Emitter:
         still = frame.still(ends[-1] == target.start)
         self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
         self.end[rows.stop - 1] = self.position
-        self._note_code(row, target.last_code)
+        self._note_code(row, rendered.code_behind(target))
         if block not in self.written:
             self.written[block] = rendered
             self.latest.append(block)
@@ -392,8 +392,7 @@ class _Emitter:
         for block in sorted(self.latest):
             rendered = self.written[block]
             edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
-            lines = rendered.lines_before(self.written.get(block + 1))
-            if lines:
+            if lines := rendered.lines_before(self.written.get(block + 1)):
                 at = int(self.program.blocks[block, 1])
                 edits.append(Edit(at, at, "".join(end_of_line + line for line in lines).encode("latin-1")))
             self.added += len(lines) + rendered.opens

@@ -105,6 +105,7 @@ class CycleCall:
     across     the letter of the axis along which it drills
     modal      it stands before the motion to the hole, and holds for others, too; else it drills where the axes stand
     fixed      why no other call may be written in its place, or beside it; empty: it may
+    bound      an argument is known only at run time: the depth stays as the program has it
     """
 
     name: str
@@ -113,6 +114,7 @@ class CycleCall:
     across: str
     modal: bool
     fixed: str = ""
+    bound: bool = False
 
 
 @dataclass(frozen=True, slots=True)

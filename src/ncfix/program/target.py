@@ -134,6 +134,7 @@ class Rendered:
     centre, centres  of the first piece if it is an arc, and of further ones by their number
     level            the R that is in force behind the block, if that is known
     conflict         why the motion cannot be written after all; empty if it is
+    code             the motion code that is in force behind the block, in tenths, if it is another than was asked for
     opens            what is written begins with a call of a cycle, which replaces the one in force
     closing          the line behind it with which the call before comes back, unless the next block opens with its own
     """
@@ -145,8 +146,13 @@ class Rendered:
     centres: dict[int, FloatArray] = field(default_factory=dict)
     level: float | None = None
     conflict: str = ""
+    code: int | None = None
     opens: bool = False
     closing: str = ""
+
+    def code_behind(self, target: Target) -> int:
+        """The motion code that is in force behind the block, in tenths."""
+        return target.last_code if self.code is None else self.code
 
     def lines_before(self, next_block: Rendered | None) -> list[str]:
         """The lines to put after the block, where that is what is written of the next one; None: nothing."""

@@ -29,7 +29,6 @@ TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are
 BY_DIAMETER = "the depth of {} follows from a diameter (_GMODE)"
 TO_A_HOLE = "a hole under MCALL to which neither G0 nor G1 leads, or one in machine coordinates"
 WITH_WORDS = "a drilling cycle and axis words in one block"
-BEYOND_CALL = "this hole needs a depth of its own, and an argument of its cycle is known only at run time"
 ELSEWHERE = "this hole needs a depth of its own, and its cycle is called in another file"
 ALONE = "this hole needs a line of its own, which REPEAT would leave out"
 UNDER_ANOTHER = "this hole needs a line of its own, after which the modal cycle in force would drill"
@@ -95,16 +94,14 @@ class Drilling:
     def call(self, control: Sinumerik, block: int, *, modal: bool) -> CycleCall:
         """The call for a hole in a block of the program that is executed."""
         depths = [(place, 1 if place in (DP, FIRST_DEPTH[0]) else -1) for place in self._depths()]
-        fixed = "" if self.sure else BEYOND_CALL
+        fixed = ALONE if block in control.solitary else ""
         if modal and self.external != control.external:
             fixed = fixed or ELSEWHERE
-        if block in control.solitary:
-            fixed = fixed or ALONE
         if not modal:
             fixed = fixed or (UNDER_ANOTHER if control.modes.modal_cycle is not None else "")
             fixed = fixed or ("" if control.stated else UNSTATED)
         across = LETTERS[control.modal.plane.across]
-        return CycleCall(self.name.upper(), self.values, tuple(depths), across, modal, fixed)
+        return CycleCall(self.name.upper(), self.values, tuple(depths), across, modal, fixed, not self.sure)
 
     def _depths(self) -> list[int]:
         """The places of the arguments that say how deep the hole, or the first step to it, is."""

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ncfix.program.moves import CycleCall
 from ncfix.program.number_style import NumberStyle
-from ncfix.program.sinumerik.layout import SinumerikLayout
+from ncfix.program.sinumerik.layout import END_OF_SUBPROGRAM, SinumerikLayout
 from ncfix.program.sinumerik.render import SinumerikRenderer
 from ncfix.program.sinumerik.unroll import argument, written
-from ncfix.program.target import Rendered, Target
+from ncfix.program.target import LINE, Rendered, Target
 from ncfix.program.tree import Program, Word
 
 FloatArray = NDArray[np.float64]
@@ -27,11 +27,8 @@ CYCLE = re.compile(r"(?P<name>\w+)\s*\((?P<arguments>.*)\)", re.DOTALL)
 REFERENCE = 1
 """The place of the height that the cycle counts from (RFP)."""
 
-STRAIGHT = (0, 10)
-BESIDE_ARC = "the hole needs a motion of its own, and neither G0 nor G1 is in force"
-TIMED = "the hole needs a motion of its own, which in inverse time (G93) needs a feed of its own"
-ENDS_HERE = "the hole needs a line behind it, and its block has an M code that acts where it ends"
-INSIDE_OUT = "the corrected depth of the hole would be on the other side of its reference plane"
+RAPID = 0
+ENDS_HERE = "the hole needs a line behind it, and the subprogram ends in its block"
 
 
 def render(program: Program, block: int, layout: SinumerikLayout, target: Target) -> Rendered:
@@ -52,6 +49,8 @@ class HoleRenderer(SinumerikRenderer):
         if abs(off) < self.half[self.across]:
             off = 0.0
         arguments, sunk = shifted(call, off, int(target.decimals[self.across]))
+        if call.bound or self._is_inside_out(call, sunk):
+            arguments, sunk = None, 0.0
         position = self._led_to(call, arguments) if call.modal else self._called(call, arguments)
         position[self.across] = target.nominal[self.across] + sunk
         self.out.ends.append(position)
@@ -79,18 +78,14 @@ class HoleRenderer(SinumerikRenderer):
 
     def _check(self, call: CycleCall) -> None:
         """Whether lines may be put before and behind the block."""
-        self._conflict(call.fixed)
-        if self.layout.after:
-            self._conflict(ENDS_HERE)
+        codes = (self._value(word, np.nan) for word in self.layout.after)
+        self.out.conflict = call.fixed or (ENDS_HERE if END_OF_SUBPROGRAM.intersection(codes) else "")
+
+    def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
+        """Whether the hole would end on the other side of the height that its cycle counts from."""
         reference = call.arguments[REFERENCE] if len(call.arguments) > REFERENCE else None
         nominal = float(self.target.nominal[self.across])
-        if isinstance(reference, float):
-            wanted = float(self.target.ends[0][self.across])
-            if (nominal - reference) * (wanted - reference) <= 0.0:
-                self._conflict(INSIDE_OUT)
-
-    def _conflict(self, why: str) -> None:
-        self.out.conflict = self.out.conflict or why
+        return isinstance(reference, float) and (nominal - reference) * (nominal + sunk - reference) <= 0.0
 
     # -- where the axes stand -----------------------------------------------------------------------------------------
 
@@ -109,13 +104,10 @@ class HoleRenderer(SinumerikRenderer):
         if arguments is not None:
             text = with_depths(text, call, arguments)
         if self.added:
-            if target.active_code not in STRAIGHT:
-                self._conflict(BESIDE_ARC)
-            if target.active_code and target.inverse_time:
-                self._conflict(TIMED)
-            text = f"MCALL {text}"
-            prefix = self._prefix()
-            self.out.lines += [prefix + "".join(self.added).strip(), prefix + "MCALL"]
+            text, prefix, led = f"MCALL {text}", self._prefix(), "".join(self.added).strip()
+            if target.active_code != RAPID and (target.active_code != LINE or target.inverse_time):
+                led, self.out.code = f"G0 {led}", RAPID
+            self.out.lines += [prefix + led, prefix + "MCALL"]
         self.out.edits.append((start, stop, text))
         return position
 
@@ -136,7 +128,7 @@ class HoleRenderer(SinumerikRenderer):
         return columns
 
     def _prefix(self) -> str:
-        return self.program.slice(self.block, self.layout.prefix) if self.layout.prefix else ""
+        return self.program.slice(self.block, self.layout.prefix) + " " if self.layout.prefix else ""
 
     def _line_end(self) -> str:
         return self.program.line_end.decode()
