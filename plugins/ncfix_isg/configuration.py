@@ -25,14 +25,17 @@ MOST_FILES = 10
 LIST = re.compile(rb"(?im)^[ \t]*(?:workpiece_axes|file(?:_format)?\[\d+\])[ \t]")
 
 
-def config_text(numbers: Mapping[str, int], folder: str, names: Sequence[str], filter_steps: int) -> bytes:
-    """The list: axis numbers, switches, and the files."""
+def config_text(
+    numbers: Mapping[str, int], folder: str, names: Sequence[str], filter_steps: int, negate: str = ""
+) -> bytes:
+    """The list: axis numbers, switches, and the files; negate: the axes whose compensation the control turns round."""
     joint = "" if folder.endswith(("\\", "/")) else "\\"
     entries = {
         **HEAD,
         **{name: str(number) for name, number in numbers.items()},
         **TAIL,
         "filter_steps": str(filter_steps),
+        **({"negate": negate} if negate else {}),
     }
     for number, name in enumerate(names):
         entries |= {f"file[{number}]": f"{folder}{joint}{name}", f"file_format[{number}]": FORMAT}
@@ -41,10 +44,14 @@ def config_text(numbers: Mapping[str, int], folder: str, names: Sequence[str], f
 
 @dataclass(frozen=True, slots=True)
 class Configuration:
-    """What the list says: the grid files in their order, and the logical number of each axis."""
+    """What the list says: the grid files in their order, the logical number of each axis, and what is turned round.
+
+    factors  linear axis -> -1 where `negate` names it, 0 where `set_to_zero` does (P-VOLC-00009 and what follows it)
+    """
 
     files: tuple[str, ...] = ()
     numbers: Mapping[str, str] = field(default_factory=dict)
+    factors: Mapping[str, float] = field(default_factory=dict)
 
 
 def is_list(content: bytes) -> bool:
@@ -65,11 +72,15 @@ def read_configuration(files: Files) -> tuple[Configuration, Remarks]:
     axes = [name for name in entries if name in LETTERS]
     _check_axes(entries, axes, remarks)
     numbers = {axis: entries[axis][1] for axis in axes}
-    return Configuration(tuple(_grid_files(entries, remarks, files)), numbers), remarks
+    return Configuration(tuple(_grid_files(entries, remarks, files)), numbers, _factors(entries, remarks)), remarks
 
 
 Entries = dict[str, tuple[int, str]]
-SPELT = {name.lower(): name for name in (*HEAD, *TAIL)}
+FACTORS = {"negate": -1.0, "set_to_zero": 0.0}
+"""Entries that name linear axes, as in `negate XY`, and by what their compensation is multiplied."""
+OTHERS = {"diagnosis_file": "", "use_axis_offsets": "0"}
+"""Entries that may be there, and the value that they must have, if any."""
+SPELT = {name.lower(): name for name in (*HEAD, *TAIL, *FACTORS, *OTHERS)}
 """The control does not tell small letters from large ones."""
 TRUTH = {"1": "TRUE", "0": "FALSE"}
 
@@ -84,7 +95,7 @@ def _entries(remarks: Remarks) -> Entries:
             name, value = _spelt(words[0]), words[1].strip()
             if name in found:
                 remarks.refuse(number, f"{name} is there twice")
-            if name not in HEAD and name not in TAIL and name not in LETTERS and not name.startswith("file"):
+            if name not in SPELT.values() and name not in LETTERS and not name.startswith("file"):
                 remarks.refuse(number, f"the name {name!r} is not known (error 70468)")
             found[name] = (number, value)
     return found
@@ -108,6 +119,20 @@ def _check_switches(entries: Entries, remarks: Remarks) -> None:
     line, manual = entries.get("manual_activation", (0, "FALSE"))
     if _truth(manual) not in TRUTH.values():
         remarks.refuse(line, f"manual_activation is {manual}", "TRUE or FALSE")
+
+
+def _factors(entries: Entries, remarks: Remarks) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name, factor in FACTORS.items():
+        line, axes = entries.get(name, (0, ""))
+        letters = axes.strip('"').upper()
+        if not set(letters) <= set("XYZ"):
+            remarks.refuse(line, f"{name} is {axes}", "linear axes of the list, such as XY")
+        found |= dict.fromkeys(letters, factor)
+    line, offsets = entries.get("use_axis_offsets", (0, "0"))
+    if _truth(offsets) != "FALSE":
+        remarks.refuse(line, f"use_axis_offsets is {offsets}: what the offsets are is in no file", "0")
+    return found
 
 
 def _truth(value: str) -> str:

@@ -10,7 +10,7 @@ each. Play, of which grids know nothing, goes into the leadscrew compensation of
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from ncfix.diagnostics import Message, RefusedError
@@ -22,7 +22,7 @@ from ncfix.tables.lines import Remarks
 from ncfix.tables.mesh import AIM, search
 from ncfix.tables.neutral import Compensation, Term
 from ncfix.tables.reversal import Reversal, reversal_note, reversals
-from ncfix.tables.settings import one_of, whole, wrong
+from ncfix.tables.settings import Form, one_of, whole, wrong
 from ncfix.tables.volume import Volume, inputs_that_matter
 from ncfix_isg.configuration import LETTERS, config_text, is_list, read_configuration
 from ncfix_isg.csv_file import grid_text, is_grid, parameters, read_grids
@@ -32,6 +32,7 @@ TABLE = "volcomp{}.csv"
 CONFIG = "volcomp.lis"
 LINEAR = "XYZ"
 MOST_NODES = 1_000_000
+AXES = Form("axes of X, Y and Z, each once", lambda text: sorted(text.upper()) == sorted({*text.upper()} & {*LINEAR}))
 ONE = 3
 """Up to so many inputs a single grid does."""
 
@@ -111,6 +112,12 @@ class Isg(Control):
         "steps": Option(
             "uneven", "uneven: nodes where the error bends; even: evenly spaced (ISG-4)", one_of("uneven", "even")
         ),
+        "negate": Option(
+            "",
+            "linear axes whose compensation the control is told to turn round (P-VOLC-00009), e.g. XY; their values "
+            "are written with the other sign, so that the same is added",
+            AXES,
+        ),
         "play": Option(
             "yes",
             "yes: what the way of an axis changes goes into its leadscrew compensation; no: it is left",
@@ -146,9 +153,10 @@ class Isg(Control):
         volume.uneven = settings["steps"] == "uneven"
         made = _made(volume, AIM * request.target, most, settings["grids"])
         names = [TABLE.format(number) for number in range(len(made.grids))]
-        files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps)}
+        negate = "".join(sorted(settings["negate"].upper()))
+        files = {CONFIG: config_text(numbers, settings["folder"], names, filter_steps, negate)}
         for name, owners, grid in zip(names, made.owners, made.grids, strict=True):
-            files[name] = grid_text(grid, owners)
+            files[name] = grid_text(_times(grid, dict.fromkeys(negate, -1.0)), owners)
         play = _play(request, settings)
         for each in play:
             files[NAME.format(each.axis)] = list_text(each, numbers[each.axis])
@@ -182,7 +190,8 @@ class Isg(Control):
         listed, config = read_configuration(files)
         grids, remarks = read_grids(listed.files, listed.numbers, files)
         play, more = read_leadscrews(files, listed.numbers)
-        return Compensation((*(Term((grid,)) for grid in grids), *play)), [config, *remarks, *more]
+        turned = (_times(grid, listed.factors) for grid in grids)
+        return Compensation((*(Term((grid,)) for grid in turned), *play)), [config, *remarks, *more]
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +213,11 @@ def _made(volume: Volume, target: float, most: int, how: str) -> _Made:
         return _Made((mesh.grid,), ("",), mesh.left)
     made = searched(volume, found, target, most)
     return _Made(made.grids, tuple(volume.inputs[face.owner] for face in made.faces), made.left)
+
+
+def _times(grid: Grid, factors: Mapping[str, float]) -> Grid:
+    """A grid as the control takes it that turns some of its axes round, or leaves them."""
+    return replace(grid, values=grid.values * [factors.get(name, 1.0) for name in grid.outputs])
 
 
 def _numbers(request: Request, given: str) -> dict[str, int]:

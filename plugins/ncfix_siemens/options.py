@@ -16,6 +16,8 @@ from ncfix_siemens.combine import TERMS
 
 MODELS = {"840D": (40, 1000), "828D": (8, 200), "802D": (2, 350)}
 """Tables and points of each. 828D and 802D sl from the manuals; 40 tables have been run on an 840D (Esmaeili, 2021)."""
+BESIDE = {"plus_multiplier": (1, 0), "plus_base": (0, 1), "plus_both": (1, 1)}
+"""Tables that take off again what a control adds besides a product: of its multiplier, and of what it multiplies."""
 MOST_TABLES, MOST_POINTS = 128, 5000
 SCHEMES = ("auto", "poly25", "trigo23", "fik40", "fik20")
 SIGNS = ("error", "correction")
@@ -73,7 +75,7 @@ def checked(given: Mapping[str, str], machine: Machine) -> Settings:
     model = given["model"]
     tables, points = MODELS[model]
     most = int(given["tables"] or tables), int(given["points"] or points)
-    limits = Limits(*most, given["positioning"] == "eec")
+    limits = Limits(*most, given["positioning"] == "eec", BESIDE.get(given["product_terms"], (0, 0)))
     style = Style(given["brackets"] == "yes", given["metric_line"] == "yes", given["path_line"])
     axes = machine_axes(given["axes"], machine)
     terms, rotary = given["product_terms"], given["rotary"]

@@ -244,3 +244,34 @@ def test_leadscrew_lists_that_cannot_be_read(line: str, said: str) -> None:
     with pytest.raises(ConfigError) as caught:
         CONTROL.read(tables)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("negate", ["", "XY", "z"])
+def test_what_the_control_turns_round_is_written_the_other_way_round(negate: str) -> None:
+    """`negate XY` in the list (P-VOLC-00009) turns the compensation of X and Y: the same must be added all the same."""
+    control = get_control("isg")
+    machine = single_error("EXX", 0.02)
+    settings = control.settings({"negate": negate})
+    made = export(control, Request(machine, ranges_of(machine), 0.0, 0.001, settings), 500)
+    assert made.left.after.max() < 0.0011
+    listed = made.native["volcomp.lis"].decode()
+    assert (f"negate                  {negate.upper()}\n" in listed) is bool(negate)
+    without = {**made.native, "volcomp.lis": listed.replace(f"negate                  {negate.upper()}\n", "").encode()}
+    names, q = machine.axis_names, np.array([[250.0, 10.0, -20.0]])
+    signs = [-1.0 if name in negate.upper() else 1.0 for name in names]
+    assert control.read(without).at(names, q) == pytest.approx(control.read(made.native).at(names, q) * signs)
+
+
+def test_lists_from_elsewhere_may_turn_axes_round_or_leave_them() -> None:
+    control = get_control("isg")
+    machine = single_error("EXX", 0.02)
+    made = export(control, Request(machine, ranges_of(machine), 0.0, 0.001, control.settings({})), 100).native
+    names, q = machine.axis_names, np.array([[250.0, 10.0, -20.0]])
+    before = control.read(made).at(names, q)
+    for line, factor in ((b'NEGATE "X"\n', -1.0), (b"set_to_zero X\n", 0.0), (b"diagnosis_file C:\\log.txt\n", 1.0)):
+        files = {**made, "volcomp.lis": made["volcomp.lis"] + line}
+        assert control.lint(files) == ()
+        assert control.read(files).at(names, q)[0, 0] == pytest.approx(factor * before[0, 0])
+    for line in (b"negate XQ\n", b"use_axis_offsets 1\n"):
+        with pytest.raises(ConfigError):
+            control.read({**made, "volcomp.lis": made["volcomp.lis"] + line})

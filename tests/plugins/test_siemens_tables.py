@@ -12,7 +12,7 @@ import pytest
 from ncfix.diagnostics import RefusedError, UsageError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Backlash, Polynomial
-from ncfix.tables.control import Request
+from ncfix.tables.control import Request, get_control
 from ncfix.tables.export import Exported, export
 from ncfix.tables.lines import Remarks
 from ncfix.tables.poses import ranges_of
@@ -318,3 +318,16 @@ def test_what_takes_a_factor_off_again_beside_encoder_tables_is_not_corrected_tw
         )
     )
     assert not made(machine, product_terms="plus_both", positioning="eec").messages
+
+
+@pytest.mark.parametrize("terms", ["plus_multiplier", "plus_base", "plus_both"])
+def test_tables_that_take_off_again_fit_too(root: Path, terms: str) -> None:
+    """What the control adds besides products takes tables: there are as many products as leave room for these."""
+    machine = load(str(root / "examples" / "machines" / "wCBXFZYSt.toml"))
+    control = get_control("siemens")
+    settings = control.settings({"value_sign": "error", "product_terms": terms})
+    made = export(control, Request(machine, ranges_of(machine), 120.0, 0.005, settings), 500)
+    assert made.native["NC_CEC.INI"].count(b"$AN_CEC_INPUT_AXIS") <= 40
+    assert b"$AN_CEC_MULT_BY_TABLE" in made.native["NC_CEC.INI"]
+    figures = made.left.figures()
+    assert figures["after"]["rms"] < 0.5 * figures["before"]["rms"]

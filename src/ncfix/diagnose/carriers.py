@@ -15,8 +15,12 @@ from ncfix.machine.smooth import Backlash
 FIX = "fix"
 POSITIONING = ("linuxcnc", "fanuc-pitch", "heidenhain", "siemens", "isg", "fanuc", "heidenhain-kinematics")
 """Tables of one axis over itself."""
-REVERSAL = ("linuxcnc", "fanuc-pitch", "siemens")
-"""Those with values of their own for each direction."""
+ALONG = ("linuxcnc", "heidenhain", "siemens", "isg", "heidenhain-kinematics")
+"""Those that hold play of a linear axis that changes along it; both Heidenhain controls with `backlash=on`."""
+REVERSAL = (*ALONG, "fanuc", "fanuc-rotary")
+"""Those that hold play of a linear axis that is the same everywhere."""
+TURNED = ("linuxcnc", "heidenhain", "siemens", "heidenhain-kinematics")
+"""Those that hold play of a rotary axis about itself."""
 VOLUME = ("fanuc", "fanuc-rotary", "isg", "siemens", "heidenhain-kinematics")
 """Those of all linear axes."""
 ACROSS = ("heidenhain", *VOLUME)
@@ -41,16 +45,26 @@ def conditions(machine: Machine, effects: Sequence[Effect]) -> tuple[str, ...]:
     return tuple(sorted(signals - set(machine.axis_names)))
 
 
+def _of_play(effect: Effect, basis: Backlash, rotary: set[str], alone: bool) -> Sequence[str]:
+    """Those whose export writes play: of an axis along or about itself in their places for that, else in tables."""
+    if effect.joint in rotary:
+        turned = len({name for name in (effect.signal, effect.times, effect.joint) if name}) == 1
+        return TURNED if turned and effect.name[1] == effect.joint and not effect.location else ("siemens",)
+    if not alone:
+        return ("siemens",)
+    return REVERSAL if basis.degree == (0,) else ALONG
+
+
 def _tables(machine: Machine, effect: Effect) -> Sequence[str]:
     if conditions(machine, [effect]) or effect.joint == SPINDLE:
         return ()
     rotary = {axis.name for axis in machine.axes if axis.rotary}
     signals = {name for name in (effect.signal, effect.times, effect.joint) if name}
-    if signals & rotary:
-        return TURNING if not isinstance(effect.basis, Backlash) else ("siemens",)
     alone = len(signals) == 1 and effect.name[1] == effect.joint and not effect.location
     if isinstance(effect.basis, Backlash):
-        return REVERSAL if alone else ("siemens",)
+        return _of_play(effect, effect.basis, rotary, alone)
+    if signals & rotary:
+        return TURNING
     if alone:
         return POSITIONING
     return ACROSS if len(signals) == 1 and not effect.rotational else VOLUME

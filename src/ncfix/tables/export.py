@@ -70,7 +70,7 @@ def export(control: Control, request: Request, poses: int = POSES) -> Exported:
     """
     _check_finite(request.machine)
     written = called("controls", control.name, control.write, request, gives=Written)
-    tables = _read(control, written.files)
+    tables = _read_again(control, written)
     messages = linted(control, written.files)
     left = residual(request.machine, tables, request.space, request.tool_length, poses)
     _check_size(request.machine, left, request.target)
@@ -126,6 +126,17 @@ def emulate(
 def _read(control: Control, files: Files) -> Tables:
     tables: Tables = called("controls", control.name, control.read, files, gives=Tables)
     return tables
+
+
+def _read_again(control: Control, written: Written) -> Tables:
+    """Raises `RefusedError` NCF484 for what the control would not load: nobody has these files to look at."""
+    try:
+        return _read(control, written.files)
+    except ConfigError as error:
+        hint = "is every error in mm and rad? A smaller range, or ncfix fix, may do"
+        texts = (f"{each.place.path}: {each.text}" if each.place else each.text for each in error.messages)
+        said = [Message("NCF484", f"the control could not be given these tables: {text}", hint=hint) for text in texts]
+        raise RefusedError.collected(said) from error
 
 
 def linted(control: Control, files: Files) -> tuple[Message, ...]:

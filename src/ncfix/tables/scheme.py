@@ -50,11 +50,16 @@ MERGED = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a control can hold; `own_free`: sums of an axis over itself go into tables of another kind."""
+    """What a control can hold.
+
+    own_free  sums of an axis over itself go into tables of another kind
+    beside    tables more that it takes for each table that multiplies others, and for each that is multiplied
+    """
 
     tables: int
     points: int
     own_free: bool = False
+    beside: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +163,7 @@ def _staged(job: Job, outputs: Sequence[int], correct: Corrections, scale: float
     while used > most:
         selection.fit_into(allowed)
         layouts = _followed(selection, left, lines, correct, scale)
-        used = sum(needed(output, each, selection.free) for output, each in layouts.items())
+        used = sum(needed(output, each, selection.free, selection.beside) for output, each in layouts.items())
         allowed -= used - most
     unscaled = {output: [one.scaled(1 / scale) for one in each] for output, each in layouts.items()}
     stage = Stage(lines, unscaled, correct, scale)
@@ -194,7 +199,8 @@ def _parts(
             one = values[..., number]
             found[face] = taken_apart(one) if way is None else taken_apart_along(one, way)
     free = frozenset(outputs) if job.limits.own_free else frozenset[int]()
-    return Selection(found, MERGED * max(SMALL * job.target, AGAINST_REST * left.rms), free), left
+    tolerance = MERGED * max(SMALL * job.target, AGAINST_REST * left.rms)
+    return Selection(found, tolerance, free, beside=job.limits.beside), left
 
 
 def ways_that_matter(machine: Machine) -> list[int]:

@@ -69,19 +69,21 @@ class Layout:
         return total
 
 
-def tables_of(layouts: Sequence[Layout]) -> int:
+def tables_of(layouts: Sequence[Layout], beside: tuple[int, int] = (0, 0)) -> int:
     """How many tables absorbed layouts take to correct one axis: that without direction, and those for ways of axes.
 
     A constant without sums is a table, too. What changes with the way takes a table for either way; a sum shares the
-    pair with the table that is there anyway.
+    pair with the table that is there anyway. beside: tables more for each table that multiplies others, and for each
+    that is multiplied, where the control adds these by themselves too and that must be taken off again.
     """
+    multiplier, multiplied = beside
     plain = {axis for layout in layouts if layout.way is None for axis in layout.sums}
     count = 0
     for layout in layouts:
         both = 1 if layout.way is None else 2
         count += int(layout.constant != 0.0)
         count += sum(1 if layout.way is None or axis in plain else 2 for axis in layout.sums)
-        count += sum(1 + both * len(star.leaves) for star in layout.stars)
+        count += sum(1 + multiplier + (1 + multiplied) * both * len(star.leaves) for star in layout.stars)
     return count
 
 

@@ -27,6 +27,7 @@ class Selection:
     free       axes whose sum over themselves takes no table of this kind (it goes into another one)
     kept       the parts that are kept
     silent     faces of which not even the constant is kept
+    beside     tables more for each that multiplies others, and for each that is multiplied
     """
 
     faces: Mapping[Face, Parts]
@@ -34,6 +35,7 @@ class Selection:
     free: frozenset[int] = frozenset()
     kept: frozenset[Key] = frozenset()
     silent: frozenset[Face] = frozenset()
+    beside: tuple[int, int] = (0, 0)
     _known: dict[tuple[Face, bool, tuple[int, ...]], tuple[Layout, Layout]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -56,7 +58,8 @@ class Selection:
 
     def tables(self, output: int) -> int:
         """How many tables an axis takes."""
-        return needed(output, [self._layouts(face)[1] for face in self.faces if face[0] == output], self.free)
+        layouts = [self._layouts(face)[1] for face in self.faces if face[0] == output]
+        return needed(output, layouts, self.free, self.beside)
 
     @property
     def total(self) -> int:
@@ -162,7 +165,7 @@ class Selection:
         return iter(enumerate(self.faces[face].parts))
 
 
-def needed(output: int, layouts: Sequence[Layout], free: frozenset[int]) -> int:
+def needed(output: int, layouts: Sequence[Layout], free: frozenset[int], beside: tuple[int, int] = (0, 0)) -> int:
     """How many tables these layouts of an axis take, without that over the axis itself if that is free."""
     ways = {layout.way for layout in layouts if output in layout.sums or layout.constant}
-    return tables_of(layouts) - int(output in free and ways == {None})
+    return tables_of(layouts, beside) - int(output in free and ways == {None})

@@ -28,6 +28,12 @@ SLACK = 1e-6
 """Of that, what rounding may come to."""
 END = 1e-9
 """An anchor that is no farther from an end of the range is there."""
+COARSE = (3, 5, 9, 17)
+"""Nodes an axis of the grid on which the middle over other axes is looked up."""
+SEEN = 200
+"""Random positions at which it is seen whether they are enough."""
+NEARLY = 1e-4
+"""mm: what they may miss; the middle is exact nowhere."""
 OTHERS = 12
 """Poses of other axes, besides the corners of their ranges, over which a middle is taken."""
 CLOSE = 48
@@ -102,23 +108,32 @@ class Volume:
     def over_all(
         cls, machine: Machine, inputs: tuple[str, ...], space: Array, tool_length: float, area: bool = False
     ) -> Volume:
-        """The same, in the middle of what is asked for over the whole range of the other axes."""
+        """The same, in the middle of what is asked for over the whole range of the other axes.
+
+        What other positions of the other axes add to a correction is levers and turns, which change slowly with where
+        the inputs stand: it is worked out on a coarse grid of them, as fine as it takes, and straight in between.
+        """
         found = cls.of(machine, inputs, space, tool_length, area)
         columns = [machine.axis_names.index(name) for name in inputs]
+        linear = linear_axes(machine)
         rest = np.concatenate([corners(space), even_poses(space, OTHERS)])
         rest[:, columns] = 0.0
         rest = np.unique(rest, axis=0)
 
-        def exact(positions: Array) -> Array:
-            low = high = found.exact(positions)
+        def added(positions: Array) -> Array:
+            """The middle less the correction with the other axes at rest."""
+            meant = found.exact(positions)
+            low = high = meant
             for place in rest:
                 q = np.tile(place, (len(positions), 1))
                 q[:, columns] = positions
-                one = exact_correction(machine, q, State(tool_length))[:, linear_axes(machine)]
+                one = exact_correction(machine, q, State(tool_length))[:, linear]
                 low, high = np.minimum(low, one), np.maximum(high, one)
-            return (low + high) / 2
+            middle: Array = (low + high) / 2 - meant
+            return middle
 
-        return replace(found, exact=exact)
+        grid = _followed(added, inputs, found.ranges, found.outputs)
+        return replace(found, exact=lambda positions: found.exact(positions) + grid.at(positions))
 
     def grid(self, counts: Sequence[int]) -> Grid:
         """The table with that many nodes along each input, at positions that files can say."""
@@ -216,6 +231,22 @@ class Volume:
         positions = np.repeat(spread, len(line), axis=0)
         positions[:, axis] = np.tile(line, len(spread))
         return self.exact(positions).reshape(len(spread), len(line), -1)
+
+
+def _followed(
+    function: Callable[[Array], Array], inputs: tuple[str, ...], ranges: Array, outputs: Sequence[str]
+) -> Grid:
+    """A function of positions (n, n_inputs) on even nodes, as many as keep it near, or the most."""
+    seen = random_poses(ranges, SEEN, seed=19)
+    meant = function(seen)
+    for count in COARSE:
+        nodes = tuple(np.linspace(low, high, count) for low, high in ranges.tolist())
+        places = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1)
+        values = function(places.reshape(-1, len(nodes))).reshape(*places.shape[:-1], len(outputs))
+        grid = Grid(inputs, nodes, tuple(outputs), values)
+        if np.abs(grid.at(seen) - meant).max() < NEARLY:
+            break
+    return grid
 
 
 def even_line(low: float, high: float, count: int, anchor: float | None) -> Array:
