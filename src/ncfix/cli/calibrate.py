@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import FiniteRange, force_option, json_option, load_machine, machine_option
 from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode, RefusedError
@@ -22,9 +23,11 @@ LOSSES = ("auto", "none", "huber", "tukey")
 
 
 @click.command()
-@click.argument("measured", nargs=-1, required=True)
+@click.argument("measured", type=PATH, nargs=-1, required=True)
 @machine_option
-@click.option("-o", "--output", metavar="FILE", required=True, help="Where to write the calibrated machine (TOML).")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", required=True, help="Where to write the calibrated machine (TOML)."
+)
 @click.option("--effects", metavar="LIST", help="Names or patterns like EC0Y,E?X; all; or a model like esmaeili-13-bc.")
 @click.option(
     "--loss",

@@ -9,6 +9,7 @@ import click
 
 from ncfix.batch.gathering import gathered
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, optional_machine_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
@@ -18,7 +19,7 @@ from ncfix.diagnostics import ExitCode, Message, NcfixError, visible
 
 
 @click.command()
-@click.argument("programs", nargs=-1, required=True, metavar="PROGRAM...")
+@click.argument("programs", type=PATH, nargs=-1, required=True, metavar="PROGRAM...")
 @optional_machine_option
 @dialect_option
 @setup_options

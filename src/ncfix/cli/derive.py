@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import force_option, json_option, load_machine
 from ncfix.cli.targets import STREAM, Outputs, targets
 
@@ -18,8 +19,10 @@ CONSTANT = ("locations", "spindle")
 
 
 @click.command()
-@click.option("-m", "--machine", "machine_path", metavar="FILE", help="The machine file (TOML).")
-@click.option("--chain", "chain_path", metavar="FILE", help="A chain file (docs/derive.md) instead of a machine.")
+@click.option("-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML).")
+@click.option(
+    "--chain", "chain_path", type=PATH, metavar="FILE", help="A chain file (docs/derive.md) instead of a machine."
+)
 @click.option("--order", type=click.IntRange(1, 4), default=1, show_default=True, help="Order of the errors.")
 @click.option("--effects", metavar="LIST", help="Groups motions, locations, spindle, machine; names or patterns: E?C.")
 @click.option("--letters", is_flag=True, help="Fixed angles between axes as letters instead of their values.")
@@ -27,7 +30,9 @@ CONSTANT = ("locations", "spindle")
 @click.option("--python", "form", flag_value="python", help="Print a Python module of numpy functions.")
 @click.option("--protocol", "form", flag_value="protocol", help="Print what can be identified, and a protocol.")
 @click.option("--vary", metavar="LIST", default="tool_length", help="Lengths to vary as well, for --protocol.")
-@click.option("-o", "--output", metavar="FILE", default=STREAM, help="Where to write instead of standard output.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write instead of standard output."
+)
 @force_option
 @json_option
 def derive(

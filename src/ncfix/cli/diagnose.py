@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import force_option, json_option, load_machine, machine_option, sound
 from ncfix.cli.targets import STREAM, Outputs, check_streams, each_once, read, shown, targets
 from ncfix.diagnostics import ExitCode
@@ -19,12 +20,16 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("measured", nargs=-1, required=True)
+@click.argument("measured", type=PATH, nargs=-1, required=True)
 @machine_option
-@click.option("-o", "--output", metavar="FILE", help="Where to write the machine with the effects added (TOML).")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", help="Where to write the machine with the effects added (TOML)."
+)
 @click.option("--without", multiple=True, metavar="NAME", help="An effect that is not to be considered (repeatable).")
-@click.option("--next", "next_path", metavar="FILE", help="Write the poses to be measured next: CSV, else a program.")
-@click.option("--report", metavar="FILE", help="Write a report with figures (HTML or Markdown).")
+@click.option(
+    "--next", "next_path", type=PATH, metavar="FILE", help="Write the poses to be measured next: CSV, else a program."
+)
+@click.option("--report", type=PATH, metavar="FILE", help="Write a report with figures (HTML or Markdown).")
 @click.option("--check", is_flag=True, help="Exit code 1 if anything is missing.")
 @force_option
 @json_option

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import DIALECT
 from ncfix.cli.options import json_option
 from ncfix.plugins import registry
 
@@ -18,7 +19,7 @@ PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses",
 
 
 @click.command()
-@click.argument("name", required=False, metavar="[NAME]")
+@click.argument("name", type=DIALECT, required=False, metavar="[NAME]")
 @json_option
 def dialects(name: str | None, as_json: bool) -> None:
     """List the dialects for `--dialect`, with the file suffixes that suggest them; or all about the one called NAME."""

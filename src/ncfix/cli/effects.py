@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import json_option, load_machine
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ axis.C = { type = "rotary", direction = [0, 0, -1] }
 
 
 @click.command()
-@click.option("-m", "--machine", "path", metavar="FILE", help="List the effects that this machine can have.")
+@click.option("-m", "--machine", "path", type=PATH, metavar="FILE", help="List the effects that this machine can have.")
 @click.option("--bases", is_flag=True, help="List the bases for `basis = ...` with their keys instead.")
 @json_option
 def effects(path: str | None, bases: bool, as_json: bool) -> None:

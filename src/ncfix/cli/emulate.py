@@ -11,6 +11,7 @@ import click
 
 from ncfix import files
 from ncfix.cli import console
+from ncfix.cli.completion import CONTROL, FOLDER, PATH
 from ncfix.cli.export import tell
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, machine_option
@@ -19,10 +20,10 @@ from ncfix.diagnostics import ConfigError, ExitCode, Message
 
 
 @click.command()
-@click.argument("control")
-@click.argument("folder", metavar="TABLEDIR")
+@click.argument("control", type=CONTROL)
+@click.argument("folder", type=FOLDER, metavar="TABLEDIR")
 @machine_option
-@click.option("--program", metavar="FILE", help="Also run this program with the tables active.")
+@click.option("--program", type=PATH, metavar="FILE", help="Also run this program with the tables active.")
 @click.option("--other-machine", is_flag=True, help="Run tables that were made for another machine or other errors.")
 @dialect_option
 @setup_options

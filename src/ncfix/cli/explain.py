@@ -9,6 +9,7 @@ from importlib.util import find_spec
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import OneOf
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import Code, UsageError
 
@@ -26,7 +27,7 @@ def all_codes() -> dict[str, Code]:
 
 
 @click.command()
-@click.argument("code", required=False)
+@click.argument("code", type=OneOf(all_codes), required=False)
 @json_option
 def explain(code: str | None, as_json: bool) -> None:
     """Explain the message code CODE, e.g. NCF002; without CODE list them all."""

@@ -11,6 +11,7 @@ import click
 
 from ncfix import files, ways
 from ncfix.cli import console
+from ncfix.cli.completion import CONTROL, FOLDER, PATH
 from ncfix.cli.following import Following
 from ncfix.cli.options import Length, Positive, dialect_option, force_option, json_option, machine_option, sound
 from ncfix.cli.setup_options import SetupOptions, setup_options
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("control")
+@click.argument("control", type=CONTROL)
 @machine_option
-@click.option("-o", "--output", metavar="DIR", required=True, help="The folder for the files.")
+@click.option("-o", "--output", type=FOLDER, metavar="DIR", required=True, help="The folder for the files.")
 @click.option(
     "--tool-length", type=Length(), default=0.0, show_default=True, help="The length that the tables hold for, mm."
 )
@@ -46,7 +47,9 @@ if TYPE_CHECKING:
 )
 @click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="An option of the control (repeatable).")
 @click.option("--probe", is_flag=True, help="Write small files that settle on the machine what --set must say.")
-@click.option("--program", metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables.")
+@click.option(
+    "--program", type=PATH, metavar="FILE", help="Rewrite this program (control gcode), or run it with the tables."
+)
 @force_option
 @dialect_option
 @setup_options

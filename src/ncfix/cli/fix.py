@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH, OneOf
 from ncfix.cli.options import dialect_option, json_option, load_machine, machine_option, sound, tolerance_option
 from ncfix.cli.processes import Jobs, settled
 from ncfix.cli.setup_options import SetupOptions, setup_options
 from ncfix.cli.targets import JSON, Outputs, check_streams, targets
+from ncfix.plugins import registry
 
 if TYPE_CHECKING:
     from ncfix.cli.job import Job
 
 
+def _strategies() -> Iterable[str]:
+    from ncfix.compensate.strategies import strategies
+
+    return strategies()
+
+
+def _executors() -> Iterable[str]:
+    from ncfix.batch.work import BUILT_IN
+
+    return registry("executors", BUILT_IN)
+
+
 @click.command()
-@click.argument("programs", nargs=-1, required=True, metavar="PROGRAM...")
+@click.argument("programs", type=PATH, nargs=-1, required=True, metavar="PROGRAM...")
 @machine_option
-@click.option("-o", "--output", metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout.")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE|DIR", help="Where to write; a folder for many programs; - for stdout."
+)
 @click.option("--in-place", is_flag=True, help="Put the result in PROGRAM's place and keep that as PROGRAM.orig.")
 @click.option(
     "--force", is_flag=True, help="Replace an output; correct a stamped program; take a machine that cannot be."
@@ -28,6 +45,7 @@ if TYPE_CHECKING:
 @click.option("--resume", is_flag=True, help="Go on with a batch where it stopped: what is done in -o DIR stays.")
 @click.option(
     "--strategy",
+    type=OneOf(_strategies),
     default="rotary-then-linear",
     show_default=True,
     metavar="NAME",
@@ -58,7 +76,12 @@ if TYPE_CHECKING:
     help="Processes that work on a long program, or programs at a time; the result is the same.",
 )
 @click.option(
-    "--executor", default="processes", show_default=True, metavar="NAME", help="What runs the programs of a batch."
+    "--executor",
+    type=OneOf(_executors),
+    default="processes",
+    show_default=True,
+    metavar="NAME",
+    help="What runs the programs of a batch.",
 )
 @json_option
 def fix(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import json_option, load_machine
 from ncfix.cli.targets import shown
 from ncfix.diagnostics import ExitCode, Message, Place, visible
@@ -22,7 +23,7 @@ def machine() -> None:
 
 
 @machine.command()
-@click.argument("file")
+@click.argument("file", type=PATH)
 @json_option
 def check(file: str, as_json: bool) -> int:
     """Check that FILE describes a machine.
@@ -66,7 +67,7 @@ def _remarks(machine: Machine, path: str) -> list[Message]:
 
 
 @machine.command()
-@click.argument("file")
+@click.argument("file", type=PATH)
 @json_option
 def show(file: str, as_json: bool) -> None:
     """Print the chain and the errors of a machine.

@@ -13,6 +13,7 @@ import click
 
 from ncfix import fast
 from ncfix.cli import console
+from ncfix.cli.completion import DIALECT, PATH
 from ncfix.cli.parts import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
@@ -24,13 +25,17 @@ if TYPE_CHECKING:
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 machine_option = click.option(
-    "-m", "--machine", "machine_path", metavar="FILE", required=True, help="The machine file (TOML)."
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", required=True, help="The machine file (TOML)."
 )
 optional_machine_option = click.option(
-    "-m", "--machine", "machine_path", metavar="FILE", help="The machine file (TOML)."
+    "-m", "--machine", "machine_path", type=PATH, metavar="FILE", help="The machine file (TOML)."
 )
-dialect_option = click.option("--dialect", metavar="NAME", help="The control's language; found out if not given.")
-table_option = click.option("-o", "--output", metavar="FILE", default=STREAM, help="Where to write the table (CSV).")
+dialect_option = click.option(
+    "--dialect", type=DIALECT, metavar="NAME", help="The control's language; found out if not given."
+)
+table_option = click.option(
+    "-o", "--output", type=PATH, metavar="FILE", default=STREAM, help="Where to write the table (CSV)."
+)
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
 SUBPROGRAM_SUFFIXES = ("", ".ngc", ".nc", ".spf", ".mpf")

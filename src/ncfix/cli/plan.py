@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import Length, force_option, json_option, load_machine, machine_option, table_option
 from ncfix.cli.targets import JSON, STREAM, Outputs, check_streams, read, shown, targets
 
@@ -27,7 +28,7 @@ ROUNDING = 1e-9
 @click.option("-n", "--count", type=click.IntRange(min=1), default=40, show_default=True, help="How many poses.")
 @click.option("--effects", metavar="LIST", help="Effects to be determined, as for calibrate.")
 @click.option("--separate", metavar="EFFECT,EFFECT", help="Find poses that tell these effects apart.")
-@click.option("--existing", metavar="FILE", help="A measurement that the new poses complete.")
+@click.option("--existing", type=PATH, metavar="FILE", help="A measurement that the new poses complete.")
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
 @click.option("--tool-length", "lengths", multiple=True, type=Length(), metavar="MM", help="A tool (repeatable).")
 @click.option(
@@ -39,7 +40,7 @@ ROUNDING = 1e-9
 @click.option(
     "--input", "inputs", multiple=True, metavar="NAME=LOW,HIGH", help="What else can be set, e.g. load_kg (repeatable)."
 )
-@click.option("--gcode", metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
+@click.option("--gcode", type=PATH, metavar="FILE", help="Also write a skeleton of the program that goes to the poses.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Other candidates.")
 @table_option
 @force_option

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.options import force_option
 from ncfix.cli.targets import STREAM, Outputs, read, shown, targets
 from ncfix.diagnostics import Place, SourceError
@@ -21,8 +22,8 @@ DEEPEST = 64
 
 
 @click.command()
-@click.argument("sources", nargs=-1, required=True, metavar="MACHINE|RESULT...")
-@click.option("-o", "--output", metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
+@click.argument("sources", type=PATH, nargs=-1, required=True, metavar="MACHINE|RESULT...")
+@click.option("-o", "--output", type=PATH, metavar="FILE", required=True, help="The page: FILE.html or FILE.md.")
 @force_option
 def report(sources: tuple[str, ...], output: str, force: bool) -> None:
     """Put machine files, and what other verbs printed with --json, on one page.

@@ -13,6 +13,7 @@ import click
 
 if TYPE_CHECKING:
     from ncfix.program.setup import Setup
+from ncfix.cli.completion import PATH
 
 OFFSET_AXES = "XYZABCUVW"
 """The order of the numbers of a work offset."""
@@ -98,7 +99,9 @@ class Position(click.ParamType):  # type: ignore[type-arg]
 
 
 OPTIONS = (
-    click.option("--setup", "setup_file", metavar="FILE", help="Work offsets, tools and start position (TOML)."),
+    click.option(
+        "--setup", "setup_file", type=PATH, metavar="FILE", help="Work offsets, tools and start position (TOML)."
+    ),
     click.option(
         "--offset",
         "offsets",
@@ -113,7 +116,7 @@ OPTIONS = (
         multiple=True,
         help="The length of a tool, mm; and its radius, as 12=120.0,5.0 (repeatable).",
     ),
-    click.option("--tool-table", "tool_table", metavar="FILE", help="The control's own tool table."),
+    click.option("--tool-table", "tool_table", type=PATH, metavar="FILE", help="The control's own tool table."),
     click.option(
         "--initial",
         type=Position(),

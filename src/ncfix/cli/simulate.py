@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.following import Following, figures
 from ncfix.cli.options import FiniteRange, dialect_option, force_option, json_option, load_machine, machine_option
 from ncfix.cli.parts import Keep, Source, source_of
@@ -34,14 +35,16 @@ OF_PLANS = ("noise_um", "drift_um", "quantum_um", "setup_error", "seed")
 
 @click.command()
 @machine_option
-@click.option("--program", metavar="FILE", help="The program that the machine runs.")
-@click.option("--plan", metavar="FILE", help="Poses to be measured, as `ncfix plan` writes them (CSV).")
+@click.option("--program", type=PATH, metavar="FILE", help="The program that the machine runs.")
+@click.option("--plan", type=PATH, metavar="FILE", help="Poses to be measured, as `ncfix plan` writes them (CSV).")
 @click.option("--noise-um", type=NOT_NEGATIVE, default=0.0, help="Noise of a measured length (with --plan).")
 @click.option("--drift-um", type=NOT_NEGATIVE, default=0.0, help="Largest drift over the measurement (with --plan).")
 @click.option("--quantum-um", type=NOT_NEGATIVE, default=0.0, help="Step of the instrument (with --plan).")
 @click.option("--setup-error", type=NOT_NEGATIVE, default=1.0, help="How far the set-up is off (with --plan).")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Other numbers, other noise (with --plan).")
-@click.option("-o", "--output", metavar="FILE", help="Write the error along the path, or the measurement (CSV).")
+@click.option(
+    "-o", "--output", type=PATH, metavar="FILE", help="Write the error along the path, or the measurement (CSV)."
+)
 @force_option
 @dialect_option
 @setup_options

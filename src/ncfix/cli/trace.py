@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from ncfix.cli import console
+from ncfix.cli.completion import PATH
 from ncfix.cli.following import Following
 from ncfix.cli.options import (
     dialect_option,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("program")
+@click.argument("program", type=PATH)
 @optional_machine_option
 @table_option
 @force_option

@@ -8,6 +8,7 @@ import click
 
 from ncfix.cli import console
 from ncfix.cli.comparing import Compared, compared
+from ncfix.cli.completion import PATH
 from ncfix.cli.following import Following
 from ncfix.cli.options import dialect_option, json_option, machine_option, tolerance_option
 from ncfix.cli.setup_options import SetupOptions, setup_options
@@ -19,8 +20,8 @@ FEW = 5
 
 
 @click.command()
-@click.argument("original")
-@click.argument("fixed")
+@click.argument("original", type=PATH)
+@click.argument("fixed", type=PATH)
 @machine_option
 @tolerance_option
 @dialect_option
