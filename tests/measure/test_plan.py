@@ -186,3 +186,41 @@ def test_few_poses_are_planned_too():
 def test_a_kind_that_sees_nothing_is_refused():
     with pytest.raises(UsageError, match="no pose of this kind tells anything"):
         plan(machine("three_axis"), "probe", 5, effects="EXX")
+
+
+@pytest.mark.parametrize("name", ["wCBXFZYSt", "wCAYFXZSt", "dmu50"])
+@pytest.mark.parametrize("reach", [{}, {"z": (-50.0, 250.0)}])
+def test_an_r_test_has_one_ball_a_set(name: str, reach: dict[str, tuple[float, float]]) -> None:
+    """The rotary axes turn, the linear ones follow, and the tip stays where the ball of the set is."""
+    known = machine(name)
+    room = Room(tool_lengths=(100.0, 160.0), reach=reach)
+    found = plan(known, "tcp", 24, room, "EX0C,EY0C,EA0C,EB0C").plan
+    assert len(found) == 24
+    tips = known.tip(found.positions(known), found.column("tool_length"))
+    sets = np.array(found.labels["set"])
+    assert 1 < len(set(sets)) <= 4
+    for each in set(sets):
+        assert np.ptp(tips[sets == each], axis=0).max() < 3e-3  # positions are rounded to 1 um in each of three axes
+    for axis in known.axes:
+        low, high = (limit / axis.unit for limit in axis.range)
+        assert (found.columns[axis.name] >= low).all()
+        assert (found.columns[axis.name] <= high).all()
+    for side, (low, high) in reach.items():
+        assert (tips[:, "xyz".index(side)] >= low - 3e-3).all()
+        assert (tips[:, "xyz".index(side)] <= high + 3e-3).all()
+    turned = [axis.name for axis in known.axes if axis.rotary]
+    assert all(np.ptp(found.columns[axis]) > 40 for axis in turned)
+
+
+def test_an_r_test_at_a_ball_that_is_given():
+    """Positions of the rotary axes that the travels do not allow are drawn again, not refused."""
+    known = machine("wCBXFZYSt")
+    room = Room(balls={"here": (150.0, 100.0, 120.0)})
+    found = plan(known, "tcp", 300, room, "EX0C,EY0C,EA0C,EB0C").plan
+    assert (len(found), set(found.labels["set"])) == (300, {"here"})
+    tips = known.tip(found.positions(known), found.column("tool_length"))
+    assert np.abs(tips - (150.0, 100.0, 120.0)).max() < 3e-3
+    with pytest.raises(UsageError, match="the ball here stands where the tip may not go"):
+        plan(known, "tcp", 20, Room(balls=room.balls, reach={"x": (-50.0, 50.0)}), "EX0C")
+    with pytest.raises(UsageError, match="no ball can be reached"):
+        plan(known, "tcp", 20, Room(balls={"far": (9000.0, 0.0, 0.0)}), "EX0C")

@@ -32,7 +32,11 @@ ROUNDING = 1e-9
 @click.option("--range", "ranges", multiple=True, metavar="AXIS=LOW,HIGH", help="Where the axis may go (repeatable).")
 @click.option("--tool-length", "lengths", multiple=True, type=Length(), metavar="MM", help="A tool (repeatable).")
 @click.option(
-    "--ball", "balls", multiple=True, metavar="NAME=X,Y,Z", help="Where a ball stands, kind probe (repeatable)."
+    "--ball",
+    "balls",
+    multiple=True,
+    metavar="NAME=X,Y,Z",
+    help="Where a ball stands, kinds probe and tcp (repeatable).",
 )
 @click.option(
     "--reach", "reaches", multiple=True, metavar="x=LOW,HIGH", help="Where the tip may be: x, y or z (repeatable)."

@@ -27,6 +27,16 @@ APPROACH = {"linear": 2.0, "rotary": 1.0}
 """mm and degree: how far an axis goes back before it comes from the wanted side."""
 TRIES = 20
 """How often more poses are drawn where few of them are within reach."""
+BALLS = 4
+"""Of an R-test, sets with a ball each, if there are poses enough."""
+FEW = 10
+"""Poses that a ball is worth."""
+CHOICE = 3
+"""Candidates for each pose of a plan, at least."""
+LOOKED_AT = 120
+"""Places at which a ball might stand, and positions of the rotary axes at which it is seen whether it is reached."""
+APART = 60.0
+"""mm: between balls."""
 UNLIMITED_MM = 100.0
 """Half the travel that is taken for a linear axis without a range."""
 
@@ -113,7 +123,11 @@ def _sides(axis: Axis, position: Array, wanted: Array, room: Room) -> Array:
 def _reached(machine: Machine, columns: Mapping[str, Array], room: Room) -> NDArray[np.bool_]:
     """Where the tip is within reach."""
     q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
-    tip = machine.tip(q, columns["tool_length"])
+    return _inside(machine.tip(q, columns["tool_length"]), room)
+
+
+def _inside(tip: Array, room: Room) -> NDArray[np.bool_]:
+    """Which places of the tip (n, 3) are within reach."""
     inside = np.ones(len(tip), dtype=bool)
     for name, (low, high) in room.reach.items():
         place = tip[:, "xyz".index(name)]
@@ -130,18 +144,97 @@ def _spread(axes: int, count: int, random: np.random.Generator) -> Array:
     return unit
 
 
+def r_test(machine: Machine, count: int, room: Room, seed: int = 0) -> Measurement:
+    """A plan of kind `tcp` as it is measured: a ball stands on the table, and the tip stays at it while axes turn.
+
+    Every set has one ball. The rotary axes are drawn, the linear ones follow from them; what the travels do not allow
+    is drawn again. Balls stand where `room` says, or where most positions of the rotary axes reach them, with the tip
+    within its reach. Raises `UsageError` NCF636 where no ball can be reached, or one is to stand beyond the reach.
+    """
+    random = np.random.default_rng(seed)
+    balls = room.balls or _reachable_balls(machine, room, random, max(1, min(BALLS, count // (CHOICE * FEW))))
+    beyond = [name for name, place in balls.items() if not _inside(np.array([place]), room).all()]
+    if beyond:
+        text = f"the ball {beyond[0]} stands where the tip may not go"
+        raise UsageError.of("NCF636", text, hint="wider --reach, or another place")
+    keys, places = list(balls), np.array(list(balls.values()))
+    parts: list[dict[str, Array]] = []
+    sets: list[str] = []
+    for _ in range(TRIES):
+        columns = _drawn(machine, count, room, random)
+        which = random.integers(len(keys), size=count)
+        found, inside = _moved_to(machine, columns, places[which], room)
+        parts.append({name: values[inside] for name, values in found.items()})
+        sets += [keys[k] for k in which[inside]]
+        if len(sets) >= count:
+            break
+    if len(sets) < 2:
+        raise UsageError.of("NCF636", "no ball can be reached within the travels", hint="--ball NAME=X,Y,Z, --range")
+    whole = {name: np.concatenate([part[name] for part in parts])[:count] for name in parts[0]}
+    return Measurement("tcp", (), whole, {"set": tuple(sets[:count])})
+
+
+def has_r_test(machine: Machine) -> bool:
+    """Whether a ball tells anything: there are axes that turn about it, and X, Y and Z that follow."""
+    return bool(machine.rotary.any()) and {"X", "Y", "Z"} <= {axis.name for axis in machine.axes if not axis.rotary}
+
+
+def _moved_to(
+    machine: Machine, columns: Mapping[str, Array], places: Array, room: Room
+) -> tuple[dict[str, Array], NDArray[np.bool_]]:
+    """The columns with X, Y and Z where the tip is at the places (n, 3), and which of these the travels allow."""
+    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    linear, moved = _towards(machine, q, columns["tool_length"], places)
+    limits = np.array([room.of(machine.axes[k]) for k in linear])
+    found = dict(columns)
+    inside = np.ones(len(q), dtype=bool)
+    for k, (low, high), position in zip(linear, limits.tolist(), np.round(moved, DECIMALS).T, strict=True):
+        axis = machine.axes[k]
+        found[axis.name] = position
+        found[f"dir_{axis.name}"] = _sides(axis, position, columns[f"dir_{axis.name}"], room)
+        inside &= (position >= low) & (position <= high)
+    return found, inside
+
+
+def _towards(machine: Machine, q: Array, tool_length: Array, places: Array) -> tuple[list[int], Array]:
+    """The columns of X, Y and Z, and where these bring the tip of poses q (n, n_axes) to the places (n, 3): (n, 3)."""
+    linear = [list(machine.axis_names).index(axis) for axis in "XYZ"]
+    by_axes = np.linalg.inv(machine.axis_jacobian(q, tool_length)[:, :3, linear])
+    gap = machine.tip(q, tool_length) - places
+    moved: Array = q[:, linear] - np.einsum("nij,nj->ni", by_axes, gap)
+    return linear, moved
+
+
+def _reachable_balls(
+    machine: Machine, room: Room, random: np.random.Generator, most: int
+) -> dict[str, tuple[float, float, float]]:
+    """Places within reach, apart from each other, that most positions of the rotary axes can bring to the tip."""
+    columns = _within_reach(machine, "tcp", LOOKED_AT, room, random)
+    q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
+    tips = machine.tip(q, columns["tool_length"])
+    if not room.reach:
+        tips = np.concatenate([np.array(list(_default_balls(machine, room).values())), tips])
+    drawn = _drawn(machine, LOOKED_AT, room, random)
+    shares = [float(_moved_to(machine, drawn, np.tile(tip, (LOOKED_AT, 1)), room)[1].mean()) for tip in tips]
+    chosen: list[Array] = []
+    for index in np.argsort(-np.array(shares), kind="stable").tolist():
+        apart = all(np.linalg.norm(tips[index] - other) >= APART for other in chosen)
+        if len(chosen) < most and apart and shares[index] > 0:
+            chosen.append(np.round(tips[index], DECIMALS))
+    if not chosen:
+        raise UsageError.of("NCF636", "no ball can be reached within the travels", hint="--ball NAME=X,Y,Z, --range")
+    return {f"ball{k}": (float(x), float(y), float(z)) for k, (x, y, z) in enumerate(chosen, 1)}
+
+
 def at_balls(machine: Machine, columns: dict[str, Array], room: Room, random: np.random.Generator) -> Measurement:
     """Poses with the stylus in one of the balls at random, those that the travels allow."""
-    names = list(machine.axis_names)
-    linear = [names.index(axis) for axis in "XYZ"]
     balls = room.balls or _default_balls(machine, room)
     keys = list(balls)
     which = random.integers(len(keys), size=len(columns["X"]))
     q = np.stack([columns[axis.name] * axis.unit for axis in machine.axes], axis=-1)
     places = np.array([balls[key] for key in keys])[which]
-    by_axes = np.linalg.inv(machine.axis_jacobian(q, columns["tool_length"])[:, :3, linear])
-    gap = machine.tip(q, columns["tool_length"]) - places
-    q[:, linear] -= np.einsum("nij,nj->ni", by_axes, gap)
+    linear, moved = _towards(machine, q, columns["tool_length"], places)
+    q[:, linear] = moved
     limits = np.array([room.of(machine.axes[k]) for k in linear])
     inside = ((q[:, linear] >= limits[:, 0]) & (q[:, linear] <= limits[:, 1])).all(axis=1)
     if inside.sum() < 2:

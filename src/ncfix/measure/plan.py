@@ -15,7 +15,7 @@ import numpy as np
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Machine
 from ncfix.machine.library import library
-from ncfix.measure.candidates import Room, candidates
+from ncfix.measure.candidates import Room, candidates, has_r_test, r_test
 from ncfix.measure.exchange import Pool, choose, information, variances
 from ncfix.measure.measurement import Array, Index, Measurement
 from ncfix.measure.observation import Observation
@@ -73,7 +73,9 @@ def plan(
     wanted = ",".join(separate) if separate and not machine.effects and effects is None else effects
     selection = select(machine, wanted)
     _can_be_set(machine, selection, room, existing)
-    offered = candidates(machine, kind, max(CANDIDATES, 3 * count), room, seed)
+    many = max(CANDIDATES, 3 * count)
+    ball = kind == "tcp" and has_r_test(machine)
+    offered = r_test(machine, many, room, seed) if ball else candidates(machine, kind, many, room, seed)
     if count >= len(offered):
         text = f"{count} poses of {len(offered)} that can be reached"
         raise UsageError.of("NCF636", text, hint="a smaller --count, or wider ranges")
