@@ -318,7 +318,7 @@ def test_what_is_said_of_axes_that_may_roll_over_comes_last(machine: Machine) ->
     assert compared(source, machine, "siemens", 200) == ""
     said = [message["code"] for message in streamed(source, machine, "siemens", 200)[1]["warnings"]]
     assert said.count("NCF247") == 2
-    assert "NCF235" in said[: said.index("NCF247")]
+    assert "NCF205" in said[: said.index("NCF247")]
 
 
 def test_text_behind_the_end_that_may_belong_to_a_program_is_looked_at(machine: Machine) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +64,30 @@ class Compared:
             rounding_um=comparison.rounding * 1e3,
         )
 
+    @classmethod
+    def together(cls, several: Sequence[Compared]) -> Compared:
+        """The worst of several ways in which the programs may run."""
+        axes = dict.fromkeys(axis for each in several for axis in each.left)
+        return cls(
+            before=_worst([each.before for each in several]),
+            after=_worst([each.after for each in several]),
+            left_out=_worst([each.left_out for each in several]),
+            beyond=_lines(each.beyond for each in several),
+            not_reached=_lines(each.not_reached for each in several),
+            unseen=_lines(each.unseen for each in several),
+            left={axis: _lines(each.left.get(axis, []) for each in several) for axis in axes},
+            rounding_um=max(each.rounding_um for each in several),
+        )
+
+
+def _worst(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The figures of the one with the largest error, and the largest rms."""
+    return {**max(several, key=lambda each: float(each["max"])), "rms": max(each["rms"] for each in several)}
+
+
+def _lines(several: Iterable[Sequence[int]]) -> list[int]:
+    return sorted({line for each in several for line in each})
+
 
 @dataclass(frozen=True, slots=True)
 class Pair:
@@ -74,13 +98,13 @@ class Pair:
     fixed: Source
     tolerance_um: float
 
-    def compared(self) -> tuple[SideBySide, Said]:
-        """What this machine does with the two, measured against what the first one means; what is said of following
-        them.
+    def compared(self) -> tuple[Sequence[SideBySide], Said]:
+        """What this machine does with the two, measured against what the first one means, in each position of block
+        delete; what is said of following them.
         """
         return through((self.original, self.fixed), self._in_parts, self._as_wholes)
 
-    def _in_parts(self) -> tuple[SideBySide, Said]:
+    def _in_parts(self) -> tuple[Sequence[SideBySide], Said]:
         """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
         from ncfix.compensate.cuts import Cuts
 
@@ -90,19 +114,24 @@ class Pair:
             task = task_of(self.following, source, dialect, *beside)
             cuts.append(Cuts(task, source.read, meant=source is self.original))
         found.run(*map(iter, cuts))
-        return found, tuple(each.said for each in cuts)
+        return [found], tuple(each.said for each in cuts)
 
-    def _as_wholes(self) -> tuple[SideBySide, Said]:
+    def _as_wholes(self) -> tuple[Sequence[SideBySide], Said]:
+        from ncfix.compensate.block_delete import in_pairs, messages_of
         from ncfix.compensate.cuts import whole
+        from ncfix.compensate.following import placed
 
-        found = self._side_by_side()
         original = self._read(self.original)
-        meant = self.following.on_machine(original, self.original.path)
+        meant = self.following.in_positions(original, self.original.path)
         other = self._read(self.fixed, like=original)
-        done = self.following.on_machine(other, self.fixed.path, self.original.path)
-        cuts = whole(meant.machine, original, meant.trace.moves, meant=True)
-        found.run(cuts, whole(meant.machine, other, done.trace.moves))
-        return found, (meant.trace.messages, done.trace.messages)
+        done = self.following.in_positions(other, self.fixed.path, self.original.path)
+        assert self.following.machine is not None
+        machine, found = placed(self.following.machine, self.following.setup), list[SideBySide]()
+        for first, second in in_pairs(meant, done):
+            found.append(self._side_by_side())
+            cuts = whole(machine, original, first.trace.moves, meant=True)
+            found[-1].run(cuts, whole(machine, other, second.trace.moves))
+        return found, (messages_of(meant), messages_of(done))
 
     def _side_by_side(self) -> SideBySide:
         from ncfix.compensate.rounding import rounding
@@ -132,4 +161,4 @@ def compared(following: Following, original: str, fixed: str, tolerance_um: floa
         tell_of_stamp(first)
     told = {(each.code, each.text) for each in of_first}
     console.tell_some([*of_first, *(each for each in of_second if (each.code, each.text) not in told)])
-    return Compared.of(found)
+    return Compared.together([Compared.of(each) for each in found])

@@ -11,6 +11,7 @@ from ncfix.cli.setup_options import SetupOptions
 
 if TYPE_CHECKING:
     from ncfix.compensate.along import Along
+    from ncfix.compensate.block_delete import Position
     from ncfix.compensate.checking import Checked
     from ncfix.compensate.following import Followed
     from ncfix.machine import Machine
@@ -74,6 +75,15 @@ class Following:
 
         assert self.machine is not None
         return follow(program, self.machine, self.setup, subprograms(self.setup, *paths))
+
+    def in_positions(self, program: Program, *paths: str) -> tuple[Position, ...]:
+        """A program as this machine follows it in all positions of block delete, or in the one that is stated."""
+        from ncfix.compensate.block_delete import positions_of
+        from ncfix.compensate.following import follow
+
+        machine, find = self.machine, subprograms(self.setup, *paths)
+        assert machine is not None
+        return positions_of(self.setup, lambda own: follow(program, machine, own, find).trace)
 
 
 def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:

@@ -98,6 +98,26 @@ class Position(click.ParamType):  # type: ignore[type-arg]
         return found
 
 
+BOTH = "both"
+"""All positions of block delete."""
+
+
+class Switches(click.ParamType):  # type: ignore[type-arg]
+    """`on`, `off`, `both`, or the numbers of switches: `2,3`."""
+
+    name = "both|on|off|2,3"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """True, False, `BOTH`, or the switches that are on."""
+        said = {"on": True, "off": False, BOTH: BOTH}.get(str(value).strip().lower())
+        if said is not None or not isinstance(value, str):
+            return value if said is None else said
+        parts = [part.strip().removeprefix("/") for part in value.split(",")]
+        if not all(re.fullmatch(r"[0-9]", part) for part in parts):
+            self.fail(f"{value!r} is neither on, off nor both, nor numbers of switches like 2,3", param, ctx)
+        return frozenset(map(int, parts))
+
+
 OPTIONS = (
     click.option(
         "--setup", "setup_file", type=PATH, metavar="FILE", help="Work offsets, tools and start position (TOML)."
@@ -150,6 +170,13 @@ OPTIONS = (
         multiple=True,
         help="Where probing ends nominally, coordinates of the program: its results count as known (repeatable).",
     ),
+    click.option(
+        "--block-skip",
+        type=Switches(),
+        metavar="[both|on|off|2,3]",
+        help="Blocks with / are skipped (on), executed (off), or may be either (both, as it is without this option); "
+        "or the numbers of the switches that are on.",
+    ),
     click.option("--assume-zero", is_flag=True, help="What is used and not given is zero; each is named in a warning."),
 )
 
@@ -168,6 +195,7 @@ class SetupOptions:
     assume_zero: bool = False
     subprograms: tuple[str, ...] = ()
     probed: tuple[dict[str, float], ...] = ()
+    block_skip: str | bool | frozenset[int] | None = None
 
     @property
     def files(self) -> tuple[str | None, str | None]:
@@ -203,7 +231,14 @@ class SetupOptions:
             assume_zero=setup.assume_zero or self.assume_zero,
             subprograms=(*self.subprograms, *setup.subprograms),
             probed={**(setup.probed or {}), **probed} if self.probed else setup.probed,
+            block_skip=self._block_skip(setup),
         )
+
+    def _block_skip(self, setup: Setup) -> bool | frozenset[int] | None:
+        """How the switches of block delete stand; None: in every position."""
+        if self.block_skip is None:
+            return setup.block_skip
+        return None if isinstance(self.block_skip, str) else self.block_skip
 
 
 def setup_options(command: Callable[..., Any]) -> Callable[..., Any]:

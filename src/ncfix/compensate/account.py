@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -63,6 +63,17 @@ class Account:
         others = refused.keys() | passed.keys()
         return cls(compensated - others if others else compensated, passed, refused)
 
+    @classmethod
+    def together(cls, accounts: Sequence[Account]) -> Account:
+        """One account of blocks that are executed in several ways: refused if in any, else passed if in any."""
+        if len(accounts) == 1:
+            return accounts[0]
+        refused = {block: why for each in reversed(accounts) for block, why in each.refused.items()}
+        passed = {block: why for each in reversed(accounts) for block, why in each.passed.items()}
+        passed = {block: why for block, why in passed.items() if block not in refused}
+        done = frozenset[int]().union(*(each.compensated for each in accounts))
+        return cls(done - refused.keys() - passed.keys(), passed, refused)
+
     @property
     def total(self) -> int:
         """Motion blocks in all."""
@@ -80,6 +91,7 @@ class FixReport:
     error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
     rounding_um  what the control's digits may add to the path that was planned
     left    axes that had to stay where they stand, since the program has not said where that is
+    block_delete  the positions of block delete for which it is right: the switches that are on in each
     """
 
     path: str
@@ -98,6 +110,7 @@ class FixReport:
     leaves: str = ""
     left: tuple[Left, ...] = ()
     rounding_um: float = 0.0
+    block_delete: tuple[list[int], ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """The per-file object of `fix --json`."""
@@ -116,6 +129,7 @@ class FixReport:
             "rounding_um": round(self.rounding_um, 4),
             "strategy": self.strategy,
             "leaves": self.leaves,
+            "block_delete": list(self.block_delete),
             "left_where_it_stands": [left.as_dict() for left in self.left],
             "refused": [refusal.as_dict() for refusal in self.refused],
             "warnings": [warning.as_dict() for warning in self.warnings],

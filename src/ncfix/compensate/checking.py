@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.assembly import untouched
+from ncfix.compensate.block_delete import Position, messages_of, most_moves, positions_of
 from ncfix.compensate.findings import Finding
-from ncfix.compensate.fix import fix_program
-from ncfix.compensate.following import Resolve, follow
+from ncfix.compensate.fix import fix_program, place_of
+from ncfix.compensate.following import Resolve, follow, placed
 from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
 from ncfix.diagnostics import Message, Place
@@ -43,9 +46,9 @@ def check_alone(
 
     What the setup does not give is no finding. Raises what `trace` raises.
     """
-    found = trace(program, setup, axes, rotary, resolve)
-    said = found.messages[len(found.assumed) :]
-    return Checked(len(program), len(found.moves), (*stamped(program), *said, *refused(program, found.moves)))
+    positions = positions_of(setup, lambda own: trace(program, own, axes, rotary, resolve))
+    remarks = _followed(program, positions)
+    return Checked(len(program), most_moves(positions), (*stamped(program), *remarks))
 
 
 def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve | None = None) -> Checked:
@@ -53,18 +56,26 @@ def check_on(program: Program, machine: Machine, setup: Setup, resolve: Resolve 
 
     Raises what `fix_program` raises, but for a stamp, which is a finding here.
     """
-    followed = follow(program, machine, setup, resolve)
-    found = followed.trace
+    positions = positions_of(setup, lambda own: follow(program, machine, own, resolve).trace)
     if machine.is_perfect:
-        remarks = (*found.messages[len(found.assumed) :], *refused(program, found.moves))
+        remarks = _followed(program, positions)
     else:
         remarks = remarks_of(fix_program(program, machine, setup, OPTIONS, resolve).report)
-    travel = tuple(
+    travel = dict.fromkeys(
         message
-        for finding in travel_findings(followed.machine, found.moves)
-        for message in finding.messages(lambda row: program.place(int(found.moves.block[row])))
+        for position in positions
+        for finding in travel_findings(placed(machine, setup), position.trace.moves)
+        for message in finding.messages(partial(place_of, program, position.trace.moves))
     )
-    return Checked(len(program), len(found.moves), together(stamped(program), remarks, travel))
+    return Checked(len(program), most_moves(positions), together(stamped(program), remarks, tuple(travel)))
+
+
+def _followed(program: Program, positions: Sequence[Position]) -> tuple[Message, ...]:
+    """What there is to say of following a program in all positions of block delete; what was assumed is no finding."""
+    assumed = {message for each in positions for message in each.trace.messages[: len(each.trace.assumed)]}
+    said = (message for message in messages_of(positions) if message not in assumed)
+    left = (message for each in positions for message in refused(program, each.trace.moves))
+    return tuple(dict.fromkeys((*said, *left)))
 
 
 def remarks_of(report: FixReport) -> tuple[Message, ...]:

@@ -168,6 +168,20 @@ CODES = {
         "Loops, subprogram calls and expressions are gone from the program that is written.",
         "Keep the original: changes are better made there.",
     ),
+    "NCF451": Code(
+        "a block that needs another correction in each position of block delete",
+        "Blocks with `/` before it may be executed or skipped, and the program is the same. Where this block begins, "
+        "or what its words mean, depends on that, and so does its correction: increments, axes that it does not name, "
+        "offsets and modes that a block with `/` sets.",
+        "Name all axes in absolute words behind blocks with `/`; or `--block-skip on` or `off`, if the switch always "
+        "stands so.",
+    ),
+    "NCF452": Code(
+        "too many switches of block delete",
+        "Each switch (`/2`, `/3`, ...) may be on or off while the program runs, and each position of all of them is "
+        "followed, corrected and proven. There are too many.",
+        "`--block-skip on`, `off`, or the numbers of the switches that are on, says how they stand.",
+    ),
     "NCF446": Code(
         "length offset that is no length",
         "The length offset in force is below zero: a distance by which the tool was touched off, or one that is taken "

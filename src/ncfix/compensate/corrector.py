@@ -103,7 +103,7 @@ class Corrector:
     def stamp(self) -> bytes:
         """The stamp as it has to be by what is known now."""
         assert self.head is not None
-        text = stamp_of(self.head, self.task.machine, self.task.options, self.units.assumed)
+        text = stamp_of(self.head, self.task.machine, self.task.options, assumed=self.units.assumed)
         return stamp.insertion(self.head, text).text
 
     def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
@@ -171,7 +171,7 @@ class Corrector:
         if not first:
             stop = int(program.blocks[1, 0]) if len(program) > 1 else len(program.source)
             return spliced(program.source, splices)[stop:]
-        edit = stamp.insertion(program, stamp_of(program, self.task.machine, self.task.options, ()))
+        edit = stamp.insertion(program, stamp_of(program, self.task.machine, self.task.options))
         self.at = edit.start
         self.head = program
         if len(splices):

@@ -8,31 +8,43 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ncfix import __version__
 from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.block_delete import (
+    Position,
+    Readings,
+    Together,
+    assumed_of,
+    messages_of,
+    most_moves,
+    positions_of,
+    settle_together,
+    stamped,
+)
 from ncfix.compensate.double import numbers_at_the_beginning, suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.left import left_where_they_stand
+from ncfix.compensate.left import either, left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
 from ncfix.compensate.rounding import rounding_along
 from ncfix.compensate.rows import lengths
-from ncfix.compensate.settle import Settled, increments, settle
+from ncfix.compensate.settle import Settled, increments
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
-from ncfix.diagnostics import RefusedError
+from ncfix.diagnostics import Place, RefusedError
 from ncfix.machine import Machine, State
 from ncfix.program import stamp
 from ncfix.program.follow.knowledge import PROBED
 from ncfix.program.language import language_of
 from ncfix.program.moves import Moves, Trace
-from ncfix.program.second_reading import SecondReading
 from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 from ncfix.program.writer import Splices, spliced
@@ -73,23 +85,24 @@ def fix_program(
     program = replace(program, dialect=replace(program.dialect, block_numbers=options.block_numbers))
     on_machine = placed(machine, setup)
 
-    def follow(source: Program) -> Trace:
-        return traced(source, machine, setup, resolve)
+    def follow(source: Program, own: Setup) -> Trace:
+        return traced(source, machine, own, resolve)
 
-    followed = with_tool_lengths(program, follow(program), machine, setup)
+    positions = positions_of(setup, lambda own: with_tool_lengths(program, follow(program, own), machine, own))
+    moves, words = [each.trace.moves for each in positions], (stamped(positions), assumed_of(positions))
 
-    def attempt(reading: SecondReading | None) -> tuple[Settled, bytes]:
-        settled = settle(program, followed.moves, on_machine, options, reading)
-        return settled, _written(program, settled, machine, options, followed)
+    def attempt(readings: Readings) -> tuple[Together, bytes]:
+        together = settle_together(program, moves, on_machine, options, readings)
+        return together, _written(program, together.splices, stamp_of(program, machine, options, *words))
 
-    proof = proven(program, attempt, follow)
-    step = machine.least_increment[0]
-    numbers = numbers_at_the_beginning(program, proof.settled, step)
+    proof = proven(program, attempt, [partial(follow, own=each.setup) for each in positions])
+    step, every = machine.least_increment[0], proof.together.settled
+    numbers = numbers_at_the_beginning(program, every[0], step)
     suspicion = suspected(numbers, step, program.path, options.force)
-    errors = _errors(on_machine, proof.settled, options.split_rapids) if options.verify else None
-    if errors is not None:
-        _check_sane(program, proof.settled, errors)
-    report = _report(program, on_machine, followed, proof.settled, errors, options)
+    errors = [_errors(on_machine, each, options.split_rapids) for each in every] if options.verify else []
+    for settled, error in zip(every, errors, strict=options.verify):
+        _check_sane(program, settled, error)
+    report = _report(program, on_machine, positions, proof.together, errors, options)
     report = replace(report, warnings=(*suspicion, *report.warnings))
     changed = proof.text != program.source
     return Fixed(_numbered(program, proof.text) if changed else proof.text, changed, report)
@@ -109,22 +122,30 @@ def refuse_stamped(program: Program, options: FixOptions) -> None:
         raise RefusedError.of("NCF430", text, program.place(block), "fix the original program, or say --force")
 
 
-def _written(program: Program, settled: Settled, machine: Machine, options: FixOptions, followed: Trace) -> bytes:
-    if not len(settled.emission.splices):
+def _written(program: Program, splices: Splices, words: str) -> bytes:
+    """The corrected text, with a stamp of these words."""
+    if not len(splices):
         return program.source
-    edit = stamp.insertion(program, stamp_of(program, machine, options, followed.assumed))
-    return spliced(program.source, Splices.joined([settled.emission.splices, Splices.of([edit])]))
+    return spliced(program.source, Splices.joined([splices, Splices.of([stamp.insertion(program, words)])]))
 
 
 SHORT_LINE = 250
 """Characters that a line may have on any control."""
 
 
-def stamp_of(program: Program, machine: Machine, options: FixOptions, assumed: tuple[str, ...]) -> str:
-    """The text of the stamp that a corrected program gets; `assumed` names what was taken as zero."""
+def stamp_of(
+    program: Program, machine: Machine, options: FixOptions, block_delete: str = "", assumed: tuple[str, ...] = ()
+) -> str:
+    """The text of the stamp that a corrected program gets.
+
+    block_delete  for which positions of its switches, in words; empty without
+    assumed       names what was taken as zero
+    """
     words = (
         f"ncfix {__version__} machine {machine.hash} strategy {options.strategy} tolerance {options.tolerance_um:g} um"
     )
+    if block_delete:
+        words += f", {block_delete}"
     if PROBED in assumed:
         words += ", nominal probing"
     if zeros := [each for each in assumed if each != PROBED]:
@@ -152,8 +173,17 @@ def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:
         raise SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
 
 
-def _figures(figures: Figures) -> dict[str, float | int | None]:
-    return {"max": round(figures.max * 1e3, 4), "rms": round(figures.rms * 1e3, 4)}
+def _figures(figures: Sequence[Figures]) -> dict[str, float | int | None]:
+    """The worst of all positions of block delete."""
+    if not figures:
+        return {}
+    most, rms = max(each.max for each in figures), max(each.rms for each in figures)
+    return {"max": round(most * 1e3, 4), "rms": round(rms * 1e3, 4)}
+
+
+def place_of(program: Program, moves: Moves, row: int) -> Place:
+    """Where the block of a motion stands."""
+    return program.place(int(moves.block[row]))
 
 
 def _line_of(program: Program, moves: Moves, figures: Figures) -> int | None:
@@ -168,37 +198,41 @@ def _untouched(program: Program) -> Fixed:
 def _report(
     program: Program,
     machine: Machine,
-    followed: Trace,
-    settled: Settled,
-    errors: PathError | None,
+    positions: Sequence[Position],
+    together: Together,
+    errors: Sequence[PathError],
     options: FixOptions,
 ) -> FixReport:
-    moves = followed.moves
-    left = tuple(left_where_they_stand(program, settled, increments(machine)).values())
-    account = Account.of(moves, settled.kept, settled.reasons)
+    every, steps = together.settled, increments(machine)
+    left = either([left_where_they_stand(program, each, steps) for each in every])
+    account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
     refused = refusals(program, account)
-    findings = [
+    findings = dict.fromkeys(
         message
+        for settled in every
         for finding in settled.plan.findings
-        for message in finding.messages(lambda row: program.place(int(moves.block[row])))
-    ]
+        for message in finding.messages(partial(place_of, program, settled.moves))
+    )
+    worst = max(range(len(errors)), key=lambda k: errors[k].after.max) if errors else 0
     report = FixReport(
         path=program.path,
         blocks=len(program),
-        moves=len(moves),
+        moves=most_moves(positions),
         compensated=len(account.compensated),
         passed=len(account.passed),
-        changed=bool(len(settled.emission.splices)),
-        inserted_blocks=settled.emission.added_blocks,
-        max_correction_um=largest_correction(moves, settled) * 1e3,
-        error_before_um=_figures(errors.before) if errors else {},
-        error_after_um=_figures(errors.after) | {"where": _line_of(program, moves, errors.after)} if errors else {},
+        changed=bool(len(together.splices)),
+        inserted_blocks=together.added_blocks,
+        max_correction_um=max(largest_correction(each.moves, each) for each in every) * 1e3,
+        error_before_um=_figures([each.before for each in errors]),
+        error_after_um=_figures([each.after for each in errors])
+        | ({"where": _line_of(program, every[worst].moves, errors[worst].after)} if errors else {}),
         refused=tuple(refused),
-        warnings=(*followed.messages, *(each.message(program.path) for each in left), *findings),
+        warnings=(*messages_of(positions), *(each.message(program.path) for each in left), *findings),
         strategy=options.strategy,
         leaves=get_strategy(options.strategy).leaves,
         left=left,
-        rounding_um=rounding_along(Intent(machine, moves, State()), settled.plan.pieces) * 1e3,
+        rounding_um=max(rounding_along(Intent(machine, each.moves, State()), each.plan.pieces) for each in every) * 1e3,
+        block_delete=tuple(sorted(each.on) for each in positions if each.on is not None),
     )
     return with_what_is_left(report, options.tolerance_um)
 

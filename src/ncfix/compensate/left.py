@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -102,7 +102,11 @@ def left_where_they_stand(program: Program, settled: Settled, steps: Array, own:
 
 def stretches_of(program: Program, blocks: NDArray[np.int32]) -> tuple[tuple[int, int], ...]:
     """The lines of blocks, as stretches without gaps, from and to."""
-    lines = np.unique(program.lines(blocks))
+    return in_stretches(np.unique(program.lines(blocks)))
+
+
+def in_stretches(lines: NDArray[np.int64]) -> tuple[tuple[int, int], ...]:
+    """Lines in ascending order, as stretches without gaps, from and to."""
     begins = np.flatnonzero(np.diff(lines, prepend=-1) > 1)
     ends = np.append(begins[1:], len(lines)) - 1
     return tuple(zip(lines[begins].tolist(), lines[ends].tolist(), strict=True))
@@ -119,6 +123,23 @@ def joined(before: Mapping[str, Left], later: Mapping[str, Left]) -> dict[str, L
     """What was left in two parts of a program, one behind the other."""
     both = {axis: before[axis].with_later(later[axis]) for axis in before.keys() & later.keys()}
     return in_order({**before, **later, **both})
+
+
+def either(found: Sequence[Mapping[str, Left]]) -> tuple[Left, ...]:
+    """What is left in any of several ways in which a program may run: the most of each axis."""
+    together = dict(found[0])
+    for other in found[1:]:
+        for axis, left in other.items():
+            own = together.setdefault(axis, left)
+            lines = sorted({line for each in (own, left) for a, b in each.stretches for line in range(a, b + 1)})
+            together[axis] = replace(
+                own,
+                motions=max(own.motions, left.motions),
+                cuts=max(own.cuts, left.cuts),
+                stretches=in_stretches(np.array(lines)),
+                most=max(own.most, left.most),
+            )
+    return tuple(in_order(together).values())
 
 
 def in_order(found: Mapping[str, Left]) -> dict[str, Left]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ncfix.compensate.arcs import across
+from ncfix.compensate.block_delete import Readings, Together
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import every, picked
 from ncfix.compensate.settle import Settled
@@ -27,7 +28,7 @@ TURN = 1.0
 ATTEMPTS = 16
 """The second attempt knows the frames that moved with the first, each further one a frame that depends on others."""
 
-Attempt = Callable[[SecondReading | None], tuple[Settled, bytes]]
+Attempt = Callable[[Readings], tuple[Together, bytes]]
 Follow = Callable[[Program], Trace]
 
 
@@ -37,37 +38,48 @@ class SelfCheckError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Proven:
-    """A text that a second reading has confirmed, and what was settled for it."""
+    """A text that a second reading has confirmed in each position of block delete, and what was settled for each."""
 
     text: bytes
-    settled: Settled
+    together: Together
 
 
-def proven(program: Program, attempt: Attempt, follow: Follow) -> Proven:
+def proven(program: Program, attempt: Attempt, follows: Sequence[Follow]) -> Proven:
     """Write, read what was written, and write again with what the reading taught, until both agree.
 
-    attempt  settles and writes, given what a control made of the last attempt
-    follow   traces a program
+    attempt  settles and writes, given what a control made of the last attempt in each position of block delete
+    follows  traces a program, in each of them
 
     Raises `SelfCheckError` if they never agree.
     """
-    reading = None
+    readings: Readings = [None] * len(follows)
     for _ in range(ATTEMPTS):
-        settled, text = attempt(reading)
+        together, text = attempt(readings)
         if text == program.source:
-            return Proven(text, settled)
-        again = _followed(program, text, settled, follow)
-        wrong = differences(settled, again)
-        assert wrong is not None, "the numbers of motions have been compared"
-        if not wrong.any():
-            return Proven(text, settled)
-        reading = SecondReading.of(again, settled.plan.pieces)
-    assert wrong is not None
-    piece = int(np.argmax(wrong))
+            return Proven(text, together)
+        pairs = [
+            (own, _followed(program, text, own, follow)) for own, follow in zip(together.settled, follows, strict=True)
+        ]
+        wrong = [_wrong(*each) for each in pairs]
+        if not any(each.any() for each in wrong):
+            return Proven(text, together)
+        readings = [SecondReading.of(again, own.plan.pieces) for own, again in pairs]
+    at = next(k for k, each in enumerate(wrong) if each.any())
+    raise SelfCheckError(_what_is_wrong(program, *pairs[at], int(np.argmax(wrong[at]))))
+
+
+def _wrong(settled: Settled, again: Moves) -> Mask:
+    wrong = differences(settled, again)
+    assert wrong is not None, "the numbers of motions have been compared"
+    return wrong
+
+
+def _what_is_wrong(program: Program, settled: Settled, again: Moves, piece: int) -> str:
+    """Where a piece would lead, and was not meant to."""
     move = int(settled.plan.pieces.move[piece])
     line = program.line(int(settled.moves.block[move]))
     meant = settled.moves.end[move] if settled.plan.pieces.kept[piece] else settled.emission.end[piece]
-    raise SelfCheckError(f"line {line} would lead to {again.end[piece]}, not to {meant}")
+    return f"line {line} would lead to {again.end[piece]}, not to {meant}"
 
 
 def _followed(program: Program, text: bytes, settled: Settled, follow: Follow) -> Moves:

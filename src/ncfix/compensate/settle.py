@@ -7,7 +7,9 @@ take turns until nothing more has to be kept; motions are only ever added to tho
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -36,6 +38,7 @@ from ncfix.program.second_reading import SecondReading
 from ncfix.program.tree import Program
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
+NONE: Mapping[int, Reason] = MappingProxyType({})
 CODE_OF_RULE = "NCF432"
 CODE_OF_TEXT = "NCF433"
 
@@ -106,14 +109,16 @@ def settle(
     reading: SecondReading | None = None,
     before: Before | None = None,
     first: Agreed | None = None,
+    refused: Mapping[int, Reason] = NONE,
 ) -> Settled:
     """Plan and write until both agree.
 
     reading  what the control made of an earlier attempt
     before   what an earlier part of the program left, where this is a part: its last motion is the first one here
     first    the plan to begin with, from `agree`, if that has been made already
+    refused  blocks that are refused whatever the plan is, and why
     """
-    agreed = first or agree(moves, machine, program.dialect, options, before)
+    agreed = first or agree(moves, machine, program.dialect, options, before, refused=refused)
     kinematics, rounds = kinematics_of(machine), list[Round]()
     while True:
         done = None if before is None else before.in_round(len(rounds)).position
@@ -141,10 +146,14 @@ def agree(
     before: Before | None = None,
     earlier: Agreed | None = None,
     number: int = 0,
+    refused: Mapping[int, Reason] = NONE,
 ) -> Agreed:
-    """Plan until nothing speaks against it; `earlier` says what is kept already, and why, in round `number`."""
+    """Plan until nothing speaks against it; `earlier` says what is kept already, and why, in round `number`.
+
+    refused  blocks that are refused in any case, where there is no `earlier` plan
+    """
     kept = np.asarray((moves.rule != Rule.CORRECT) | (moves.kind == Kind.DWELL)) if earlier is None else earlier.kept
-    reasons = _by_rule(moves) if earlier is None else earlier.reasons
+    reasons = {**refused, **_by_rule(moves)} if earlier is None else earlier.reasons
     head = None if before is None else before.in_round(number)
     state, trail = State() if before is None else State(direction=before.direction), list[tuple[bool, Array]]()
     bound = np.zeros(len(moves), dtype=bool)
@@ -160,15 +169,15 @@ def agree(
             trail.append(_last_of(planned, moves))
         planned = replace(planned, pieces=on_digits(Intent(machine, moves, state), planned.pieces))
         against = findings(machine, moves, planned.pieces, planned.start, state)
-        refused = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
+        stays = planned.pieces.kept[_first_rows(planned, len(moves))] & ~kept
         for finding in against:
-            refused[finding.moves] = True
+            stays[finding.moves] = True
         astray = led_astray(machine, moves, planned.pieces, planned.start, state)
         waiting = head is not None and len(trail) < len(head.kept)
-        if not (refused.any() or (~bound[astray]).any() or waiting):
+        if not (stays.any() or (~bound[astray]).any() or waiting):
             return Agreed(planned, kept, reasons, unmoored, tuple(trail))
-        _explain_findings(reasons, (*against, *planned.findings), moves, refused)
-        kept |= refused
+        _explain_findings(reasons, (*against, *planned.findings), moves, stays)
+        kept |= stays
         bound[astray] = True
 
 

@@ -360,6 +360,7 @@ class _Emitter:
             wordless=tuple(wordless.tolist()),
             call=moves.call_of(row),
             measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
+            spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
             level=self.levels.wanted(
                 row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position
             ),

@@ -164,6 +164,7 @@ class Moves:
     call         (n,) of canned cycles whose depth stands in a call of its own: index into `calls`; -1 of others.
                  None: of none
     calls        the calls that occur
+    spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
     """
 
     axes: tuple[str, ...]
@@ -202,6 +203,7 @@ class Moves:
     passing: NDArray[np.int8] | None = None
     call: NDArray[np.int32] | None = None
     calls: tuple[CycleCall, ...] = ()
+    spelled: NDArray[np.bool_] | None = None
 
     def __len__(self) -> int:
         return len(self.block)
@@ -260,3 +262,5 @@ class Trace:
     """What was not given and was taken as zero (`assume_zero`), in words, e.g. "work offset G54"."""
     stamp: str = ""
     """The text of the stamp comment if the program carries one."""
+    switches: frozenset[int] = frozenset()
+    """The switches of block delete that were asked: blocks with `/`, `/2`, ... stand where the control got to."""

@@ -219,6 +219,7 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "held": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "approach": lambda moves: np.full(moves.end.shape, np.nan),
     "placed": lambda moves: np.ones(moves.end.shape, dtype=np.bool_),
+    "spelled": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "measured": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),

@@ -12,13 +12,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ncfix.program.tree import Flow, Template
+from ncfix.program.tree import Comment, Constant, Flow, Skip, Template, Word
 
 UNREAD = "unread"
 """The kind of an `Opaque` that could not be read where nobody may need it."""
 
 CALL = 980
 """M98 in tenths."""
+
+DWELL = 40
+"""G4 in tenths."""
+PATHLESS = frozenset({0, 10, 70, 80, 90})
+"""M0, M1 and coolant, in tenths."""
 
 OPENING = frozenset({"sub", "if", "while", "repeat", "do"})
 CLOSING = frozenset({"endsub", "endif", "endwhile", "endrepeat"})
@@ -54,6 +59,31 @@ def whole_text(source: bytes, blocks: NDArray[np.int64]) -> int:
 def runs_straight_on(template: Template) -> bool:
     """Whether nothing leads from a block of this shape to another part of the text, or from there to it."""
     return not any(isinstance(item, Flow) for item in template.items) and CALL not in template.m_codes
+
+
+@dataclass(frozen=True, slots=True)
+class Deletable:
+    """What blocks that may be skipped have in common.
+
+    switches  of block delete: `/` is one, `/2` another
+    matters   to the path: whether the coolant is on, the control stops or waits leads no axis elsewhere
+    """
+
+    switches: frozenset[int]
+    matters: bool
+
+
+def deletable(template: Template, dwell: str) -> Deletable | None:
+    """Which switches decide over blocks of this shape, if any; `dwell`: the letters that say with G4 how long."""
+    switches = frozenset(item.level for item in template.items if isinstance(item, Skip))
+    if not switches:
+        return None
+    plain = all(isinstance(item, Word | Comment | Skip) for item in template.items)
+    plain = plain and all(isinstance(word.value, Constant) for word in template.words if word.address in "GM")
+    words = {word.address for word in template.words} - {"N", "G", "M"}
+    waits = template.g_codes == (DWELL,) and words <= set(dwell)
+    idle = plain and (waits or not (template.g_codes or words)) and PATHLESS.issuperset(template.m_codes)
+    return Deletable(switches, not idle)
 
 
 @dataclass(slots=True)

@@ -95,7 +95,8 @@ class BlockRenderer(TurnWriter):
         return float(position[column])
 
     def _absent_axis(self, position: FloatArray, column: int, end: float) -> None:
-        still = not np.isfinite(end) or abs(end - position[column]) < self.half[column]
+        near = abs(end - position[column]) < self.half[column] and not self.target.must_name(column)
+        still = near or not np.isfinite(end)
         if still or not self._has_words(column):
             return
         if self.layout.allowed is not None and self.target.letters[column] not in self.layout.allowed:

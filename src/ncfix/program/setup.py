@@ -58,7 +58,8 @@ class Setup:
     subprograms       folders in which subprograms are looked for that are not beside the program
     probed            where probing ends, if its results count as nominal: axis letter -> position in the program's
                       coordinates, mm or degree; axes that are not in it: the end of the motion. None: at run time only
-    block_skip        blocks with `/` are skipped (LinuxCNC's own default: they are executed)
+    block_skip        how the switches of block delete stand: all on (blocks with `/` are skipped), all off, or those
+                      that are on, by number; None: not said. Whoever follows a program once takes them as off then
     """
 
     work_offsets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -70,7 +71,7 @@ class Setup:
     workpiece_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tcp: bool = False
     assume_zero: bool = False
-    block_skip: bool = False
+    block_skip: bool | frozenset[int] | None = None
     most_blocks: int = MOST_BLOCKS
     no_point: str = ""
     passed_codes: frozenset[int] = frozenset()

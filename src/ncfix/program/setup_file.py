@@ -95,7 +95,7 @@ class Reading:
             "workpiece_offset": self.triple,
             "tcp": self.flag,
             "assume_zero": self.flag,
-            "block_skip": self.flag,
+            "block_skip": self.switches,
             "no_point": self.no_point,
             "most_blocks": self.count,
             "passed_codes": self.codes,
@@ -158,6 +158,17 @@ class Reading:
         if not isinstance(value, bool):
             self.fault(WRONG_VALUE, key, f"expected true or false, found {value!r}")
         return value is True
+
+    def switches(self, key: str, value: Any) -> bool | frozenset[int] | None:
+        """How the switches of block delete stand: all on or off, those that are on, or "both" for all positions."""
+        if isinstance(value, bool):
+            return value
+        if isinstance(value, list) and all(type(each) is int and 0 <= each <= 9 for each in value):
+            return frozenset(value)
+        if value != "both":
+            said = 'true, false, "both", or the numbers of the switches that are on, such as [2, 3]'
+            self.fault(WRONG_VALUE, key, f"expected {said}, found {value!r}")
+        return None
 
     def no_point(self, key: str, value: Any) -> str:
         """What numbers without a decimal point mean."""

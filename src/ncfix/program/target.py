@@ -75,6 +75,7 @@ class Target:
     measured     (n_axes,) axes whose words are computed at run time, and must be; empty: no axis
     wordless     (n_axes,) axes that have no word and must get none; empty: no axis
     call         of a canned cycle whose depth stands in a call of its own
+    spelled      (n_axes,) axes that get a word even if they stand where it leads; empty: no axis
     """
 
     letters: tuple[str, ...]
@@ -112,10 +113,15 @@ class Target:
     wordless: tuple[bool, ...] = ()
     call: CycleCall | None = None
     measured: tuple[bool, ...] = ()
+    spelled: tuple[bool, ...] = ()
 
     def may_name(self, column: int) -> bool:
         """Whether an axis has a word, or may get one."""
         return not self.wordless or not self.wordless[column]
+
+    def must_name(self, column: int) -> bool:
+        """Whether an axis gets a word even if it stands where that leads it."""
+        return bool(self.spelled) and self.spelled[column]
 
     @property
     def last_code(self) -> int:

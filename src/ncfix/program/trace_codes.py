@@ -191,8 +191,11 @@ TRACE_CODES: dict[str, Code] = {
     ),
     "NCF235": Code(
         "Block skip",
-        "Blocks that begin with `/` are executed or passed over as the operator chooses; what follows depends on it.",
-        "block_skip = true in the setup file passes over them.",
+        "Blocks that begin with `/` are executed or passed over as the operator chooses; what follows depends on it. "
+        "`fix`, `check` and `verify` hold both positions of the switch to the tolerance, or all positions of several "
+        "(`/2`, `/3`); what looks at one position says which.",
+        "`--block-skip on` or `off` (block_skip in the setup file), if the switch always stands so: then only that "
+        "position is looked at, and the stamp says it.",
     ),
     "NCF236": Code(
         "Line cannot be read",

@@ -175,7 +175,7 @@ class Comment:
 
 @dataclass(frozen=True, slots=True)
 class Skip:
-    """Block skip `/` with its level (1 if none is written)."""
+    """Block skip `/` with its level: if none is written, the first there is (0 on SINUMERIK, else 1)."""
 
     level: int
     span: Span

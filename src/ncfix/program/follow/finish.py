@@ -49,4 +49,5 @@ def finished(control: Control, program: Program, moves: Moves) -> Trace:
         messages=rollover.remarks(control),
         assumed=tuple(control.knowledge.assumed),
         stamp="" if marked is None else program.text_of(marked),
+        switches=frozenset(control.switches),
     )

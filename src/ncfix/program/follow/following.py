@@ -14,7 +14,7 @@ from ncfix.program.follow.control import Control
 from ncfix.program.follow.finish import check_reach
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Moves
-from ncfix.program.parts import Remains
+from ncfix.program.parts import NotInPartsError, Remains
 from ncfix.program.tree import Program
 
 
@@ -66,6 +66,8 @@ class PartFollower(ABC):
             self.interpreter.next_part(program)
         self.control.builder.clear()
         self.interpreter.run_part(last, self.budget(program))
+        if self.control.switches:
+            raise NotInPartsError("blocks with / may be skipped, and all positions of block delete are looked at")
         moves = self.control.moves()
         check_reach(program, moves)
         rollover.say(self.control, program)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 
 from ncfix.diagnostics import Message, Place
 from ncfix.program.dialect import Dialect
@@ -28,6 +28,14 @@ from ncfix.program.follow.modal import Modal, Offsets, Tools
 from ncfix.program.follow.motion import AT_START, Unknown
 from ncfix.program.follow.places import Places
 from ncfix.program.language import Run
+from ncfix.program.reach import Deletable
+
+BLOCK_DELETE = "NCF235"
+
+
+def named_switches(switches: Collection[int]) -> str:
+    """Switches of block delete as they are written in blocks: `/2 /3`."""
+    return " ".join(f"/{number}" for number in sorted(switches))
 
 
 class Standing(ABC):
@@ -47,6 +55,7 @@ class Standing(ABC):
     offset_checked  it has been asked for the work offset in force
     tcp        X Y Z are those of the tip (tool-centre-point control)
     tilted     a tilted plane is in force, in which they are
+    switches   the switches of block delete that have been asked, where that matters to the path
     increments what a number without a decimal point counts, linear and rotary words
     locate     where in the program we are; `messages` are the remarks so far, by their text, and `rolled` those about
                axes that may roll over, which come behind them
@@ -69,6 +78,7 @@ class Standing(ABC):
         self.rolled: dict[str, Message] = {}
         self.increments = (1.0, 1.0)
         self.tilted = False
+        self.switches = set[int]()
         self.tcp = run.setup.tcp
         self.said: Unknown | None = None
         self.saying: tuple[Unknown, Unknown] | None = None
@@ -99,6 +109,19 @@ class Standing(ABC):
         """A remark, once per text."""
         if text not in self.messages:
             self.messages[text] = Message(code, text, self.place(), hint)
+
+    def is_deleted(self, block: Deletable) -> bool:
+        """Whether a block that may be skipped is passed over."""
+        switches, stated = block.switches, self.setup.block_skip
+        deleted = bool(switches & stated) if isinstance(stated, frozenset) else bool(stated)
+        if not block.matters:
+            return deleted
+        self.switches |= switches
+        told = "skipped" if deleted else "executed"
+        name = "/" if stated is None or isinstance(stated, bool) else named_switches(switches)
+        hint = "--block-skip off: they are executed" if deleted else "--block-skip on: they are skipped"
+        self.warn(BLOCK_DELETE, f"blocks with {name} are taken as {told}", hint)
+        return deleted
 
     # -- frames -------------------------------------------------------------------------------------------------------
 

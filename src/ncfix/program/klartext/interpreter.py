@@ -34,7 +34,6 @@ from ncfix.program.recurrence import ENDLESS, NEVER_ENDS, Recurrence
 from ncfix.program.tree import Opaque, Program, Span
 
 NO_END = "NCF234"
-SKIPPED_BLOCKS = "NCF235"
 WRITTEN_AT_RUN_TIME = "NCF237"
 AT_RUN_TIME = "NCF277"
 ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
@@ -122,7 +121,7 @@ class Interpreter:
             control.external = unit.name
             if not unit.name:
                 control.row_block = block
-            if plan.skip and self.is_skipped():
+            if plan.skip is not None and control.is_deleted(plan.skip):
                 continue
             if self.recorder is not None:
                 self.recorder.note(unit, block, control, control.row_block)
@@ -153,13 +152,6 @@ class Interpreter:
         flow.block += done
         self.control.budget.spend(done)
         return done > 0
-
-    def is_skipped(self) -> bool:
-        """Whether blocks with `/` are passed over."""
-        if self.control.setup.block_skip:
-            return True
-        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "block_skip = true in the setup file")
-        return False
 
     # -- one block ----------------------------------------------------------------------------------------------------
 

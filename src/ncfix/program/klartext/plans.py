@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ncfix.program.klartext.calculate import Evaluate, compiled
-from ncfix.program.reach import UNREAD
+from ncfix.program.reach import UNREAD, Deletable, deletable
 from ncfix.program.tree import (
     Assignment,
     Command,
@@ -15,7 +15,6 @@ from ncfix.program.tree import (
     Item,
     NamedParameter,
     Opaque,
-    Skip,
     Span,
     Template,
     Text,
@@ -52,7 +51,7 @@ class Plan:
     tool         the name of a tool, or the value of its number
     statement    the span of a statement that is not taken apart, and its kind
     spans        address -> where the word stands
-    skip         the block may be skipped
+    skip         the switches of block delete that it begins with: `/` is the only one
     moves        the block leads somewhere: by its words, or by its path function alone
     empty        the block does nothing
     """
@@ -67,7 +66,7 @@ class Plan:
     tool: str | Evaluate | None = None
     statement: tuple[str, Span] | None = None
     spans: Mapping[str, Span] = field(default_factory=dict)
-    skip: bool = False
+    skip: Deletable | None = None
     moves: bool = False
     empty: bool = False
 
@@ -163,7 +162,7 @@ def plan_of(template: Template) -> Plan:
         tool=tool_of(template.words),
         statement=next(((item.kind, item.span) for item in opaque), None),
         spans={word.address: word.span for word in reversed(words)},
-        skip=any(isinstance(item, Skip) for item in items),
+        skip=deletable(template, ""),
         moves=any(word.address in MOVING for word in words) or opening in ALWAYS_MOVING,
     )
     return replace(plan, empty=plan == Plan())

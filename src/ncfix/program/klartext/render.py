@@ -86,7 +86,7 @@ class Renderer(HoleWriter):
     def _as_it_is(self) -> bool:
         """The block says well enough what is wanted, and nothing that it relies on has moved."""
         target, name = self.target, self.layout.name
-        if name in SAID_BY_WORDS or name.startswith(("appr", "dep")) or len(target.ends) > 1:
+        if name in SAID_BY_WORDS or name.startswith(("appr", "dep")) or len(target.ends) > 1 or any(target.spelled):
             return False
         arc = name not in STRAIGHT
         if arc != target.arc or (np.abs(target.ends[0] - target.nominal) >= self.half).any():

@@ -116,6 +116,7 @@ class WordWriter(BlockWriter[Layout]):
 
     def _absent(self, position: FloatArray, column: int, end: float, always: bool) -> None:
         end = self._turned(column, end)
+        always |= self.target.must_name(column)
         if not np.isfinite(end) or (not always and abs(end - position[column]) < self.half[column]):
             return
         text = self._number(end, column)

@@ -40,7 +40,6 @@ LAST_PROGRAM = 9999
 
 POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
 MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
-SKIPPED_BLOCKS = "NCF235"
 UNREADABLE = "NCF236"
 INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
 
@@ -175,7 +174,7 @@ class Interpreter:
         control.numbers, control.first = unit.numbers, unit.first[index]
         if unit is self.main:
             control.row_block = index
-        if plan.skip and self.is_skipped():
+        if plan.skip is not None and control.is_deleted(plan.skip):
             return False
         if plan.tape:
             if self.recorder:
@@ -201,13 +200,6 @@ class Interpreter:
         ended = self.execute_words(plan, index)
         self.recorder = written
         return ended
-
-    def is_skipped(self) -> bool:
-        """Whether blocks with `/` are passed over."""
-        if self.control.setup.block_skip:
-            return True
-        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "--block-skip: they are skipped")
-        return False
 
     def at_tape(self, index: int) -> bool:
         """`%`: the first line of a tape, or its end."""

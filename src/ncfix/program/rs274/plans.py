@@ -12,7 +12,7 @@ from ncfix.program.follow.coordinates import INDEX
 from ncfix.program.follow.faults import Fault
 from ncfix.program.follow.lane_tables import Lane
 from ncfix.program.follow.modal import NO_MOTION
-from ncfix.program.reach import UNREAD
+from ncfix.program.reach import UNREAD, Deletable, deletable
 from ncfix.program.rs274 import groups
 from ncfix.program.rs274.expressions import Evaluate
 from ncfix.program.rs274.groups import TOOL_CHANGE, Rules
@@ -26,13 +26,14 @@ from ncfix.program.tree import (
     NamedParameter,
     Opaque,
     Parameter,
-    Skip,
     Span,
     Tape,
     Template,
     Word,
 )
 
+DWELL_WORDS = "P"
+"""With G4: how long."""
 NO_WORDS = frozenset("GMNO")
 """Addresses that do not come as values to the steps of a block."""
 
@@ -101,7 +102,8 @@ class Plan:
     assignments  parameters that are set
     code_words   G and M words whose code is computed; else `codes` are the codes
     flow         the flow-control line that the block is
-    skip, tape   the block begins with `/`; it is a `%`
+    skip         the switches of block delete that it begins with (`/`, `/2`)
+    tape         the block is a `%`
     unread       the block could not be read
     command      where a command to the control itself stands (`$H` of Grbl)
     axes         bit mask of the axis words
@@ -118,7 +120,7 @@ class Plan:
     code_words: tuple[tuple[Word, Evaluate], ...] = ()
     codes: Codes | None = None
     flow: FlowLine | None = None
-    skip: bool = False
+    skip: Deletable | None = None
     tape: bool = False
     command: Span | None = None
     unread: bool = False
@@ -165,7 +167,7 @@ def take_statements(plan: Plan, rules: Rules) -> None:
     items = plan.template.items
     plan.assignments = tuple(assignment(item, rules) for item in items if isinstance(item, Assignment))
     plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, Flow)), None)
-    plan.skip = any(isinstance(item, Skip) for item in items)
+    plan.skip = deletable(plan.template, DWELL_WORDS)
     plan.tape = any(isinstance(item, Tape) for item in items)
     opaque = {item.kind: item.span for item in items if isinstance(item, Opaque)}
     plan.unread, plan.command = UNREAD in opaque, opaque.get("command")

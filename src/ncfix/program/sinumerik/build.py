@@ -74,7 +74,7 @@ class SinumerikBuilder(Builder):
             case "COMMENT":
                 return Comment(self.span_to_end(token))
             case "SKIP":
-                return Skip(int(token[1:] or 1), span)
+                return Skip(int(token[1:] or 0), span)
             case "HEAD" | "PROCEDURE":
                 return Opaque("program head", span)
             case name:

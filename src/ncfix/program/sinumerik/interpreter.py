@@ -37,7 +37,6 @@ from ncfix.program.sinumerik.unroll import Recorder
 from ncfix.program.sinumerik.vectors import run_vectors
 from ncfix.program.tree import Program, Span
 
-SKIPPED_BLOCKS = "NCF235"
 NOT_UNDERSTOOD = "NCF250"
 SYNCHRONOUS = "NCF251"
 PROGRAM_ENDS = frozenset({20, 300, 170})
@@ -193,7 +192,7 @@ class Interpreter:
         self.span = None
         if not unit.external:
             control.row_block = index
-        if plan.skip >= 0 and self.is_skipped():
+        if plan.skip is not None and control.is_deleted(plan.skip):
             return False
         if plan.opaque:
             self.opaque(plan, unit.program.text_of(index))
@@ -252,13 +251,6 @@ class Interpreter:
         except AtRuntimeError:
             if self.recorder is not None or not bypassed(self.control, self.course, step, plan.steps):
                 raise
-
-    def is_skipped(self) -> bool:
-        """Whether blocks with `/` are passed over."""
-        if self.control.setup.block_skip:
-            return True
-        self.control.warn(SKIPPED_BLOCKS, "blocks with / are taken as executed", "--block-skip: they are skipped")
-        return False
 
     def opaque(self, plan: Plan, text: str) -> None:
         """Text that is no motion, or that nobody understands."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.program.follow.lane_tables import Lane
+from ncfix.program.reach import Deletable, deletable
 from ncfix.program.sinumerik.blocks import STATEMENT
 from ncfix.program.sinumerik.build import BRACKET
 from ncfix.program.sinumerik.values import Evaluate, compiled, nothing
@@ -24,7 +25,6 @@ from ncfix.program.tree import (
     NamedParameter,
     Opaque,
     Parameter,
-    Skip,
     Span,
     Template,
     Text,
@@ -32,6 +32,8 @@ from ncfix.program.tree import (
     Word,
 )
 
+DWELL_WORDS = "FS"
+"""With G4: how long."""
 LISTS = frozenset({BRACKET, "set", "rep"})
 """What gives several elements their values."""
 
@@ -105,7 +107,7 @@ class Plan:
     steps      assignments, names, jumps, in the order written
     g, m       codes in tenths
     axes       bit mask of the axis words
-    skip       the level of block skip, 0 without
+    skip       the switches of block delete that it begins with (`/` is `/0`)
     opaque     kinds of text that is passed over or not understood
     lane       set if the block may go through the fast lane
     vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
@@ -117,7 +119,7 @@ class Plan:
     g: tuple[int, ...] = ()
     m: tuple[int, ...] = ()
     axes: int = 0
-    skip: int = -1
+    skip: Deletable | None = None
     opaque: frozenset[str] = frozenset()
     lane: Lane | None = None
     vector: tuple[int, ...] | None = None
@@ -133,7 +135,7 @@ def plan_of(template: Template) -> Plan:
     plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
     plan.g, plan.m = template.g_codes, template.m_codes
     plan.axes = sum({1 << INDEX[each.address] for each in plan.settings if each.address in INDEX})
-    plan.skip = next((item.level for item in items if isinstance(item, Skip)), -1)
+    plan.skip = deletable(template, DWELL_WORDS)
     plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
     plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
     plan.lane = lane_of(plan)

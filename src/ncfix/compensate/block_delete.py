@@ -1,0 +1,337 @@
+"""Block delete: a program with blocks that the operator may have skipped (`/`, `/2`), right in all positions.
+
+Each switch may be on or off while the program runs, and the text is the same. So the program is followed in every
+position of its switches, and corrected in each of them for itself; where a block is executed in several positions, all
+of them must want the same of it. A motion that does not start at the same place in all of them is not split, for the
+pieces would lie on one of its ways only; what still needs another correction in another position is refused.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ncfix.compensate.account import Reason
+from ncfix.compensate.findings import Mask
+from ncfix.compensate.options import FixOptions
+from ncfix.compensate.settle import Settled, settle
+from ncfix.diagnostics import Message, Place, RefusedError, SourceError, UsageError
+from ncfix.machine import Machine
+from ncfix.program.follow.standing import BLOCK_DELETE, named_switches
+from ncfix.program.moves import Moves, Trace
+from ncfix.program.second_reading import SecondReading
+from ncfix.program.setup import Setup
+from ncfix.program.tree import Program, Skip
+from ncfix.program.writer import Edit, Splices
+
+DIFFERS = "NCF451"
+TOO_MANY = "NCF452"
+MOST_SWITCHES = 4
+"""Switches of which all positions are followed: sixteen of them."""
+GRAIN = 9
+"""Decimals of mm and rad to which places are the same."""
+WHY = "where a block with / before it is skipped, this block needs another correction than where that is executed"
+
+Follow = Callable[[Setup], Trace]
+Edits = tuple[Edit, ...]
+Readings = Sequence[SecondReading | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """How the switches stand: `on` are those that are; None where the program asks none. And what the control does.
+
+    setup  says so
+    """
+
+    on: frozenset[int] | None
+    setup: Setup
+    trace: Trace
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return named(self.on or (), self.trace.switches)
+
+
+def named(on: Iterable[int], switches: Iterable[int]) -> str:
+    """A position of switches in words: `off`, `on`, and which where there are several."""
+    on, switches = frozenset(on), frozenset(switches)
+    if not on:
+        return "off"
+    return "on" if on >= switches else f"on for {named_switches(on)} only"
+
+
+def positions_of(setup: Setup, follow: Follow) -> tuple[Position, ...]:
+    """A program followed in all positions of the switches that it asks, or in the one that the setup states.
+
+    The first has all of them off, if it is not stated. Raises what `follow` raises, of switches that are on with these
+    words; UsageError with what all positions lack; RefusedError NCF452 for more switches than can be looked at.
+    """
+    if setup.block_skip is not None:
+        trace = follow(setup)
+        return (Position(_stated(setup, trace.switches), setup, trace),)
+    found, lacking = {frozenset[int](): _tried(setup, follow)}, list[Message]()
+    switches = _asked(found.values())
+    while len(found) < 2 ** len(switches):
+        if len(switches) > MOST_SWITCHES:
+            text = f"the program has {len(switches)} switches of block delete ({named_switches(switches)})"
+            hint = f"--block-skip on, off, or the numbers of those that are on: up to {MOST_SWITCHES} are all looked at"
+            raise RefusedError.of(TOO_MANY, f"{text}: too many to prove each position of them", None, hint)
+        for on in _subsets(switches):
+            if on not in found:
+                found[on] = _tried(replace(setup, block_skip=on), follow)
+        switches |= _asked(found.values())
+    for each in found.values():
+        lacking += each.messages if isinstance(each, UsageError) else ()
+    if lacking:
+        raise UsageError.collected(dict.fromkeys(lacking))
+    if not switches:
+        (trace,) = (each for each in found.values() if isinstance(each, Trace))
+        return (Position(None, setup, trace),)
+    return tuple(
+        Position(on, replace(setup, block_skip=on), replace(each, switches=switches))
+        for on, each in found.items()
+        if isinstance(each, Trace)
+    )
+
+
+def _stated(setup: Setup, switches: frozenset[int]) -> frozenset[int] | None:
+    """The switches of a program that are on in the stated position; None if it asks none."""
+    if not switches:
+        return None
+    stated = setup.block_skip
+    return switches & stated if isinstance(stated, frozenset) else switches if stated else frozenset()
+
+
+def _tried(setup: Setup, follow: Follow) -> Trace | UsageError:
+    """The program in a position, or what it lacks there."""
+    try:
+        return follow(setup)
+    except UsageError as error:
+        return error
+    except SourceError as error:
+        if not setup.block_skip:
+            raise
+        raise SourceError.collected(_with_position(each, setup) for each in error.messages) from None
+
+
+def _with_position(message: Message, setup: Setup) -> Message:
+    """What stops the control, with the switches that are on."""
+    assert isinstance(setup.block_skip, frozenset)
+    text = f"where blocks with {named_switches(setup.block_skip)} are skipped: {message.text}"
+    return replace(message, text=text, hint="--block-skip off: they never are, and only this is looked at")
+
+
+def _asked(found: Iterable[Trace | UsageError]) -> frozenset[int]:
+    return frozenset[int]().union(*(each.switches for each in found if isinstance(each, Trace)))
+
+
+def _subsets(switches: frozenset[int]) -> list[frozenset[int]]:
+    ordered = sorted(switches)
+    return [frozenset(each) for many in range(len(ordered) + 1) for each in combinations(ordered, many)]
+
+
+def in_pairs(first: Sequence[Position], second: Sequence[Position]) -> Iterator[tuple[Position, Position]]:
+    """Two programs in the same positions of block delete; a program does not mind switches that it does not ask."""
+    if len(first) == len(second) == 1:
+        yield first[0], second[0]
+        return
+    tables = [{each.on or frozenset[int](): each for each in own} for own in (first, second)]
+    for on in dict.fromkeys((*tables[0], *tables[1])):
+        one, other = (own[on & frozenset[int]().union(*own)] for own in tables)
+        yield one, other
+
+
+# -- what there is to say ---------------------------------------------------------------------------------------------
+
+
+def messages_of(positions: Sequence[Position]) -> tuple[Message, ...]:
+    """What there is to say of a program in all positions, once each; of block delete, that all were looked at."""
+    told = [each for position in positions for each in position.trace.messages]
+    if len(positions) == 1:
+        return tuple(told)
+    places = [each.place for each in told if each.code == BLOCK_DELETE]
+    rest = dict.fromkeys(each for each in told if each.code != BLOCK_DELETE)
+    return (_all_proven(positions, min(filter(None, places), key=lambda place: place.line, default=None)), *rest)
+
+
+def _all_proven(positions: Sequence[Position], place: Place | None) -> Message:
+    (switches, *_) = (each.trace.switches for each in positions)
+    many = "both" if len(positions) == 2 else f"all {len(positions)}"
+    text = f"blocks with {_written(switches)} may be executed or skipped: {many} positions of block delete are held to"
+    return Message(BLOCK_DELETE, text, place, "--block-skip on or off looks at one position only")
+
+
+def _written(switches: frozenset[int]) -> str:
+    return "/" if len(switches) == 1 else named_switches(switches)
+
+
+def most_moves(positions: Sequence[Position]) -> int:
+    """Motions of a program, in the position of block delete in which it has most."""
+    return max(len(each.trace.moves) for each in positions)
+
+
+def assumed_of(positions: Sequence[Position]) -> tuple[str, ...]:
+    """What was taken as zero in any position, in words."""
+    if len(positions) == 1:
+        return positions[0].trace.assumed
+    return tuple(dict.fromkeys(name for each in positions for name in each.trace.assumed))
+
+
+def stamped(positions: Sequence[Position]) -> str:
+    """What the stamp says of block delete; empty for a program without."""
+    if positions[0].on is None:
+        return ""
+    if len(positions) == 1:
+        return f"block delete {positions[0].name}"
+    return f"block delete on or off{'' if len(positions) == 2 else ' (all switches)'}"
+
+
+# -- one text for all positions ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """What is settled for each position, and the text of all.
+
+    added_blocks  lines added
+    """
+
+    settled: tuple[Settled, ...]
+    splices: Splices
+    added_blocks: int
+
+
+def settle_together(
+    program: Program,
+    moves: Sequence[Moves],
+    machine: Machine,
+    options: FixOptions,
+    readings: Readings,
+) -> Together:
+    """Settle a program in all positions, so that they agree on the text; `moves` and `readings` of each of them."""
+    if len(moves) == 1:
+        settled = settle(program, moves[0], machine, options, readings[0])
+        return Together((settled,), settled.emission.splices, settled.emission.added_blocks)
+    refused, whole, spelled = dict[int, Reason](), _starting_elsewhere(moves), dict[int, Mask]()
+    while True:
+        found: list[Settled] = []
+        for k, own in enumerate(moves):
+            twin = next((j for j in range(k) if equal(own, moves[j]) and equal(readings[k], readings[j])), None)
+            if twin is not None:
+                found.append(found[twin])
+                continue
+            held = _spelled(_held_whole(own, whole), spelled)
+            found.append(settle(program, held, machine, options, readings[k], refused=refused))
+        more = {block: why for each in found for block, why in each.reasons.items()}
+        if more.keys() > refused.keys():
+            refused = more
+            continue
+        edits = [_by_block(program, each.emission.splices) for each in found]
+        differing = _differing(moves, edits)
+        if not differing:
+            return _merged(found, edits)
+        if differing <= refused.keys():
+            raise AssertionError(f"blocks {sorted(differing)} are kept and yet differ")
+        for block in differing - spelled.keys():
+            spelled[block] = _named(found, block)
+            whole.add(block)
+            differing.remove(block)
+        refused |= {block: Reason(DIFFERS, WHY, _deletable_before(program, block)) for block in differing}
+
+
+def _held_whole(moves: Moves, whole: set[int]) -> Moves:
+    """The motions, those of blocks `whole` not to be split."""
+    bound = moves.compensated | np.isin(moves.block, list(whole))
+    return replace(moves, compensated=bound) if whole else moves
+
+
+def _spelled(moves: Moves, spelled: Mapping[int, Mask]) -> Moves:
+    """The motions, those of some blocks with words for all axes that need one in any position."""
+    if not spelled:
+        return moves
+    named = np.zeros(moves.end.shape, dtype=np.bool_)
+    for block, axes in spelled.items():
+        named[moves.block == block] = axes
+    return replace(moves, spelled=named & ~moves.programmed)
+
+
+def _named(found: Sequence[Settled], block: int) -> Mask:
+    """(n_axes,) the axes that a block leads anywhere, in any position."""
+    axes = np.zeros(len(found[0].moves.axes), dtype=np.bool_)
+    for each in found:
+        rows = np.flatnonzero(each.moves.block == block)
+        last = np.searchsorted(each.plan.pieces.move, rows, side="right") - 1
+        off = each.emission.end[last] != each.emission.start[rows]
+        axes |= (off & ~np.isnan(each.emission.end[last])).any(axis=0)
+    return axes
+
+
+def _by_block(program: Program, splices: Splices) -> Mapping[int, Edits]:
+    """Edits by the block in which they are."""
+    blocks = np.searchsorted(program.blocks[:, 0], splices.start, side="right") - 1
+    found = defaultdict[int, Edits](tuple)
+    for block, edit in zip(blocks.tolist(), splices.edits(), strict=True):
+        found[block] += (edit,)
+    return found
+
+
+def _differing(moves: Sequence[Moves], edits: Sequence[Mapping[int, Edits]]) -> set[int]:
+    """The blocks of which positions in which they are executed want different things."""
+    wanted, differing = dict[int, Edits](), set[int]()
+    for own, done in zip(moves, edits, strict=True):
+        for block in {*own.block.tolist(), *done}:
+            if wanted.setdefault(block, done.get(block, ())) != done.get(block, ()):
+                differing.add(block)
+    return differing
+
+
+def _deletable_before(program: Program, block: int) -> int:
+    """The nearest block with a `/` before a block, or that block itself; -1 if there is none."""
+    shapes = np.array([any(isinstance(item, Skip) for item in each.items) for each in program.templates])
+    found = np.flatnonzero(shapes[program.template[: block + 1]])
+    return int(found[-1]) if found.size else -1
+
+
+def _merged(found: Sequence[Settled], edits: Sequence[Mapping[int, Edits]]) -> Together:
+    """The text of all positions: they agree on blocks that several of them execute."""
+    wanted = {block: own for done in edits for block, own in done.items()}
+    every = [edit for block in sorted(wanted) for edit in wanted[block]]
+    ends = b"\n" if any(b"\n" in edit.text for edit in every) else b"\r"
+    return Together(tuple(found), Splices.of(every), sum(edit.text.count(ends) for edit in every))
+
+
+def equal(one: object, other: object) -> bool:
+    """Whether two values are the same: numbers to the last bit, and what is not known like itself."""
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return one.shape == other.shape and np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(equal, one, other))
+    if is_dataclass(one) and type(one) is type(other):
+        return all(equal(getattr(one, each.name), getattr(other, each.name)) for each in fields(one))
+    return one == other
+
+
+def _starting_elsewhere(moves: Sequence[Moves]) -> set[int]:
+    """The blocks whose motions do not start at the same places in all positions in which they are executed."""
+    starts, elsewhere = dict[int, bytes](), set[int]()
+    for own in moves:
+        for block, start in _starts(own).items():
+            if starts.setdefault(block, start) != start:
+                elsewhere.add(block)
+    return elsewhere
+
+
+def _starts(moves: Moves) -> Mapping[int, bytes]:
+    """Block -> where its motions start, one after the other."""
+    found = defaultdict[int, bytes](bytes)
+    places = np.round(moves.start, GRAIN) + 0.0
+    places[np.isnan(places)] = np.nan
+    for block, start in zip(moves.block.tolist(), places, strict=True):
+        found[block] += start.tobytes()
+    return found
