@@ -15,6 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -25,25 +26,54 @@ from differential.errors import LETTERS, Machine
 from differential.generated import MACHINES, SETUP, terms_of
 from differential.generator import Generator
 from differential.judge import judge
-from differential.test_fanuc import source_of as fanuc_source
+from differential.test_fanuc import Fanuc
 
 CASES = int(os.environ.get("NCFIX_DELETED", "4"))
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))
 STRATEGIES = ("rotary-then-linear", "position", "full")
+ARC = re.compile(r"(N\d+ ?)?G0?[23]\b")
+WITHOUT_ROTARY = ("three", "table")
+"""Machines on which LinuxCNC's interpreter can judge what leads rotary axes elsewhere: there are none."""
 
 
 def deletable(source: str, seed: int, share: float = 0.25, marks: tuple[str, ...] = ("/",)) -> str:
     """The program with `/` before some of its lines, but not the first and the last ones."""
     rng, lines = random.Random(seed), source.splitlines()
-    chosen = [2 < n < len(lines) - 1 and rng.random() < share and bool(line) for n, line in enumerate(lines)]
+    behind = [*lines[1:], ""]
+    chosen = [
+        2 < n < len(lines) - 1 and rng.random() < share and bool(line) and not ARC.match(behind[n])
+        for n, line in enumerate(lines)
+    ]
     return "".join(
         f"{rng.choice(marks) if skipped else ''}{line}\n" for line, skipped in zip(lines, chosen, strict=True)
     )
 
 
-def linuxcnc_source(seed: int, rotary: str) -> str:
-    """A program for LinuxCNC."""
-    return Generator(random.Random(seed), rotary).program(18)
+class LinuxCnc(Generator):
+    """No offsets from where the axes stand, which a correction moves, and no reference points without axes."""
+
+    def offset(self) -> None:
+        before = len(self.lines)
+        super(type(self), self).offset()
+        self.lines[before:] = ["G55" if line.startswith("G92") else line for line in self.lines[before:]]
+
+    def machine(self) -> None:
+        before = len(self.lines)
+        super(type(self), self).machine()
+        self.lines[before:] = ["G53 G0 Z0" if line in ("G28", "G30") else line for line in self.lines[before:]]
+
+
+class Iso(Fanuc):
+    """The same for plain ISO code and Fanuc."""
+
+    offset, machine = LinuxCnc.offset, LinuxCnc.machine
+
+
+def source_of(dialect: str, seed: int, rotary: str) -> str:
+    """A program; centres are relative to the start on the others without saying so."""
+    if dialect == "linuxcnc":
+        return LinuxCnc(random.Random(seed), rotary).program(18)
+    return Iso(random.Random(seed), rotary).program(18).replace(" G91.1", "")
 
 
 @dataclass(slots=True)
@@ -77,7 +107,7 @@ class Both:
             if outcome.code in (product.FAULT, product.DONE):
                 self.wrong.append(f"seed {seed} {name}: {outcome.errors}")
             return
-        terms = replace(terms_of(source, outcome, model), rotary=0.5 if "full" in self.options else 0.0)
+        terms = terms_of(source, outcome, model)
         for on, original in enumerate(originals):
             verdict = judge(original, self.rs274(outcome.text, controls[on]), model, terms)
             self.found["motions"] += verdict.motions
@@ -98,9 +128,9 @@ def test_both_positions_judged_by_linuxcnc(
     figures: Callable[[str], None],
 ) -> None:
     options = ("--strategy", strategy, "--dialect", dialect, "--no-point", "calculator")
-    source = linuxcnc_source if dialect == "linuxcnc" else fanuc_source
-    both = Both(rs274, machine, machine_file, tmp_path, source, options, Counter(), [])
+    names = WITHOUT_ROTARY if strategy == "full" else MACHINES
+    both = Both(rs274, machine, machine_file, tmp_path, partial(source_of, dialect), options, Counter(), [])
     for seed in range(FIRST, FIRST + CASES):
-        both.one(seed, MACHINES[seed % len(MACHINES)])
+        both.one(seed, names[seed % len(names)])
     figures(f"block delete, {dialect}, {strategy}: {dict(both.found)}, {len(both.wrong)} wrong")
     assert not both.wrong, "\n".join(both.wrong[:12])

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from ncfix.compensate.account import Reason
-from ncfix.compensate.findings import Mask
+from ncfix.compensate.findings import Finding, Mask
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.settle import Settled, settle
 from ncfix.diagnostics import Message, Place, RefusedError, SourceError, UsageError
@@ -174,6 +174,26 @@ def _written(switches: frozenset[int]) -> str:
 def most_moves(positions: Sequence[Position]) -> int:
     """Motions of a program, in the position of block delete in which it has most."""
     return max(len(each.trace.moves) for each in positions)
+
+
+def worst_findings(every: Sequence[Settled]) -> list[tuple[Finding, ...]]:
+    """The findings in each position, each block's only where its figure is the largest of all of them."""
+    if len(every) == 1:
+        return [every[0].plan.findings]
+    worst, where = dict[tuple[str, int], float](), dict[tuple[str, int], tuple[int, int]]()
+    for position, settled in enumerate(every):
+        for finding in settled.plan.findings:
+            for row, value in zip(finding.moves.tolist(), finding.values.tolist(), strict=True):
+                key = finding.code, int(settled.moves.block[row])
+                if key not in worst or value > worst[key]:
+                    worst[key], where[key] = value, (position, row)
+    return [
+        tuple(
+            finding.among([where[finding.code, int(settled.moves.block[row])] == (k, row) for row in finding.moves])
+            for finding in settled.plan.findings
+        )
+        for k, settled in enumerate(every)
+    ]
 
 
 def assumed_of(positions: Sequence[Position]) -> tuple[str, ...]:

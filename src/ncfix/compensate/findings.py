@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,13 @@ class Finding:
         axis = self.axes[k] if self.axes else ""
         unit = "degrees" if self.turns and self.turns[k] else "mm"
         return self.text.format(value=float(self.values[k]), axis=axis, unit=unit)
+
+    def among(self, chosen: Sequence[bool]) -> Finding:
+        """Some of the motions, (k,)."""
+        rows = np.flatnonzero(np.array(chosen, dtype=np.bool_))
+        axes = tuple(self.axes[row] for row in rows) if self.axes else ()
+        turns = tuple(self.turns[row] for row in rows) if self.turns else ()
+        return replace(self, moves=self.moves[rows], values=self.values[rows], axes=axes, turns=turns)
 
     def messages(self, place_of: Callable[[int], Place | None], most: int = MOST) -> tuple[Message, ...]:
         """One message per motion, at most `most`; the last one says how many more there are."""

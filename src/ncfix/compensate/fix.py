@@ -26,6 +26,7 @@ from ncfix.compensate.block_delete import (
     positions_of,
     settle_together,
     stamped,
+    worst_findings,
 )
 from ncfix.compensate.double import numbers_at_the_beginning, suspected
 from ncfix.compensate.findings import Mask
@@ -209,8 +210,8 @@ def _report(
     refused = refusals(program, account)
     findings = dict.fromkeys(
         message
-        for settled in every
-        for finding in settled.plan.findings
+        for settled, found in zip(every, worst_findings(every), strict=True)
+        for finding in found
         for message in finding.messages(partial(place_of, program, settled.moves))
     )
     worst = max(range(len(errors)), key=lambda k: errors[k].after.max) if errors else 0

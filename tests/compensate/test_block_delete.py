@@ -1,0 +1,174 @@
+"""Block delete: what a corrected program is in each position of the switches, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ncfix.compensate.checking import check_on
+from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate.following import traced
+from ncfix.diagnostics import RefusedError, SourceError, UsageError
+from ncfix.machine import Machine, load
+from ncfix.program.reader import read
+from ncfix.program.setup import Setup, Tool
+
+SETUP = Setup(
+    work_offsets={"G54": dict.fromkeys("XYZ", 0.0), "G55": {"X": 20.0, "Y": -5.0, "Z": 0.0}, "PRESET": {}, "G500": {}},
+    tools={0: Tool(0.0), 1: Tool(50.0)},
+    initial={"X": 0.0, "Y": 0.0, "Z": 100.0},
+    no_point="calculator",
+)
+RETRACTED = "G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n/G1 X60 Y90\nG1 X20 Y25 Z0\nG1 X30 Y25 Z5\nM2\n"
+TOLERANCE = 1e-3
+ROUNDING = 1e-3
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    return load(str(Path(__file__).parents[1] / "differential/machines/three.toml"))
+
+
+def fixed(text: str, machine: Machine, dialect: str = "linuxcnc", setup: Setup = SETUP) -> Fixed:
+    return fix_program(read(text.encode(), "p.ngc", dialect), machine, setup, FixOptions())
+
+
+def in_position(text: str, on: bool) -> str:
+    """The lines that are executed, without their marks."""
+    lines = (line for line in text.splitlines() if not (on and line.startswith("/")))
+    return "".join(line.removeprefix("/") + "\n" for line in lines)
+
+
+def way(text: str, machine: Machine, dialect: str, actual: bool) -> np.ndarray:
+    """Points of the tip along the feeds of a program without marks, (n, 3)."""
+    moves = traced(read(text.encode(), "p.ngc", dialect), machine, SETUP).moves
+    share = np.linspace(0, 1, 21)[:, None]
+    q = np.concatenate([start + share * (end - start) for start, end in zip(moves.start, moves.end, strict=True)])
+    return machine.actual(q)[:, :3, 3] if actual else machine.tip(q)
+
+
+def off(points: np.ndarray, path: np.ndarray) -> float:
+    """How far points are from a path at most."""
+    start, step = path[:-1], np.diff(path, axis=0)
+    square = np.maximum((step**2).sum(axis=1), 1e-30)
+    share = np.clip(np.einsum("pkj,kj->pk", points[:, None] - start, step) / square, 0, 1)
+    return float(np.linalg.norm(start + share[..., None] * step - points[:, None], axis=2).min(axis=1).max())
+
+
+@pytest.mark.parametrize("dialect", ["linuxcnc", "iso", "fanuc", "siemens"])
+def test_what_starts_behind_a_skipped_block_keeps_its_way(dialect: str, machine: Machine) -> None:
+    source = RETRACTED.replace("M2", "M30").replace("G21", "G71" if dialect == "siemens" else "G21")
+    done = fixed(source, machine, dialect)
+    text = done.text.decode()
+    assert done.report.refused == ()
+    assert [line.startswith("/") for line in text.splitlines()].count(True) > 1
+    for on in (False, True):
+        meant, found = (
+            way(in_position(each, on), machine, dialect, actual) for each, actual in ((source, False), (text, True))
+        )
+        assert off(found[21:], meant) < 3 * TOLERANCE + ROUNDING
+
+
+def test_klartext_too(machine: Machine) -> None:
+    text = (
+        "BEGIN PGM P MM\nTOOL CALL 1 Z S1000\nL X+0 Y+0 Z+0 R0 FMAX\nL X+10 Y+0 F500\n/L X+60 Y+90\n"
+        "L X+20 Y+25 Z+0\nL X+30 Y+25 Z+5\nEND PGM P MM\n"
+    )
+    done = fixed(text, machine, "heidenhain")
+    assert done.report.refused == ()
+    assert done.report.block_delete == ([], [1])
+    lines = done.text.decode().splitlines()
+    at = next(n for n, line in enumerate(lines) if line.startswith(("L X+19.9", "L X+20")))
+    assert lines[at - 1].startswith("/")
+    assert lines[at + 1].startswith(("L X+29.9", "L X+30"))
+
+
+def test_both_positions_are_said_and_stamped(machine: Machine) -> None:
+    done = fixed(RETRACTED, machine)
+    assert b", block delete on or off" in done.text
+    assert done.report.as_dict()["block_delete"] == [[], [1]]
+    assert "NCF235" in [each.code for each in done.report.warnings]
+    for stated, word in ((True, b"on"), (False, b"off"), (frozenset({1}), b"on"), (frozenset({2}), b"off")):
+        setup = Setup(SETUP.work_offsets, SETUP.tools, SETUP.initial, block_skip=stated)
+        only = fixed(RETRACTED, machine, setup=setup)
+        assert b", block delete %s)" % word in only.text
+        assert len(only.report.block_delete) == 1
+        assert "NCF235" in [each.code for each in only.report.warnings]
+
+
+@pytest.mark.parametrize(
+    ("between", "behind"),
+    [
+        ("/G1 X60 Y90", "G1 X20"),  # Y has no word, and stands elsewhere
+        ("/G55", "G1 X20 Y25 Z0"),  # another offset
+        ("/G91", "G1 X20 Y25 Z0"),  # increments, or not
+        ("/G1 X60 Y90", "G91\nG1 X5 Y5 Z1\nG90"),  # increments from elsewhere
+        ("/G20", "G1 X2 Y1 Z0"),  # inches, or not
+    ],
+)
+def test_what_cannot_be_one_text_is_refused_with_its_line(between: str, behind: str, machine: Machine) -> None:
+    text = f"G21 G90 G17\nG0 X0 Y0 Z0\nG1 X10 Y0 F500\n{between}\n{behind}\nG0 G54 G21 G90\nG0 X0 Y0 Z0\nM2\n"
+    report = fixed(text, machine).report
+    line = next(n for n, each in enumerate(text.splitlines(), 1) if n > 4 and "X" in each)
+    (refused,) = [each for each in report.refused if each.line == line]
+    assert refused.code == "NCF451"
+    assert "(line 4)" in refused.reason
+
+
+def test_words_that_only_one_position_needs_are_written(machine: Machine) -> None:
+    """Z has to move behind the one, and not behind the other."""
+    for way_there in ("/G1 X10.4 Y0.4", "/G1 X-80 Y70", "/G0 X50 Y-60"):
+        text = RETRACTED.replace("/G1 X60 Y90", way_there).replace("G1 X20 Y25 Z0", "G1 X20 Y25")
+        assert fixed(text, machine).report.refused == ()
+
+
+def test_switches_with_numbers_are_followed_in_all_their_positions(machine: Machine) -> None:
+    text = RETRACTED.replace("G1 X30", "/2 G1 X-40 Y40 Z3\nG1 X30")
+    done = fixed(text, machine, "iso")
+    assert done.report.block_delete == ([], [1], [2], [1, 2])
+    assert done.report.refused == ()
+    many = RETRACTED.replace("G1 X30", "".join(f"/{n} G1 X{n} Y{n} Z0\n" for n in range(2, 7)) + "G1 X30")
+    with pytest.raises(RefusedError) as raised:
+        fixed(many, machine, "iso")
+    assert raised.value.code == "NCF452"
+
+
+def test_a_position_in_which_the_control_stops_is_an_error_that_names_it(machine: Machine) -> None:
+    text = "G21 G90 G17\nG0 X0 Y0 Z0\n/G1 X10 Y0 F500\nG2 X20 Y10 I0 J10 F500\nM2\n"
+    with pytest.raises(SourceError) as raised:
+        fixed(text, machine)
+    assert "where blocks with /1 are skipped" in raised.value.messages[0].text
+    assert raised.value.messages[0].place is not None
+    assert raised.value.messages[0].place.line == 4
+
+
+def test_what_any_position_lacks_is_asked_for(machine: Machine) -> None:
+    text = RETRACTED.replace("/G1 X60 Y90", "/G56 X1 Y1")
+    with pytest.raises(UsageError):
+        fixed(text, machine)
+
+
+def test_jumps_and_program_ends_are_followed_in_both_positions(machine: Machine) -> None:
+    text = RETRACTED.replace("/G1 X60 Y90", "/M2")
+    assert fixed(text, machine).report.block_delete == ([], [1])
+    jump = RETRACTED.replace("/G1 X60 Y90", "/GOTO 9\nG1 X60 Y90 Z0").replace("G1 X20", "N9 G1 X20")
+    done = fixed(jump.replace("M2", "M30"), machine, "fanuc")
+    assert done.report.refused == ()
+    assert done.report.block_delete == ([], [1])
+
+
+def test_blocks_that_change_no_path_ask_no_switch(machine: Machine) -> None:
+    plain = RETRACTED.replace("/G1 X60 Y90", "G1 X60 Y90")
+    text = plain.replace("G1 X20", "/M8\n/M1\n/G4 P1\nG1 X20")
+    assert fixed(text, machine).report.block_delete == ()
+    stamp, *lines = fixed(text, machine).text.splitlines()
+    assert b"block delete" not in stamp
+    assert [line for line in lines if line[:1] != b"/"] == fixed(plain, machine).text.splitlines()[1:]
+
+
+def test_check_looks_at_both_positions(machine: Machine) -> None:
+    text = RETRACTED.replace("G1 X20 Y25 Z0", "G1 X20")
+    found = check_on(read(text.encode(), "p.ngc", "linuxcnc"), machine, SETUP)
+    assert {"NCF235", "NCF451"} <= {each.code for each in found.findings}
