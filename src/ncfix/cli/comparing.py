@@ -126,7 +126,8 @@ class Pair:
         other = self._read(self.fixed, like=original)
         done = self.following.in_positions(other, self.fixed.path, self.original.path)
         assert self.following.machine is not None
-        machine, found = placed(self.following.machine, self.following.setup), list[SideBySide]()
+        machine = placed(self.following.machine, self.following.setup)
+        found: list[SideBySide] = []
         for first, second in in_pairs(meant, done):
             found.append(self._side_by_side())
             cuts = whole(machine, original, first.trace.moves, meant=True)

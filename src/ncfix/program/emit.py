@@ -313,13 +313,13 @@ class _Emitter:
 
     def _target(self, row: int, rows: slice) -> Target:
         moves, pieces = self.moves, self.pieces
-        frame = self.frames[self.reading.frame[row]]
+        at = int(self.reading.frame[row])
+        frame = self.frames[at]
         as_programmed = self.nominal_frames[moves.frame[row]]
         start = frame.program(self._before(row).copy())
         nominal_start = as_programmed.program(moves.start[row].copy())
         nominal = as_programmed.program(moves.end[row].copy())
-        arc = bool(pieces.arc[rows.start])
-        modal, kind = int(moves.modal[row]), self.kind[row]
+        arc, modal, kind = bool(pieces.arc[rows.start]), int(moves.modal[row]), self.kind[row]
         straight = modal if modal in (0, 10) or kind == Kind.CYCLE else 10
         fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
         if wordless.any():
@@ -361,9 +361,7 @@ class _Emitter:
             call=moves.call_of(row),
             measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
             spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
-            level=self.levels.wanted(
-                row, rows.start, int(self.reading.frame[row]), frame, as_programmed, self.position
-            ),
+            level=self.levels.wanted(row, rows.start, at, frame, as_programmed, self.position),
         )
 
     def _turn_minutes(self, row: int) -> float:
