@@ -118,6 +118,18 @@ ARCS = (
 """What the generator does not have: codes other than G0 and G1 in force at a call, frames and turns under MCALL."""
 
 
+def test_increments_in_turned_coordinates_that_hide_them(root: Path) -> None:
+    """Where the tool stands across the plane nobody has said, so nobody can say from where the increment counts."""
+    body = (
+        'CYCLE800(1,"T",200000,57,-6,-3,0.4,15.5,-24,-27.7,0,0,0,-1)\nG1 X30 Y30\nMCALL CYCLE85(40,0,2,-4,,0,100,300)'
+    )
+    text = "\n".join([*HEAD, body, "X=-28 Y=IC(19) Z45", "G0 X16 Y=IC(3)", "MCALL", "G0 X1 Y2 Z60", "M30"]) + "\n"
+    tally = Tally()
+    judged(text, "position", errors.load(root / MACHINE), load(str(root / MACHINE)), tally)
+    assert not tally.wrong
+    assert tally.holes.keys() == {"refused"}
+
+
 @pytest.mark.parametrize("strategy", ["rotary-then-linear", "full"])
 @pytest.mark.parametrize("body", ARCS)
 def test_none_is_refused(body: str, strategy: str, root: Path) -> None:

@@ -79,7 +79,8 @@ class HoleRenderer(SinumerikRenderer):
     def _check(self, call: CycleCall) -> None:
         """Whether lines may be put before and behind the block."""
         codes = (self._value(word, np.nan) for word in self.layout.after)
-        self.out.conflict = call.fixed or (ENDS_HERE if END_OF_SUBPROGRAM.intersection(codes) else "")
+        ends = ENDS_HERE if END_OF_SUBPROGRAM.intersection(codes) else ""
+        self.out.conflict = self.out.conflict or call.fixed or ends
 
     def _is_inside_out(self, call: CycleCall, sunk: float) -> bool:
         """Whether the hole would end on the other side of the height that its cycle counts from."""
