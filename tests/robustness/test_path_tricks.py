@@ -279,7 +279,7 @@ def test_a_folder_that_becomes_a_link_meanwhile(ground: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o644, 0o664, 0o444, 0o755])
-@pytest.mark.parametrize("size", ["10", ""])
+@pytest.mark.parametrize("size", ["1", "10", ""])
 def test_an_output_has_the_mode_of_its_program(
     mode: int, size: str, ground: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -292,3 +292,17 @@ def test_an_output_has_the_mode_of_its_program(
         assert stat.S_IMODE(os.stat(output).st_mode) == mode
     assert run(["fix", "-m", "machine.toml", "--assume-zero", "part.ngc", "--in-place"]) == ExitCode.DONE
     assert [stat.S_IMODE(os.stat(name).st_mode) for name in ("part.ngc", "part.ngc.orig")] == [mode, mode]
+
+
+@pytest.mark.parametrize("through", ["the folder", "a file"])
+def test_tables_stay_in_their_folder(through: str, ground: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    Path("foreign/comp.ini").write_bytes(FOREIGN)
+    if through == "the folder":
+        os.symlink("foreign", "out")
+    else:
+        os.mkdir("out")
+        os.symlink("../foreign/comp.ini", "out/comp.ini")
+    before = state(ground)
+    assert run(["export", "linuxcnc", "-m", "machine.toml", "-o", "out", "--force"]) == ExitCode.USAGE
+    assert "NCF005" in capfd.readouterr().err
+    assert state(ground) == before

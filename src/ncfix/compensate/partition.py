@@ -151,7 +151,7 @@ class Parts:
         """
         wanted = self._wanted
         while True:
-            new = self.read(max(wanted - len(self.rest), self.size // 8))
+            new = self.read(max(wanted - len(self.rest), self.size // 8, 1))
             text = self.rest + new
             if not new:
                 self.rest = b""
