@@ -141,7 +141,7 @@ CASES = {
     "verb raises": Case("commands", "@click.command()\ndef odd():\n    {}['x']\n", "register(odd)", ("odd",),
                         "failed: KeyError"),
     "verb calls ncfix wrongly": Case(
-        "commands", "@click.command()\ndef odd():\n    import ncfix.machine\n    ncfix.machine.load(None)\n",
+        "commands", "@click.command()\ndef odd():\n    import ncfix.plugins\n    ncfix.plugins.nearest(5, 5)\n",
         "register(odd)", ("odd",), "in what it called of ncfix"),
     "no verb": Case("commands", "", "register(5, 'odd')", ("odd",), "it has no main", "NCF508"),
     "executor raises": Case("executors", "def make(workers):\n    raise OSError('no cluster')\n", "register(make, 'x')",
