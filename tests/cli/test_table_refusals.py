@@ -56,7 +56,14 @@ REFUSED = {
     "too many points": ("heidenhain", (*SIGN, "--set", "points=257"), constant("EXX", 0.01), 2, "NCF485", "256"),
     "too many tables": ("siemens", (*SIEMENS, "--set", "tables=129"), constant("EXX", 0.01), 2, "NCF485", "128"),
     "no sign": ("fanuc", (), constant("EXX", 0.01), 2, "NCF485", "needs the option 'sign'"),
-    "beyond what the machine allows": ("isg", (), constant("EXX", 0.7), 4, "NCF489", "larger than this machine allows"),
+    "beyond what the machine allows": (
+        "isg",
+        ("--force",),
+        constant("EXX", 0.7),
+        4,
+        "NCF489",
+        "larger than this machine allows",
+    ),
     "no such control": ("okuma", (), constant("EXX", 0.01), 2, "NCF480", "no tables for a control 'okuma'"),
     "not a number": ("isg", ("--tool-length", "nan"), constant("EXX", 0.01), 2, "NCF001", "not a length from 0"),
 }
@@ -77,7 +84,7 @@ def test_refusals_of_export(shop: Any, ncfix: Any, case: str) -> None:
 def test_values_beyond_the_format(shop: Any, ncfix: Any, control: str) -> None:
     machine = with_effect(shop, constant("EXX", 15.0))
     machine.write_text("max_correction = { linear = 50, rotary = 1 }\n" + machine.read_text())
-    result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", *SIGN)
+    result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", *SIGN, "--force")
     assert (result.code, "NCF484" in result.err) == (ExitCode.REFUSED, True), result.err
     assert "is the error in mm?" in result.err
 

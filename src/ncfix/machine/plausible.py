@@ -304,7 +304,7 @@ def _positions(machine: Machine) -> Iterator[Fault]:
     """Tables and knots in a unit other than that of the axis, or where it never is."""
     for effect in machine.effects:
         axis = _axis(machine, effect.input or effect.joint)
-        positions = np.unique(getattr(effect.basis, "positions", ()) or getattr(effect.basis, "knots", ()))
+        positions = np.array(sorted({*(getattr(effect.basis, "positions", ()) or getattr(effect.basis, "knots", ()))}))
         if axis is None or effect.joint == SPINDLE or len(positions) < 3:
             continue
         places = effect.center + effect.scale * positions
