@@ -28,7 +28,7 @@ def compared(
 
     parts  in how many both are given, one after the other
     """
-    found = SideBySide(near)
+    found = SideBySide(near, 0.0)
     found.run(divided(cut(machine, original, meant=True), parts), divided(cut(machine, other, meant=False), parts))
     before, there, back = found.matches
     return before.along, there.along, back.along

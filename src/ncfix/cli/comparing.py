@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
 from ncfix.diagnostics import Message, SourceError
 
 if TYPE_CHECKING:
+    from ncfix.compensate.coverage import Why
     from ncfix.compensate.side_by_side import SideBySide
     from ncfix.program.tree import Program
 
@@ -29,7 +30,9 @@ class Compared:
 
     beyond       lines of the other with errors larger than tolerance and rounding
     not_reached  lines of the original from which the other is farther away
-    unseen       lines of the original that cut, nobody knows where
+    unseen       lines of the original that may cut, and are not looked at
+    no_figure    how many motions at feed are not looked at, by reason
+    blind        some of these may cut
     left         linear axis -> lines of the original that cut, and nobody but the machine knows where that axis stands:
                  nothing can be corrected along it there
     rounding_um  what the control's digits may add to the path
@@ -43,11 +46,18 @@ class Compared:
     unseen: list[int]
     left: dict[str, list[int]]
     rounding_um: float
+    no_figure: dict[str, int]
+    blind: bool
+
+    @property
+    def beyond_somewhere(self) -> bool:
+        """Something is farther from the intended path than the tolerance and what rounding adds."""
+        return bool(self.beyond or self.not_reached)
 
     @property
     def within(self) -> bool:
-        """Nothing is farther from the intended path than the tolerance and what rounding adds."""
-        return not self.beyond and not self.not_reached
+        """Nothing is farther from the intended path than that, and nothing that may cut is left out."""
+        return not self.beyond_somewhere and not self.blind
 
     @classmethod
     def of(cls, comparison: SideBySide) -> Compared:
@@ -62,12 +72,15 @@ class Compared:
             unseen=comparison.lines_unseen,
             left=comparison.lines_left,
             rounding_um=comparison.rounding * 1e3,
+            no_figure=gathered(comparison.no_figure),
+            blind=any(why.cuts for why in comparison.no_figure),
         )
 
     @classmethod
     def together(cls, several: Sequence[Compared]) -> Compared:
         """The worst of several ways in which the programs may run."""
         axes = dict.fromkeys(axis for each in several for axis in each.left)
+        reasons = sorted({reason for each in several for reason in each.no_figure})
         return cls(
             before=_worst([each.before for each in several]),
             after=_worst([each.after for each in several]),
@@ -77,16 +90,26 @@ class Compared:
             unseen=_lines(each.unseen for each in several),
             left={axis: _lines(each.left.get(axis, []) for each in several) for axis in axes},
             rounding_um=max(each.rounding_um for each in several),
+            no_figure={reason: max(each.no_figure.get(reason, 0) for each in several) for reason in reasons},
+            blind=any(each.blind for each in several),
         )
 
 
 def _worst(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The figures of the one with the largest error, and the largest rms."""
-    return {**max(several, key=lambda each: float(each["max"])), "rms": max(each["rms"] for each in several)}
+    """The figures of the one with the largest error, and the largest rms, of those in which something was looked at."""
+    seen = [each for each in several if each["max"] is not None]
+    if not seen:
+        return several[0]
+    return {**max(seen, key=lambda each: float(each["max"])), "rms": max(each["rms"] for each in seen)}
 
 
 def _lines(several: Iterable[Sequence[int]]) -> list[int]:
     return sorted({line for each in several for line in each})
+
+
+def gathered(found: Mapping[Why, int]) -> dict[str, int]:
+    """Counts by reason, in plain words."""
+    return {why.reason: count for why, count in sorted(found.items())}
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,8 +155,16 @@ def counted(count: int, thing: str) -> str:
 
 def error_figures(error: Mapping[str, Any]) -> str:
     """The figures of an error along a path, for people."""
+    if error["max"] is None:
+        return "none, for nothing was looked at"
     where = f", worst at line {error['where']}" if error.get("where") else ""
     return f"max {error['max']:.2f} um, rms {error['rms']:.2f} um{where}"
+
+
+def no_figure(found: Mapping[str, int]) -> str:
+    """For how many motions there is no figure, and why, the most frequent reason first."""
+    reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(found.items(), key=lambda item: -item[1]))
+    return f"no figure for {counted(sum(found.values()), 'motion')} at feed: {reasons}"
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

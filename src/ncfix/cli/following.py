@@ -93,5 +93,7 @@ def axes_of(templates: Sequence[Template]) -> tuple[str, ...]:
 
 
 def figures(along: Along) -> dict[str, Any]:
-    """The error along a path in two figures, um, and the line of the worst."""
+    """The error along a path in two figures, um, and the line of the worst; None where nothing was looked at."""
+    if not along.count:
+        return {"max": None, "rms": None, "where": None}
     return {"max": 1e3 * along.max, "rms": 1e3 * along.rms, "where": along.where}

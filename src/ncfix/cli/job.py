@@ -199,9 +199,18 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
     lines = [
         f"{visible(entry['path'])} -> {visible(output)}",
         f"  motion blocks       {counts}; {entry['inserted_blocks']} inserted",
-        f"  largest correction  {entry['max_correction_um']:.1f} um",
     ]
-    if entry["error_before_um"]:
+    if entry["passed"]:
+        rules = sorted(entry["passed_by_rule"].items(), key=lambda item: -item[1])
+        lines.append(f"  passed by rule      {', '.join(f'{count} {rule}' for rule, count in rules)}")
+    if entry["max_correction_um"] is None:
+        lines.append("  nothing corrected")
+    else:
+        lines.append(f"  largest correction  {entry['max_correction_um']:.1f} um")
+    if entry["error_before_um"] and entry["error_before_um"]["max"] is None:
+        if entry["compensated"]:
+            lines.append("  tip error           no figure: nothing that cuts was corrected")
+    elif entry["error_before_um"]:
         without = "; without what is refused" if entry["refused"] else ""
         if any(left["cuts"] for left in entry["left_where_it_stands"]):
             without += "; without what is left where it stands (NCF439)"
@@ -209,6 +218,8 @@ def _summary(entry: dict[str, Any], refused: bool) -> list[str]:
         lines.append(f"  tip error after     {console.error_figures(entry['error_after_um'])}{without}")
     if entry["compensated"]:
         lines.append(f"  rounding            up to {entry['rounding_um']:.2f} um of that are the control's digits")
+    if entry["no_figure"]:
+        lines.append(f"  {console.no_figure(entry['no_figure'])}")
     if entry["leaves"]:
         lines.append(f"  {entry['strategy']}: {entry['leaves']}")
     return lines

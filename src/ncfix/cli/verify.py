@@ -38,7 +38,8 @@ def verify(
 ) -> int:
     """Compare what this machine cuts with FIXED with what ORIGINAL means, along the whole path.
 
-    Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits add.
+    Exit code 1 if the tool tip leaves the intended path by more than the tolerance and what the control's digits
+    add, or may, where nobody can look.
     """
     following = Following.of(machine_path, dialect, given)
     with console.busy(f"comparing {shown(fixed)} with {shown(original)}"):
@@ -55,6 +56,7 @@ def verify(
             lines_beyond=found.beyond,
             lines_not_reached=found.not_reached,
             lines_not_looked_at=found.unseen,
+            no_figure=found.no_figure,
             left_where_it_stands=[{"axis": axis, "lines": lines} for axis, lines in found.left.items()],
         )
     else:
@@ -66,19 +68,29 @@ def said(found: Compared, tolerance_um: float) -> Iterator[str]:
     """What was found, for people."""
     yield f"tip error before: {console.error_figures(found.before)}"
     yield f"tip error after:  {console.error_figures(found.after)}"
-    if found.left_out["max"] > max(tolerance_um + found.rounding_um, found.after["max"]):
+    if (found.left_out["max"] or 0.0) > max(tolerance_um + found.rounding_um, found.after["max"] or 0.0):
         yield f"intended path not reached: {console.error_figures(found.left_out)} of the original"
+    if found.no_figure:
+        yield console.no_figure(found.no_figure)
     if found.unseen:
         yield f"not looked at: {lines_said(found.unseen)} of the original; where they cut is not known"
     limits = f"{tolerance_um:g} um and {found.rounding_um:.2f} um of the control's digits"
-    if found.within:
-        yield f"within {limits}"
+    if found.within and found.after["max"] is None:
+        yield "nothing cuts: there is nothing to compare"
+        return
+    if not found.beyond_somewhere:
+        yield f"within {limits}" if found.within else unsure(limits)
         return
     of = "" if found.beyond else " of the original"
     yield f"NOT within {limits}: {lines_said(found.beyond or found.not_reached)}{of}"
     for axis, lines in found.left.items():
         where = f"{lines_said(lines)} of the original"
         yield f"along {axis} nothing can be corrected in {where}: the program has not said where {axis} stands there"
+
+
+def unsure(limits: str) -> str:
+    """The verdict where all that was looked at is right, and not all could be."""
+    return f"NOT known to be within {limits}: what was looked at is, and the rest may not be"
 
 
 def lines_said(lines: Sequence[int]) -> str:

@@ -9,12 +9,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ncfix.compensate.coverage import rule_of
 from ncfix.compensate.left import Left
 from ncfix.diagnostics import Message, Place
 from ncfix.program.moves import Kind, Moves, Rule
 
 SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""
+
+
+NOTHING_SEEN: Mapping[str, None] = {"max": None, "rms": None}
+"""The figures where nothing was looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +48,15 @@ class Refusal:
 class Account:
     """Motion blocks by what became of them; every one is in exactly one of the three.
 
-    passed   block -> the rule by which it was passed
+    passed   block -> why it was passed, in the words of its program
     refused  block -> why
+    rules    block that was passed -> the rule (`program.passing`) by which
     """
 
     compensated: frozenset[int]
     passed: Mapping[int, str]
     refused: Mapping[int, Reason]
+    rules: Mapping[int, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, moves: Moves, kept: NDArray[np.bool_], reasons: Mapping[int, Reason]) -> Account:
@@ -59,9 +66,12 @@ class Account:
         refused = {block: reasons[block] for block in moves.block[motion & kept].tolist() if block in reasons}
         passed = {int(moves.block[row]): moves.reasons[moves.reason[row]] for row in by_rule}
         passed = {block: reason for block, reason in passed.items() if block not in refused}
+        rules = {int(moves.block[row]): rule_of(moves, row).reason for row in by_rule.tolist()}
         compensated = frozenset(moves.block[motion & ~kept].tolist())
         others = refused.keys() | passed.keys()
-        return cls(compensated - others if others else compensated, passed, refused)
+        return cls(
+            compensated - others if others else compensated, passed, refused, {each: rules[each] for each in passed}
+        )
 
     @classmethod
     def together(cls, accounts: Sequence[Account]) -> Account:
@@ -71,8 +81,9 @@ class Account:
         refused = {block: why for each in reversed(accounts) for block, why in each.refused.items()}
         passed = {block: why for each in reversed(accounts) for block, why in each.passed.items()}
         passed = {block: why for block, why in passed.items() if block not in refused}
+        rules = {block: rule for each in reversed(accounts) for block, rule in each.rules.items() if block in passed}
         done = frozenset[int]().union(*(each.compensated for each in accounts))
-        return cls(done - refused.keys() - passed.keys(), passed, refused)
+        return cls(done - refused.keys() - passed.keys(), passed, refused, rules)
 
     @property
     def total(self) -> int:
@@ -89,9 +100,13 @@ class FixReport:
     """What was done to one program, as figures.
 
     error_before, error_after  tip error along the path: {"max", "rms"} in um, and "where" (line) after
+            None where nothing was looked at
+    max_correction_um  None where nothing was corrected
     rounding_um  what the control's digits may add to the path that was planned
     left    axes that had to stay where they stand, since the program has not said where that is
     block_delete  the positions of block delete for which it is right: the switches that are on in each
+    passed_by_rule  blocks that were passed, by rule
+    no_figure  motions at feed and holes of which the figures say nothing, by reason
     """
 
     path: str
@@ -101,7 +116,7 @@ class FixReport:
     passed: int
     changed: bool
     inserted_blocks: int = 0
-    max_correction_um: float = 0.0
+    max_correction_um: float | None = None
     error_before_um: Mapping[str, float | int | None] = field(default_factory=dict)
     error_after_um: Mapping[str, float | int | None] = field(default_factory=dict)
     refused: tuple[Refusal, ...] = ()
@@ -111,6 +126,8 @@ class FixReport:
     left: tuple[Left, ...] = ()
     rounding_um: float = 0.0
     block_delete: tuple[list[int], ...] = ()
+    passed_by_rule: Mapping[str, int] = field(default_factory=dict)
+    no_figure: Mapping[str, int] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, object]:
         """The per-file object of `fix --json`."""
@@ -122,11 +139,13 @@ class FixReport:
             "moves": self.moves,
             "compensated": self.compensated,
             "passed": self.passed,
+            "passed_by_rule": dict(sorted(self.passed_by_rule.items())),
             "inserted_blocks": self.inserted_blocks,
             "max_correction_um": self.max_correction_um,
             "error_before_um": dict(self.error_before_um),
             "error_after_um": dict(self.error_after_um),
             "rounding_um": round(self.rounding_um, 4),
+            "no_figure": dict(sorted(self.no_figure.items())),
             "strategy": self.strategy,
             "leaves": self.leaves,
             "block_delete": list(self.block_delete),

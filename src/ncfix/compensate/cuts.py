@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from ncfix.compensate.bodies import Bodies
+from ncfix.compensate.coverage import Why, not_looked_at
 from ncfix.compensate.crew import Read
 from ncfix.compensate.curve import Curve
 from ncfix.compensate.direction import Signs, matters
@@ -16,7 +17,7 @@ from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.flanks import Flank
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rounding import rounding_of_arcs
-from ncfix.compensate.simulation import actual_tip, unseen
+from ncfix.compensate.simulation import actual_tip
 from ncfix.compensate.stretches import Stretches
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
@@ -38,7 +39,7 @@ class Cut:
     actual    what the machine makes of it
     intended  what it means; None of a program of which that does not matter
     flank     where the tip is besides, with the play of axes, if there is any
-    unseen    lines of motions that cut nobody knows where
+    unseen    why motions at feed are not looked at -> their lines, one for each
     left      linear axis -> lines of motions that cannot be corrected along it
     last      nothing comes after it
     rounding  how far the tip may be off because numbers are rounded to the control's digits, mm
@@ -48,7 +49,7 @@ class Cut:
     actual: Curve
     intended: Curve | None
     flank: Flank | None
-    unseen: Index
+    unseen: dict[Why, Index]
     left: dict[str, Index]
     last: bool
     rounding: float
@@ -82,7 +83,8 @@ class Cut:
         flank = Flank.of(bodies, actual).taken(counted(actual)) if bodies else None
         left = {axis: lines_of(found) for axis, found in left_in_cuts(intent.moves).items()}
         digits = rounding_of_arcs(intent.machine, np.nan_to_num(intent.moves.sweep[rows]))
-        return cls(in_lines(actual), intended, flank, lines_of(unseen(intent.moves)), left, last, digits, bodies)
+        unseen = {why: lines_of(found) for why, found in not_looked_at(intent.moves).items()}
+        return cls(in_lines(actual), intended, flank, unseen, left, last, digits, bodies)
 
 
 def whole(machine: Machine, program: Program, moves: Moves, meant: bool = False) -> Iterator[Cut]:

@@ -8,6 +8,7 @@ plan meant. If it would not, that is a fault of ncfix, and nothing is written.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from ncfix import __version__
-from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.account import NOTHING_SEEN, Account, FixReport, Refusal, with_what_is_left
 from ncfix.compensate.block_delete import (
     Position,
     Readings,
@@ -28,11 +29,12 @@ from ncfix.compensate.block_delete import (
     stamped,
     worst_findings,
 )
+from ncfix.compensate.coverage import without_figure
 from ncfix.compensate.double import numbers_at_the_beginning, suspected
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.following import Resolve, placed, traced, with_tool_lengths
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.left import either, left_where_they_stand
+from ncfix.compensate.left import either, left_by_motion, left_where_they_stand
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError, proven
 from ncfix.compensate.rounding import rounding_along
@@ -174,10 +176,10 @@ def _check_sane(program: Program, settled: Settled, errors: PathError) -> None:
         raise SelfCheckError(f"line {line} would lead {errors.after.max:.3f} mm away from where it should")
 
 
-def _figures(figures: Sequence[Figures]) -> dict[str, float | int | None]:
-    """The worst of all positions of block delete."""
-    if not figures:
-        return {}
+def _figures(figures: Sequence[Figures], seen: bool) -> dict[str, float | int | None]:
+    """The worst of all positions of block delete; `seen`: something was looked at."""
+    if not figures or not seen:
+        return dict(NOTHING_SEEN) if figures else {}
     most, rms = max(each.max for each in figures), max(each.rms for each in figures)
     return {"max": round(most * 1e3, 4), "rms": round(rms * 1e3, 4)}
 
@@ -205,8 +207,12 @@ def _report(
     options: FixOptions,
 ) -> FixReport:
     every, steps = together.settled, increments(machine)
-    left = either([left_where_they_stand(program, each, steps) for each in every])
+    lacking = [left_by_motion(each, steps) for each in every]
+    left = either([left_where_they_stand(program, each.moves, own) for each, own in zip(every, lacking, strict=True)])
     account = Account.together([Account.of(each.moves, each.kept, each.reasons) for each in every])
+    no_figure = Counter[str]()
+    for settled, own in zip(every, lacking, strict=True):
+        no_figure |= without_figure(settled.moves, settled.kept, own.axes if own else None)
     refused = refusals(program, account)
     findings = dict.fromkeys(
         message
@@ -215,6 +221,8 @@ def _report(
         for message in finding.messages(partial(place_of, program, settled.moves))
     )
     worst = max(range(len(errors)), key=lambda k: errors[k].after.max) if errors else 0
+    seen = any(each.samples for each in errors)
+    where = {"where": _line_of(program, every[worst].moves, errors[worst].after)} if errors else {}
     report = FixReport(
         path=program.path,
         blocks=len(program),
@@ -223,10 +231,11 @@ def _report(
         passed=len(account.passed),
         changed=bool(len(together.splices)),
         inserted_blocks=together.added_blocks,
-        max_correction_um=max(largest_correction(each.moves, each) for each in every) * 1e3,
-        error_before_um=_figures([each.before for each in errors]),
-        error_after_um=_figures([each.after for each in errors])
-        | ({"where": _line_of(program, every[worst].moves, errors[worst].after)} if errors else {}),
+        max_correction_um=max(largest_correction(each.moves, each) for each in every) * 1e3
+        if account.compensated
+        else None,
+        error_before_um=_figures([each.before for each in errors], seen),
+        error_after_um={**_figures([each.after for each in errors], seen), **where},
         refused=tuple(refused),
         warnings=(*messages_of(positions), *(each.message(program.path) for each in left), *findings),
         strategy=options.strategy,
@@ -234,6 +243,8 @@ def _report(
         left=left,
         rounding_um=max(rounding_along(Intent(machine, each.moves, State()), each.plan.pieces) for each in every) * 1e3,
         block_delete=tuple(sorted(each.on) for each in positions if each.on is not None),
+        passed_by_rule=Counter(account.rules.values()),
+        no_figure=no_figure,
     )
     return with_what_is_left(report, options.tolerance_um)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ncfix.compensate.findings import Array, Mask
 from ncfix.diagnostics import Message, Place
+from ncfix.program.moves import Moves
 from ncfix.program.tree import Program
 
 if TYPE_CHECKING:
@@ -79,19 +80,37 @@ class Left:
         return {"axis": self.axis, "motions": self.motions, "cuts": self.cuts, "lines": lines, **most}
 
 
-def left_where_they_stand(program: Program, settled: Settled, steps: Array, own: Mask | None = None) -> dict[str, Left]:
-    """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves."""
+@dataclass(frozen=True, slots=True)
+class Lacking:
+    """Which axes of motions were left, (n, n_axes), and how far they are from where they should be, mm or rad."""
+
+    axes: Mask
+    off: Array
+
+
+def left_by_motion(settled: Settled, steps: Array, own: Mask | None = None) -> Lacking | None:
+    """The axes that were left, of motions `own` (n,) if given; `steps` (n_axes,) what the control resolves.
+
+    None if there are none.
+    """
     moves, known = settled.moves, settled.plan.known
     wordless = moves.wordless
     if known is None or not wordless.any():
-        return {}
+        return None
     off = np.abs(known.end - moves.end - settled.shift)
     if known.beside is not None:
         off = np.maximum(off, known.beside)
     lacking = wordless & (off >= steps / 2) & ~settled.kept[:, None]
     if own is not None:
         lacking &= own[:, None]
-    found = {}
+    return Lacking(lacking, off)
+
+
+def left_where_they_stand(program: Program, moves: Moves, left: Lacking | None) -> dict[str, Left]:
+    """The axes that were left, by name."""
+    if left is None:
+        return {}
+    found, lacking, off = {}, left.axes, left.off
     for column in np.flatnonzero(lacking.any(axis=0)).tolist():
         rows = np.flatnonzero(lacking[:, column])
         axis, turns, most = moves.axes[column], bool(moves.rotary[column]), float(off[rows, column].max())

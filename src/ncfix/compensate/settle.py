@@ -17,6 +17,7 @@ from ncfix.compensate.account import Reason
 from ncfix.compensate.assembly import Plan
 from ncfix.compensate.before import Before, Round
 from ncfix.compensate.budget import Closure
+from ncfix.compensate.coverage import at_measured_places
 from ncfix.compensate.digits import on_digits
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.following import kinematics_of
@@ -68,8 +69,8 @@ class Settled:
         Not those to a place that the machine measures itself: what it finds has its error in it.
         """
         wanted = self.moves.cuts | (self.moves.kind == Kind.RAPID) if rapids else self.moves.cuts
-        shown: Mask = wanted & ~self.kept
-        return shown if self.moves.measured is None else shown & ~self.moves.measured.any(axis=1)
+        shown: Mask = wanted & ~self.kept & ~at_measured_places(self.moves)
+        return shown
 
     @property
     def shift(self) -> Array:

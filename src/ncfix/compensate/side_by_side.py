@@ -15,12 +15,14 @@ both programs have to be at hand as a whole.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ncfix.compensate.along import Along, lines_of
+from ncfix.compensate.coverage import Why
 from ncfix.compensate.curve import Curve, Samples
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.findings import Index
@@ -166,12 +168,13 @@ class SideBySide:
 
     tolerance    of the path before rounding, mm
     rounding     what the control's digits may add to it, mm; arcs that are met make it more
-    unseen, left as `Cut` has them, of the original, by parts
+    unseen, left as `Cut` has them, of the original, by parts; `blind`: what is unseen of the other
     """
 
     tolerance: float
     rounding: float
-    unseen: list[Index] = field(default_factory=list)
+    unseen: dict[Why, list[Index]] = field(default_factory=dict)
+    blind: Counter[Why] = field(default_factory=Counter)
     left: dict[str, list[Index]] = field(default_factory=dict)
     intended: Track = field(default_factory=Track.empty)
     unfixed: Track = field(default_factory=Track.empty)
@@ -192,8 +195,13 @@ class SideBySide:
 
     @property
     def lines_unseen(self) -> list[int]:
-        """Lines of the original that cut nobody knows where, in order."""
-        return lines_of(self.unseen)
+        """Lines of the original that may cut and are not looked at, in order."""
+        return lines_of([lines for why, parts in self.unseen.items() if why.cuts for lines in parts])
+
+    @property
+    def no_figure(self) -> Counter[Why]:
+        """How many motions at feed are not looked at, and why: of the program that has more of them."""
+        return Counter({why: sum(map(len, parts)) for why, parts in self.unseen.items()}) | self.blind
 
     @property
     def lines_left(self) -> dict[str, list[int]]:
@@ -226,7 +234,8 @@ class SideBySide:
         assert cut.intended is not None
         self.unfixed.add(cut.actual, cut.last, cut.flank)
         self.intended.add(cut.intended, cut.last)
-        self.unseen.append(cut.unseen)
+        for why, lines in cut.unseen.items():
+            self.unseen.setdefault(why, []).append(lines)
         for axis, lines in cut.left.items():
             self.left.setdefault(axis, []).append(lines)
 
@@ -236,6 +245,7 @@ class SideBySide:
         else:
             self.fixed.add(cut.actual, cut.last, cut.flank)
             self.rounding = max(self.rounding, cut.rounding)
+            self.blind += Counter({why: len(lines) for why, lines in cut.unseen.items()})
 
     def _go_on(self) -> None:
         for match in self.matches:

@@ -21,7 +21,7 @@ from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.diagnostics import Message
 from ncfix.machine import State
-from ncfix.program.moves import Kind, Moves
+from ncfix.program.moves import Kind
 
 LEAST = 4
 """Fewest samples between the ends of a motion."""
@@ -118,13 +118,6 @@ def _samples(intent: Intent, rows: Index, counts: Index) -> tuple[Index, Array]:
     begins, ends = (along, np.zeros(len(along))), (np.arange(len(rows)), np.ones(len(rows)))
     counts, fraction = merged(len(rows), (along[owners(inside)], between), begins, ends)
     return rows[owners(counts)], fraction
-
-
-def unseen(moves: Moves) -> Index:
-    """The motions that cut and cannot be looked at, since where they begin or end is not known."""
-    ends, starts = (np.isfinite(places).all(axis=1) for places in (moves.end, moves.start))
-    lost = np.where(moves.kind == Kind.CYCLE, ~ends, ~(ends & starts))
-    return np.flatnonzero(moves.cuts & lost)
 
 
 def actual_tip(intent: Intent, rows: Index, fraction: Array) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ncfix.compensate.budget import DENSITY
+from ncfix.compensate.coverage import at_measured_places
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners
@@ -42,7 +43,7 @@ class Stretches:
     def of(cls, intent: Intent) -> Stretches:
         """Of a program."""
         moves = intent.moves
-        known = finite(moves.end) & moves.cuts
+        known = finite(moves.end) & moves.cuts & ~at_measured_places(moves)
         hole = moves.kind == Kind.CYCLE
         along = np.flatnonzero(known & ~hole & finite(moves.start))
         counts, between = with_kinks(intent, intent.segments, along, *_evenly(intent, along), JUMP)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ncfix.compensate.account import Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.account import NOTHING_SEEN, Account, FixReport, Refusal, with_what_is_left
+from ncfix.compensate.coverage import without_figure
 from ncfix.compensate.double import Numbers, numbers_at_the_beginning, together
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import largest_correction, refusals
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.left import Left, joined, left_where_they_stand
+from ncfix.compensate.left import Left, joined, left_by_motion, left_where_they_stand
 from ncfix.compensate.notes import Notes
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.rounding import rounding_along
@@ -44,8 +46,10 @@ class Side:
         if other.max > self.max:
             self.max, self.line = other.max, other.line
 
-    def as_dict(self, way: float) -> dict[str, float | int | None]:
-        """The figures, um."""
+    def as_dict(self, way: float, samples: int) -> dict[str, float | int | None]:
+        """The figures, um, of so many places that were looked at."""
+        if not samples:
+            return dict(NOTHING_SEEN)
         rms = math.sqrt(self.squares / way) if way else 0.0
         return {"max": round(self.max * 1e3, 4), "rms": round(rms * 1e3, 4)}
 
@@ -56,6 +60,8 @@ class Tally:
 
     step     of the control's digits, mm
     rounding what these add to the path at most, mm
+    passed   blocks, by rule; `unseen`: motions that have no figure, by reason
+    samples  places that were looked at
     numbers  those in the first lines, by which a program is known that was corrected before
     """
 
@@ -63,7 +69,9 @@ class Tally:
     blocks: int = 0
     moves: int = 0
     compensated: int = 0
-    passed: int = 0
+    passed: Counter[str] = field(default_factory=Counter)
+    unseen: Counter[str] = field(default_factory=Counter)
+    samples: int = 0
     inserted: int = 0
     changed: bool = False
     largest: float = 0.0
@@ -79,19 +87,21 @@ class Tally:
 
     def add(self, program: Program, settled: Settled, own: Mask, machine: Machine) -> None:
         """Take in a part; `own` (n,) motions that were not the last of the part before."""
-        moves, steps = settled.moves, increments(machine)
+        moves = settled.moves
         self.rounding = max(self.rounding, rounding_along(Intent(machine, moves, State()), settled.plan.pieces, own))
-        self.left = joined(self.left, left_where_they_stand(program, settled, steps, own))
+        lacking = left_by_motion(settled, increments(machine), own)
+        self.left = joined(self.left, left_where_they_stand(program, moves, lacking))
+        self.unseen += without_figure(moves, settled.kept, lacking.axes if lacking else None, own)
         account = Account.of(moves, settled.kept, settled.reasons)
         theirs = set(moves.block[~own].tolist())
         self.moves += int(own.sum())
         self.compensated += len(account.compensated) - len(theirs & account.compensated)
-        self.passed += len(account.passed) - len(theirs & account.passed.keys())
+        self.passed += Counter(rule for block, rule in account.rules.items() if block not in theirs)
         self.inserted += settled.emission.added_blocks
         self.changed |= len(settled.emission.splices) > 0
         self.largest = max(self.largest, largest_correction(moves, settled, own))
         refused = {block: reason for block, reason in account.refused.items() if block not in theirs}
-        self.refused += refusals(program, Account(account.compensated, account.passed, refused))
+        self.refused += refusals(program, replace(account, refused=refused))
         self.numbers = numbers_at_the_beginning(program, settled, self.step, own)
         for finding in settled.plan.findings:
             self.found.add(finding, program, moves, own)
@@ -121,6 +131,8 @@ class Tally:
         self.changed |= other.changed
         self.largest = max(self.largest, other.largest)
         self.rounding = max(self.rounding, other.rounding)
+        self.unseen += other.unseen
+        self.samples += other.samples
         self.way += other.way
         self.before.take(other.before)
         self.after.take(other.after)
@@ -134,6 +146,7 @@ class Tally:
     def figures(self, errors: PathError, program: Program, moves: Moves) -> None:
         """Take in the tip errors of a part."""
         self.way += errors.way
+        self.samples += errors.samples
         for side, figures in ((self.before, errors.before), (self.after, errors.after)):
             line = program.line(int(moves.block[figures.move])) if figures.move >= 0 else None
             side.add(figures, errors.way, line)
@@ -144,17 +157,17 @@ class Tally:
     def report(self, path: str, messages: tuple[Message, ...], leaves: str, options: FixOptions) -> FixReport:
         """The report; `messages` are those of following the program."""
         figures = options.verify
-        after = self.after.as_dict(self.way) | {"where": self.after.line}
+        after = self.after.as_dict(self.way, self.samples) | {"where": self.after.line}
         report = FixReport(
             path=path,
             blocks=self.blocks,
             moves=self.moves,
             compensated=self.compensated,
-            passed=self.passed,
+            passed=self.passed.total(),
             changed=self.changed,
             inserted_blocks=self.inserted,
-            max_correction_um=self.largest * 1e3,
-            error_before_um=self.before.as_dict(self.way) if figures else {},
+            max_correction_um=self.largest * 1e3 if self.compensated else None,
+            error_before_um=self.before.as_dict(self.way, self.samples) if figures else {},
             error_after_um=after if figures else {},
             refused=tuple(self.refused),
             warnings=(*messages, *self.notes.values(), *self._left(path), *self.found.messages()),
@@ -162,5 +175,7 @@ class Tally:
             leaves=leaves,
             left=tuple(self.left.values()),
             rounding_um=self.rounding * 1e3,
+            passed_by_rule=self.passed,
+            no_figure=self.unseen,
         )
         return with_what_is_left(report, options.tolerance_um)

@@ -270,7 +270,7 @@ class FigureTally:
     def add(self, part: Samples) -> None:
         """Take in a batch; places at which an error is not known do not count."""
         self.way += float(part.weight.sum())
-        self.samples += len(part.move)
+        self.samples += int(np.count_nonzero(np.isfinite(part.after)))
         for side, error in enumerate((part.before, part.after)):
             known = np.nan_to_num(error)
             self.squares[side] += float((part.weight * known**2).sum())

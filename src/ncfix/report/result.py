@@ -83,7 +83,7 @@ def _program(entry: Result) -> list[str]:
 
 
 def _figures(error: Result | None) -> str:
-    return f"{error['max']:.2f} ({error['rms']:.2f})" if error else ""
+    return f"{error['max']:.2f} ({error['rms']:.2f})" if error and error["max"] is not None else ""
 
 
 def _message(message: Result) -> tuple[str, str, str]:
