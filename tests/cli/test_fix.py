@@ -304,8 +304,8 @@ def test_the_readme_shows_what_its_first_command_does(root: Path, ncfix: Any, tm
     result = ncfix(*arguments)
     assert result.code == ExitCode.DONE, result.err
     readme = (root / "README.md").read_text()
-    figures = re.findall(r"^  (?:motion blocks|largest|tip error|rounding).*$", result.err, re.MULTILINE)
-    assert len(figures) == 5
+    figures = re.findall(r"^  (?:motion blocks|passed by rule|largest|tip error|rounding).*$", result.err, re.MULTILINE)
+    assert len(figures) == 6
     assert "\n".join(figures) in readme
     original, corrected = (root / "examples/programs/blade.nc").read_text(), (tmp_path / "blade.nc").read_text()
     shown = [re.split(r"(?:->)? {6,}(?:-> +)?", line) for line in re.findall(r"^N\d+ .*$", readme, re.MULTILINE)]
