@@ -76,9 +76,9 @@ def test_markdown_has_rows_of_one_width_and_the_extremes_of_curves() -> None:
 
 
 def test_the_suffix_says_the_form() -> None:
-    assert form_of("a/b.html") is html.rendered
-    assert form_of("page") is html.rendered
-    assert form_of("PAGE.MD") is markdown.rendered
+    assert form_of("a/b.html")(DOCUMENT) == html.rendered(DOCUMENT)
+    assert form_of("page")(DOCUMENT) == html.rendered(DOCUMENT)
+    assert form_of("PAGE.MD")(DOCUMENT) == markdown.rendered(DOCUMENT)
     with pytest.raises(UsageError) as caught:
         form_of("page.docx")
     assert caught.value.code == "NCF018"
