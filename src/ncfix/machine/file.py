@@ -6,6 +6,7 @@ docs/formats.md describes the file. Millimetres and degrees there are mm and rad
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -40,7 +41,7 @@ TILTED = 1e-6
 def load(path: str | Path) -> Machine:
     """The machine that a file describes. Raises `ConfigError` with every fault found (NCF300 to NCF319)."""
     try:
-        source = taken(str(path), MOST_SAID)
+        source = taken(os.fspath(path), MOST_SAID)
     except OSError as error:
         text = f"cannot read the machine file: {error.strerror}"
         hint = READING.get(error.errno or 0, "give an existing file's path")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,7 @@ UNIT_TO = 1e-9
 def load_chain(path: str | Path) -> Chain:
     """The chain that a file describes; raises `ConfigError` with every fault found (NCF302 ... NCF305, NCF391)."""
     try:
-        source = taken(str(path), MOST_SAID)
+        source = taken(os.fspath(path), MOST_SAID)
     except OSError as error:
         raise ConfigError.of("NCF300", f"cannot read the chain file: {error.strerror}", Place(str(path))) from error
     return loads_chain(decoded(source, str(path), "NCF301"), str(path))
