@@ -84,7 +84,7 @@ def test_refusals_of_export(shop: Any, ncfix: Any, case: str) -> None:
 def test_values_beyond_the_format(shop: Any, ncfix: Any, control: str) -> None:
     machine = with_effect(shop, constant("EXX", 15.0))
     machine.write_text("max_correction = { linear = 50, rotary = 1 }\n" + machine.read_text())
-    result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", *SIGN, "--force")
+    result = ncfix("export", control, "-m", machine, "-o", shop.folder / "t", "--force", *SIGN)
     assert (result.code, "NCF484" in result.err) == (ExitCode.REFUSED, True), result.err
     assert "is the error in mm?" in result.err
 

@@ -72,8 +72,9 @@ def calibrate(
     code 4: the result does not describe the measurements, and nothing was written.
     """
     from ncfix.machine import dumps
+    from ncfix.machine.plausible import doubts
     from ncfix.measure.calibrate import calibrate as calibrated
-    from ncfix.measure.misfit import misfit
+    from ncfix.measure.misfit import refusals
     from ncfix.measure.prediction import guesses, over_the_travels
     from ncfix.measure.reader import reads
 
@@ -86,9 +87,13 @@ def calibrate(
         calibration = calibrated(data, machine, effects, loss, prune, knots, time_constants)
     over = over_the_travels(calibration)
     remarks = (*calibration.remarks, *guesses(calibration, over))
+    odd = doubts(calibration.machine, target.path)
+    refused = refusals(calibration, odd)
+    if refused and not allow_misfit:
+        console.tell(*(each for each in remarks if each not in refused))
+        raise RefusedError(refused)
+    remarks = (*remarks, *(doubt.message for doubt in odd))
     console.tell(*remarks)
-    if not allow_misfit and (message := misfit(calibration)) is not None:
-        raise RefusedError((message,))
     target.write(dumps(calibration.machine).encode())
     if as_json:
         said = [message.as_dict() for message in remarks]

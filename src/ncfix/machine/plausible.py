@@ -10,7 +10,7 @@ machine of a metre.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -126,8 +126,9 @@ def _travel_mm(axis: Axis) -> float:
 
 def functions(machine: Machine, effect: Effect) -> Array:
     """The functions of an effect over what they depend on, (k, n): over the travels of axes, signals one scale about
-    their centre.
+    their centre, after a long time where they act late.
     """
+    effect = replace(effect, time_constant_s=None)
     signals = [signal for signal in signals_of(machine.axes, effect) if signal is not None]
     axes = sorted({signal.axis for signal in signals if signal.axis is not None})
     inputs = sorted({name for signal in signals for name in signal.inputs})
@@ -304,7 +305,7 @@ def _positions(machine: Machine) -> Iterator[Fault]:
     """Tables and knots in a unit other than that of the axis, or where it never is."""
     for effect in machine.effects:
         axis = _axis(machine, effect.input or effect.joint)
-        positions = np.array(sorted({*(getattr(effect.basis, "positions", ()) or getattr(effect.basis, "knots", ()))}))
+        positions = np.array(sorted({*getattr(effect.basis, "positions", ()), *getattr(effect.basis, "knots", ())}))
         if axis is None or effect.joint == SPINDLE or len(positions) < 3:
             continue
         places = effect.center + effect.scale * positions

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtrc
 
-from ncfix.diagnostics import Message, UsageError
+from ncfix.diagnostics import Message, RefusedError, UsageError
 from ncfix.machine import Machine
+from ncfix.machine.plausible import functions, much
 from ncfix.measure import weights
-from ncfix.measure.measurement import Array, Measurement
-from ncfix.measure.observation import Observation
+from ncfix.measure.measurement import Array, Index, Measurement
+from ncfix.measure.observation import Mask, Observation
 from ncfix.measure.observe import observe
 from ncfix.measure.selection import Selection, select
 from ncfix.measure.solve import Solution, solve
@@ -29,6 +31,7 @@ CONVERGED = 1e-5
 """Change of the predictions, in units of the noise, that is none."""
 FAR = 1e6
 """The same: from here on it is no iteration any more."""
+TINY = 1e-300
 UNLIKELY = 0.01
 """Probability of so large a chi-square below which the noise is taken to be larger than it is said to be."""
 ROUNDING = 1e-9
@@ -82,6 +85,21 @@ class Problem:
         return Problem(
             machine, selection, seen, values, sigma, design, tuple(len(each.unknowns.start) for each in seen)
         )
+
+    @cached_property
+    def stated(self) -> Mask:
+        """Which values were stated by a certificate and not read, (m,): calibrated distances."""
+        rows: Index = np.concatenate([each.rows for each in self.observations])
+        return rows < 0
+
+    @cached_property
+    def limits(self) -> Array:
+        """What is much for each coefficient on this machine, (p,), mm or rad: who knows no better knows nothing."""
+        parts = [np.zeros(0)]
+        for effect in self.selection.estimated:
+            largest = np.abs(functions(self.machine, effect)).max(axis=1)
+            parts.append(much(self.machine, effect.name) / np.maximum(largest, TINY))
+        return np.concatenate(parts)
 
     @property
     def start(self) -> Array:
@@ -191,9 +209,13 @@ def calibrate(
     knots    of new error motions of linear axes, which are cubics without; those that do not matter go with `prune`
     time_constants  estimate those of effects that lag, too
 
-    Raises `UsageError` NCF630, NCF635, NCF637, NCF639.
+    Raises `UsageError` NCF630, NCF635, NCF637, NCF639, and `RefusedError` NCF623.
     """
-    from ncfix.measure import lags, pruning, results
+    from ncfix.measure import contradictions, lags, pruning, results, suspects
+
+    nothing = [message for each in measurements if (message := contradictions.untouched(each)) is not None]
+    if nothing:
+        raise RefusedError(tuple(nothing))
 
     selection = effects if isinstance(effects, Selection) else select(machine, effects, _point(measurements), knots)
     remarks: tuple[Message, ...] = ()
@@ -204,7 +226,8 @@ def calibrate(
     try:
         estimate = settle(problem, loss)
     except UsageError as error:
-        raise UsageError((*error.messages, *(each for data in measurements for each in data.remarks))) from error
+        why = suspects.suspected(problem) if error.code == "NCF637" else ()
+        raise UsageError((*error.messages, *why, *(each for data in measurements for each in data.remarks))) from error
     if prune is not None:
         problem, estimate = pruning.pruned(problem, estimate, prune, loss)
     found = results.result(problem, estimate, loss)
@@ -223,10 +246,21 @@ def settle(problem: Problem, loss: str = weights.AUTO) -> Estimate:
     ones = np.ones(len(problem.values))
     estimate = _iterate(problem, ones, loss)
     if loss == weights.AUTO:
-        outlying = weights.outliers(estimate.solution)
+        outlying = weights.outliers(estimate.solution) & ~problem.stated
         if outlying.any():
             estimate = _iterate(problem, np.where(outlying, 0.0, ones), loss)
+    scale = _scale(problem, estimate)
+    unknown = np.sqrt(np.diag(estimate.solution.covariance)) * scale > problem.limits[estimate.solution.kept]
+    if unknown.any() or (scale < 1 and (estimate.solution.weak or estimate.solution.combinations)):
+        kept = estimate.weight if loss == weights.AUTO else ones
+        estimate = _iterate(problem, kept, loss, scale)
     return estimate
+
+
+def _scale(problem: Problem, estimate: Estimate) -> float:
+    """How many times larger the noise is than its standard deviations say."""
+    freedom = max(int((estimate.weight > 0).sum()) - estimate.solution.rank, 1)
+    return noise_scale(problem, estimate.reduced(problem.sigma, freedom), freedom) or 1.0
 
 
 def _enough(problem: Problem) -> None:
@@ -239,7 +273,8 @@ def _enough(problem: Problem) -> None:
         raise UsageError.of("NCF630", text, hint="measure more poses, or estimate fewer effects: --effects")
 
 
-def _iterate(problem: Problem, weight: Array, loss: str) -> Estimate:
+def _iterate(problem: Problem, weight: Array, loss: str, scale: float = 1.0) -> Estimate:
+    """Gauss-Newton steps to convergence; `scale`: the noise is this many times larger than it is said to be."""
     coefficients, unknowns = problem.selection.start.copy(), problem.start
     design = problem.design / problem.sigma[:, None]
     nuisance = problem.nuisance(unknowns) / problem.sigma[:, None]
@@ -247,7 +282,7 @@ def _iterate(problem: Problem, weight: Array, loss: str) -> Estimate:
         residual = problem.residual(coefficients, unknowns)
         target = residual / problem.sigma
         root = np.sqrt(weight)
-        solution = solve(design * root[:, None], nuisance * root[:, None], target * root)
+        solution = solve(design * root[:, None], nuisance * root[:, None], target * root, problem.limits / scale)
         rest = (target - design @ solution.change) * root
         moved = np.linalg.lstsq(nuisance * root[:, None], rest, rcond=1e-11)[0] if nuisance.shape[1] else unknowns
         coefficients, unknowns = coefficients + solution.change, unknowns + moved
@@ -255,7 +290,7 @@ def _iterate(problem: Problem, weight: Array, loss: str) -> Estimate:
         settled = bool(np.abs(change).max(initial=0.0) < CONVERGED)
         if loss in (weights.HUBER, weights.TUKEY):
             before = weight
-            weight = weights.of(loss, target - change)
+            weight = np.where(problem.stated, 1.0, weights.of(loss, target - change))
             settled = settled and bool(np.abs(weight - before).max() < 1e-3)
         if settled:
             residual = problem.residual(coefficients, unknowns)

@@ -77,11 +77,44 @@ CODES = {
         "The values are larger than a machine tool's errors in mm can be. They are given in mm (rotations in rad).",
     ),
     "NCF617": Code(
-        "measured columns look swapped",
-        "With two columns exchanged, or the sign of one changed, the model explains the measurements far better.",
-        "Check which way the instrument's axes point.",
+        "a mistake in a measurement file",
+        "With two columns exchanged, the sign of a column, of a set or of an axis changed, radians taken for degrees, "
+        "or one set's lengths of another scale, the model explains the measurements far better, more than chance or a "
+        "missing effect can. No machine file is written (exit code 4); `--allow-misfit` writes it all the same.",
+        "Check units and signs, and which way the instrument's axes point.",
     ),
     "NCF618": Code("an instrument's file that cannot be read", "A line is not what that format has at this place."),
+    "NCF620": Code(
+        "an error that these measurements hardly see",
+        "Its uncertainty would be more than what is much for such an error on any machine, so that the number found "
+        "would be noise. It is held at what the machine file says.",
+        "`ncfix plan` finds poses that show it.",
+    ),
+    "NCF621": Code(
+        "stated lengths that contradict each other",
+        "Calibrated distances (`# distance:`) are never outliers: what they say holds. One of these is further from "
+        "what the others and the readings say than its uncertainty and the noise allow. One is wrong, or the model "
+        "lacks an effect. No machine file is written (exit code 4); `--allow-misfit` writes it all the same.",
+        "Look at the certificates; leave the wrong one out, or estimate more effects: `--effects`.",
+    ),
+    "NCF622": Code(
+        "too many outliers",
+        "More than a twentieth of the values, or most rows of a set, are far from the model that the others make: it "
+        "is not said which of them are right. No machine file is written (exit code 4); `--allow-misfit` writes it "
+        "all the same.",
+        "Look at these rows; calibrate with either part alone.",
+    ),
+    "NCF623": Code(
+        "measurements in which nothing was measured",
+        "All values are the very same. No instrument reads that: the file was not filled in, or the instrument did not "
+        "run.",
+    ),
+    "NCF624": Code(
+        "too many set-ups",
+        "Each set has unknowns of its own, and with so many of them the equations would fill all memory. Mostly each "
+        "row was given a set of its own by mistake, which would leave nothing to tell errors from set-ups.",
+        "Rows that were measured in one set-up have one and the same `set`.",
+    ),
     "NCF630": Code(
         "too few rows for the unknowns",
         "There are more unknowns (errors, and the set-up of the instrument) than measured values, or just as many: "

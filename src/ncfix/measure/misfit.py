@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ncfix.diagnostics import Message
+from ncfix.machine.plausible import Doubt
 from ncfix.measure.calibrate import Calibration
+from ncfix.measure.contradictions import contradictions
 from ncfix.measure.residuals import place, residuals
 
 BEYOND = 1000.0
@@ -16,6 +20,13 @@ UM = 1e3
 HINT = (
     "look at that row, at units (mm, rad, degree), signs and columns, and whether it is this machine; noise_um is in um"
 )
+
+
+def refusals(calibration: Calibration, odd: Sequence[Doubt]) -> tuple[Message, ...]:
+    """Why no machine file may be written: data that contradict each other, a misfit, or a machine that cannot be."""
+    found = misfit(calibration)
+    impossible = tuple(doubt.message for doubt in odd if doubt.impossible)
+    return (*contradictions(calibration), *(() if found is None else (found,)), *impossible)
 
 
 def misfit(calibration: Calibration) -> Message | None:

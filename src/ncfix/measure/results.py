@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import permutations, product
 from typing import Any
 
 import numpy as np
@@ -15,15 +14,12 @@ from scipy.special import chdtrc
 from ncfix import __version__
 from ncfix.diagnostics import Message
 from ncfix.machine import Effect, Machine
-from ncfix.measure import words
+from ncfix.measure import contradictions, suspects, words
 from ncfix.measure.calibrate import UNLIKELY, Calibration, Estimate, Problem, noise_scale
 from ncfix.measure.measurement import Array
-from ncfix.measure.observation import Observation
 from ncfix.measure.residuals import Residuals, place, residuals
 from ncfix.measure.solve import orthonormal, without
 
-BETTER = 0.2
-"""Squares left after exchanging columns, of those before, from which on the columns look exchanged."""
 NAMED = 20
 """Outliers that are named one by one."""
 
@@ -38,7 +34,8 @@ def result(problem: Problem, estimate: Estimate, loss: str) -> Calibration:
     remarks += words.remarks(estimate.solution, problem.selection.labels)
     remarks += _outliers(problem, estimate, found)
     remarks += _noise(problem, chi_square, freedom)
-    remarks += [message for each in _swapped(problem, estimate) for message in each]
+    remarks += contradictions.remarks(problem, estimate)
+    remarks += suspects.suspected(problem)
     before, after = _rms_before(problem), _rms(problem, estimate.residual, estimate.weight > 0)
     machine = _machine(problem, estimate, scale, {"rms_before_um": before, "rms_after_um": after, "loss": loss})
     remarks += [message for seen in problem.observations for message in seen.doubts(machine)]
@@ -109,33 +106,3 @@ def _rms_before(problem: Problem) -> float:
     residual = problem.residual(problem.selection.start, problem.start) / problem.sigma
     basis = orthonormal(problem.nuisance(problem.start) / problem.sigma[:, None])
     return _rms(problem, without(basis, residual) * problem.sigma, np.ones(len(residual), dtype=bool))
-
-
-def _swapped(problem: Problem, estimate: Estimate) -> Iterator[list[Message]]:
-    """Whether exchanged or reversed columns would explain much more."""
-    if len(problem.observations) != 1 or problem.observations[0].measurement.kind != "tcp":
-        return
-    seen = problem.observations[0]
-    columns = np.concatenate([estimate.solution.orthogonal, estimate.solution.nuisance], axis=1)
-    rows = (problem.values / problem.sigma).reshape(-1, len(seen.components))
-    weight = np.sqrt(estimate.weight).reshape(rows.shape)
-    known = problem.values - problem.residual(problem.selection.start, problem.start)
-    known = (known / problem.sigma).reshape(rows.shape)
-
-    def left(order: tuple[int, ...], signs: tuple[int, ...]) -> float:
-        changed = ((rows[:, order] * signs - known) * weight).ravel()
-        return float((without(columns, changed) ** 2).sum())
-
-    size = len(seen.components)
-    straight = left(tuple(range(size)), (1,) * size)
-    tried = {key: left(*key) for key in product(permutations(range(size)), product((1, -1), repeat=size))}
-    order, signs = min(tried, key=lambda key: tried[key])
-    clear = tried[order, signs] < BETTER * straight and straight > 4 * len(problem.values)
-    if clear:
-        yield [_look_swapped(seen, order, signs)]
-
-
-def _look_swapped(seen: Observation, order: tuple[int, ...], signs: tuple[int, ...]) -> Message:
-    names = [f"{'-' if sign < 0 else ''}{seen.components[k]}" for k, sign in zip(order, signs, strict=True)]
-    text = f"the columns {', '.join(seen.components)} look exchanged: {', '.join(names)} fit much better"
-    return Message("NCF617", text, seen.measurement.place(0), "which way do the instrument's axes point?")

@@ -20,6 +20,8 @@ RANK = 1e-6
 """Scaled columns nearer than this to a combination of others are that combination."""
 STURDY = 0.05
 """Of columns that are combinations of one another the first are kept, if this much of them is new."""
+ALONE = 0.3
+"""Share of a held column that is new from which on it is no combination of others, but weak by itself."""
 SIGNIFICANT = 0.02
 """Share from which on a column is named as part of such a combination."""
 
@@ -42,6 +44,7 @@ class Solution:
     unseen       those that change nothing that was measured
     set_up       those that change only what the unknown set-up changes too
     combinations those that are held because others do the same
+    weak         those that are held because they are seen too little to be told from zero
     covariance   (r, r) of the kept, for a noise of one
     orthogonal   (m, r) orthonormal columns of the kept after elimination
     nuisance     (m, s) orthonormal columns of the set-up
@@ -59,6 +62,7 @@ class Solution:
     nuisance: Array
     residual: Array
     condition: float
+    weak: tuple[int, ...] = ()
 
     @property
     def leverage(self) -> Array:
@@ -90,17 +94,19 @@ def without(basis: Array, columns: Array) -> Array:
     return twice
 
 
-def solve(design: Array, nuisance: Array, target: Array) -> Solution:
+def solve(design: Array, nuisance: Array, target: Array, limit: Array | None = None) -> Solution:
     """Least squares of `design @ change + nuisance @ anything = target`.
 
-    design (m, p), nuisance (m, k), target (m,), all divided by the noise.
+    design (m, p), nuisance (m, k), target (m,), all divided by the noise; limit (p,): what would be known to no better
+    than this is not known, and held.
     """
     basis = orthonormal(nuisance)
     left, wanted = without(basis, design), without(basis, target)
     before, after = np.linalg.norm(design, axis=0), np.linalg.norm(left, axis=0)
     seen = np.flatnonzero(after > VISIBLE * np.maximum(before, 1e-300))
     scaled = left[:, seen] / after[seen]
-    kept, orthogonal, triangle, combinations = _independent(scaled, seen, after)
+    most = np.full(len(seen), np.inf) if limit is None else limit[seen] * after[seen]
+    kept, orthogonal, triangle, combinations, weak = _independent(scaled, seen, after, most)
     change = np.zeros(design.shape[1])
     projected = orthogonal.T @ wanted
     inverse = solve_triangular(triangle, np.eye(len(kept))) / after[kept, None] if len(kept) else np.zeros((0, 0))
@@ -118,25 +124,54 @@ def solve(design: Array, nuisance: Array, target: Array) -> Solution:
         basis,
         wanted - orthogonal @ projected,
         float(values[0] / values[-1]),
+        weak,
     )
 
 
-def _independent(scaled: Array, seen: Index, size: Array) -> tuple[Index, Array, Array, tuple[Combination, ...]]:
-    """A largest set of independent columns, their QR factors, and what the others are made of."""
+def _independent(
+    scaled: Array, seen: Index, size: Array, most: Array
+) -> tuple[Index, Array, Array, tuple[Combination, ...], tuple[int, ...]]:
+    """A largest set of independent columns, their QR factors, what the others are made of, and which are just weak.
+
+    most (s,) is the standard deviation of the scaled columns' factors beyond which one is not known.
+    """
     if not scaled.shape[1]:
-        return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), ()
-    chosen = _chosen(scaled)
+        return np.zeros(0, dtype=np.int64), scaled, np.zeros((0, 0)), (), ()
+    chosen, orthogonal, upper = _known(scaled, _chosen(scaled), most)
     held = np.setdiff1d(np.arange(scaled.shape[1]), chosen)
-    orthogonal, upper = np.linalg.qr(scaled[:, chosen])
     kept = seen[chosen]
-    combinations = []
+    combinations, weak = [], []
     for column in held:
-        shares = solve_triangular(upper, orthogonal.T @ scaled[:, column])
+        along = orthogonal.T @ scaled[:, column]
+        if along @ along < 1 - ALONE**2:
+            weak.append(int(seen[column]))
+            continue
+        shares = solve_triangular(upper, along)
         others = np.flatnonzero(np.abs(shares) > SIGNIFICANT * np.abs(shares).max())
         factors = shares[others] * size[seen[column]] / size[kept[others]]
         names = tuple(int(k) for k in kept[others])
         combinations.append(Combination(int(seen[column]), names, tuple(float(f) for f in factors)))
-    return kept, orthogonal, upper, tuple(combinations)
+    return kept, orthogonal, upper, tuple(combinations), tuple(weak)
+
+
+def _known(scaled: Array, chosen: Index, most: Array) -> tuple[Index, Array, Array]:
+    """Those of the chosen columns whose factors are known to `most` (s,), and their QR factors.
+
+    The one that is known least is left out, and all others are looked at anew: of columns whose sum alone is seen, one
+    goes and the others are known.
+    """
+    orthogonal, upper = np.linalg.qr(scaled[:, chosen])
+    among, triangle = np.arange(len(chosen)), upper
+    while len(among):
+        deviation = np.linalg.norm(solve_triangular(triangle, np.eye(len(among))), axis=1) / most[chosen[among]]
+        worst = int(np.argmax(deviation))
+        if deviation[worst] <= 1:
+            break
+        among = np.delete(among, worst)
+        triangle = np.asarray(np.linalg.qr(upper[:, among], mode="r"))
+    if len(among) == len(chosen):
+        return chosen, orthogonal, upper
+    return chosen[among], *np.linalg.qr(scaled[:, chosen[among]])
 
 
 def _chosen(scaled: Array) -> Index:

@@ -16,6 +16,10 @@ def remarks(solution: Solution, labels: Sequence[str]) -> list[Message]:
     found = _unseen(_listed(solution.unseen, labels), "nothing that was measured depends on")
     found += _unseen(_listed(solution.set_up, labels), "the unknown set-up takes the place of")
     found += [_combined(combination, labels) for combination in solution.combinations]
+    if weak := _listed(solution.weak, labels):
+        are = "is held as it is" if len(weak) == 1 else "are held as they are"
+        text = f"{', '.join(weak)} {are}: these measurements would tell it to no better than what is much"
+        found.append(Message("NCF620", text, hint="measure where it acts: `ncfix plan`"))
     if solution.condition > 1e4:
         text = f"the estimates depend strongly on one another: condition {solution.condition:.0f}"
         found.append(Message("NCF638", text, hint="measure at more varied poses, or estimate fewer effects"))
