@@ -64,7 +64,7 @@ def outcome(files: Files, effects: str | None = None) -> tuple[str, ...]:
 
 
 def one_set(change: Change) -> Change:
-    return in_part("set", lambda name: int(name) % 4 == 2, change)
+    return in_part("set", lambda name: int(name) == 2, change)
 
 
 def turning(topology: str) -> str:
