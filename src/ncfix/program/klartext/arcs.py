@@ -24,6 +24,7 @@ from ncfix.program.klartext.targets import (
     here,
     led,
     polar,
+    polar_axes,
     pole_frame,
     starts_unknown,
 )
@@ -100,8 +101,7 @@ def circular_polar(control: Control, step: Step) -> None:
     if give_up(control, step, where):
         return
     if not step.words.values.keys() & {"PA", "IPA"}:
-        axes = step.words.axes or 3
-        somewhere(control, axes, *command_of(control, where, axes), NO_ANGLE)
+        do_without(control, step, where, NO_ANGLE)
         return
     start, end = points(control, where, plane)
     centre = pole[0] - start[0], pole[1] - start[1]
@@ -131,7 +131,7 @@ def tangential(control: Control, step: Step) -> None:
     left = -ahead[plane.second], ahead[plane.first]
     side = away[0] * left[0] + away[1] * left[1]
     size = math.hypot(*left)
-    if size < FLAT or abs(side) <= FLAT * math.hypot(*away):
+    if size < FLAT or math.hypot(*away) < FLAT or abs(side) <= FLAT * math.hypot(*away):
         do_without(control, step, where, NO_TANGENT)
         return
     radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)
@@ -218,9 +218,10 @@ def give_up(control: Control, step: Step, where: Where) -> bool:
 
 def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
     """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
-    axes = step.words.axes or 3
+    about_pole = step.name in ("cp", "ctp")
+    axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
     target, unknown = command_of(control, where, axes)
-    if step.words.runtime and not step.words.incremental:
+    if about_pole or (step.words.runtime and not step.words.incremental):
         somewhere(control, axes, target, unknown, reason)
         return
     control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=reason))

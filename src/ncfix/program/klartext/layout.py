@@ -85,7 +85,7 @@ class Layout:
     def turn(self, program: Program, block: int) -> float | None:
         """The angle of a CP in rad, if it is given by IPA."""
         word = next((word for word in self.polar if word.address == "IPA"), None)
-        if word is None or not isinstance(word.value, Literal):
+        if self.name != "cp" or word is None or not isinstance(word.value, Literal):
             return None
         return math.radians(float(program.values_of(block)[word.value.slot]))
 

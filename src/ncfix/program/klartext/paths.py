@@ -36,6 +36,9 @@ TAKES = {
 }
 """Path function -> the words among `MOVING` that lead it."""
 
+TURNING = frozenset({"c", "cp", "cr"})
+"""What takes a sense of rotation, DR+ or DR-."""
+
 CALLING = frozenset({"", "l", "ln", "lp", "cycl call", "cycl call pos"})
 """What may execute a cycle where it leads; behind an arc there would be two motions in one block."""
 
@@ -57,6 +60,8 @@ def astray(control: Control, step: Step, *, called: bool) -> str:
     if called and name not in CALLING:
         return CALLED_BY_ARC.format(said)
     other = next((word for word in words if word in MOVING and word not in TAKES.get(name, MOVING)), "")
+    if step.flags & {"dr+", "dr-"} and name in TAKES and name not in TURNING:
+        other = "DR"
     if other:
         return NOT_TAKEN.format(said, other)
     if name in ("lp", "cp", "ctp") or words.keys() & POLAR:

@@ -83,7 +83,7 @@ VECTOR = frozenset({"TX", "TY", "TZ"})
 MOVING = CARTESIAN | POLAR | VECTOR
 """The addresses that lead somewhere."""
 
-ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "lp", "ln"})
+ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "ln"})
 """Path functions that move even where they name no end: `C DR-` is a full circle."""
 
 

@@ -20,10 +20,31 @@ POLAR_ARC = "an arc (CT) in polar coordinates"
 POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that has a centre or radius, too"
 DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
 VIA = ("I1", "J1", "K1")
+OF_ARCS = frozenset({*CENTRE_LETTERS, "CR", "AR", "TURN"})
+OF_CIP = frozenset({*VIA, "TURN"})
+NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
+TWICE = "{} says by {} and {} where the arc lies: which of them counts is not sure"
+NO_END = "CIP without an end point: no circle is given by two points"
 FLAT = 1e-9
 """A triangle of a smaller height, relative, has no circle."""
 
 Triple = tuple[float, float, float]
+
+
+def misled(control: Sinumerik, words: Words, name: str, taken: frozenset[str]) -> str:
+    """Why a motion is refused that has words of arcs beyond those that it takes, or more than say an arc; or empty."""
+    named = words.values.keys() & (OF_ARCS | OF_CIP)
+    if not named:
+        return ""
+    stray = sorted(named - taken)
+    if stray:
+        return NOT_TAKEN.format(name, stray[0])
+    plane = control.modal.plane
+    centre = sorted({CENTRE_LETTERS[index] for index in (plane.first, plane.second)} & named)
+    ended = any(words.axes >> index & 1 for index in (plane.first, plane.second))
+    if "CR" in named and (centre or "AR" in named):
+        return TWICE.format(name, "CR", (centre or ["AR"])[0])
+    return TWICE.format(name, "AR", "an end point beside its centre") if "AR" in named and centre and ended else ""
 
 
 def arc(control: Sinumerik, words: Words, code: int) -> None:
@@ -164,6 +185,8 @@ def through_point(control: Sinumerik, words: Words, code: int) -> None:
         control.go(Leg(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"))
         return
     start, finish = tuple(control.position[:3]), tuple(end.target[:3])
+    if not words.axes & 0b111 and not {"AP", "RP"} & words.values.keys():
+        raise Fault(ARC_FAULT, NO_END)
     circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
     circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
     control.go(Leg(Kind.ARC, words, end, code, arc=circle))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ncfix.program.follow.coordinates import INDEX
+from ncfix.program.follow.coordinates import CENTRE_LETTERS, INDEX
 from ncfix.program.moves import Kind
 from ncfix.program.passing import Pass, Passing
-from ncfix.program.sinumerik.circles import arc, through_point
+from ncfix.program.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, through_point
 from ncfix.program.sinumerik.cycles import TO_A_HOLE, drill, hole_after
 from ncfix.program.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
 from ncfix.program.sinumerik.framing import mind_carried, take_up
@@ -31,6 +31,12 @@ CORNERS = frozenset({"RND", "CHF", "CHR"})
 CIP, CT = MOTIONS["cip"], MOTIONS["ct"]
 OTHER_WAYS = UNFOLLOWED_MOTIONS.keys() | {20, 30, CIP, CT}
 """Motion codes with which an axis word is no straight motion."""
+
+
+TAKING = {20: ("G2", OF_ARCS), 30: ("G3", OF_ARCS), CIP: ("CIP", OF_CIP), CT: ("CT", frozenset({"TURN"}))}
+"""Motions that take words of arcs; centre words beside a straight motion lead nowhere."""
+
+WHERE_IT_ENDS = "where the axis {{}} stands is not known after this: {}"
 
 
 def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
@@ -85,7 +91,12 @@ def is_one_piece(control: Sinumerik, words: Words) -> bool:
 
 def as_coded(control: Sinumerik, words: Words, code: int) -> None:
     """The motion that the code in force makes of the words."""
-    if code in (20, 30):
+    name, taken = TAKING.get(code, (f"G{code // 10}", frozenset(CENTRE_LETTERS)))
+    why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
+    if why:
+        refused(control, words, code, why)
+        control.lose_axes(GEOMETRY, WHERE_IT_ENDS.format(why))
+    elif code in (20, 30):
         arc(control, words, code)
     elif code == CIP:
         through_point(control, words, code)

@@ -10,6 +10,7 @@ from ncfix.program.follow.faults import Fault
 from ncfix.program.sinumerik import framing, motion
 from ncfix.program.sinumerik.affine import WORLD
 from ncfix.program.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
+from ncfix.program.sinumerik.circles import VIA
 from ncfix.program.sinumerik.cycles import AFTER_CYCLE, cycle
 from ncfix.program.sinumerik.destination import Words, set_pole
 from ncfix.program.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
@@ -58,14 +59,14 @@ SETTINGS: dict[int, Handler] = {
     **dict.fromkeys((400, 410, 420), framing.compensation),
     **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
 }
-MOVING = frozenset({"AP", "RP", *VECTOR, *ANGLES}) | NORMALS | OTHERS
+MOVING = frozenset({"AP", "RP", "ANG", *VECTOR, *ANGLES}) | NORMALS | OTHERS
 """Words that make a block move even where no axis is named."""
 
 ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
 """What A2 B2 C2 are: the names of one group of G codes."""
 
-CIRCLE = frozenset({"I", "J", "K", "AR", "TURN"})
-"""Those that do it while G2 or G3 is in force."""
+CIRCLE = frozenset({"I", "J", "K", "AR", "TURN", "CR"})
+"""Those that do it while G2 or G3 is in force; the point on the way, while CIP is."""
 
 STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
 
@@ -287,6 +288,8 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
 
 def is_circle(control: Sinumerik, words: Words) -> bool:
     """An arc with no end point: it ends where it began, or where its angle leads."""
+    if control.modal.motion == motion.CIP:
+        return not words.values.keys().isdisjoint(VIA)
     return control.modal.motion in (20, 30) and bool(words.values.keys() & CIRCLE)
 
 
