@@ -1,0 +1,242 @@
+"""Statements of every language with subsets of their words, each in a short program, and what must come of them.
+
+A statement that leads somewhere must never be passed over: it is a motion, or the block is named with a reason. Which
+ones do is said here from the manuals, of the text alone; where a corrected program goes, other controls than the
+product say (`differential.tnc`, `sinumerik`, `fanuc`).
+"""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from classes.judging import SETUP, machine
+from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.compensate.following import kinematics_of
+from ncfix.diagnostics import NcfixError
+from ncfix.program.moves import Kind
+from ncfix.program.reader import read
+from ncfix.program.trace import trace
+
+MACHINE = machine()
+WORDS_AT_ONCE = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """The statements of one language.
+
+    heads   what a block begins with
+    words   what may stand behind; of one address only one
+    before  the programs before it, several modes; after: what follows
+    leads   (head, words, mode) whether the manuals say that the block moves axes, or that the control stops at it
+    """
+
+    dialect: str
+    heads: tuple[str, ...]
+    words: tuple[str, ...]
+    before: tuple[str, ...]
+    after: str
+    leads: Callable[[str, Sequence[str], int], bool]
+
+    def cases(self) -> Iterator[Case]:
+        """Every head with every subset of the words, behind every mode."""
+        for mode in range(len(self.before)):
+            for head in self.heads:
+                for count in range(WORDS_AT_ONCE + 1):
+                    for words in combinations(self.words, count):
+                        if len({address(word) for word in words}) == count:
+                            yield Case(self, head, words, mode)
+
+    def some(self, count: int, seed: int) -> list[Case]:
+        """So many of them at random; all for none."""
+        found = list(self.cases())
+        return found if not count else random.Random(seed).sample(found, min(count, len(found)))
+
+
+def address(word: str) -> str:
+    """What a word says: its axis or address, however it says it."""
+    return (
+        re.match(r"I?([A-Z]+\d?(?:\[.\])?)", word)[1]
+        if word[:1] == "I" and word[1:2].isalpha()
+        else re.match(r"[A-Z]+\d?(?:\[.\])?", word)[0]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """One statement in its program."""
+
+    family: Family
+    head: str
+    words: tuple[str, ...]
+    mode: int
+
+    @property
+    def block(self) -> str:
+        return " ".join((self.head, *self.words)).strip()
+
+    @property
+    def line(self) -> int:
+        return self.family.before[self.mode].count("\n") + 1
+
+    @property
+    def text(self) -> str:
+        return f"{self.family.before[self.mode]}{self.block}\n{self.family.after}"
+
+    @property
+    def leads(self) -> bool:
+        return self.family.leads(self.head, self.words, self.mode)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a statement: "motion", "named", "stopped", "nothing", or a fault of the product."""
+
+    what: str
+    text: str = ""
+    named: frozenset[int] = frozenset()
+
+
+def outcome(case: Case) -> Outcome:
+    """Correct the program and look at the statement."""
+    source = case.text.encode()
+    try:
+        program = read(source, "part", case.family.dialect)
+        moves = trace(program, SETUP, MACHINE.axis_names, frozenset(), kinematics=kinematics_of(MACHINE)).moves
+        fixed = fix_program(program, MACHINE, SETUP, FixOptions(tolerance_um=50.0, verify=False))
+    except NcfixError as error:
+        places = [message.place for message in error.messages]
+        return Outcome("stopped" if any(p is None or p.line >= case.line for p in places) else f"elsewhere: {error}")
+    except Exception as error:
+        return Outcome(f"NCF000 {type(error).__name__}: {error}")
+    refused = frozenset(each.line for each in fixed.report.refused)
+    rows = [row for row, block in enumerate(moves.block.tolist()) if block + 1 == case.line]
+    passed = frozenset(
+        int(moves.block[row]) + 1 for row in range(len(moves)) if moves.rule[row] == 1 and moves.kind[row] != Kind.DWELL
+    )
+    if case.line in refused:
+        return Outcome("named", fixed.text.decode(), refused | passed)
+    motions = [row for row in rows if moves.kind[row] != Kind.DWELL]
+    return Outcome("motion" if motions else "nothing", fixed.text.decode(), refused | passed)
+
+
+# -- Klartext ---------------------------------------------------------------------------------------------------------
+
+PATHS = ("C", "CP", "CR", "CT", "CTP")
+TURNS = ("APPR LT", "APPR LN", "APPR CT", "APPR LCT", "APPR PLT", "APPR PLCT", "DEP LT", "DEP LN", "DEP CT", "DEP LCT")
+CALLS = ("CYCL CALL", "CYCL CALL POS")
+
+
+def klartext_leads(head: str, words: Sequence[str], mode: int) -> bool:
+    """Path functions but for L, LP and LN need no words; M99 calls a cycle where the tool stands."""
+    if head in ("RND", "CHF", "CC"):
+        return False
+    ends = any(re.match(r"I?[XYZ]|I?P[AR]|TX", word) for word in words)
+    return head in (*PATHS, *TURNS, *CALLS) or "M99" in words or ends
+
+
+KLARTEXT = Family(
+    dialect="heidenhain",
+    heads=("", "L", "LP", "LN", *PATHS, *TURNS, *CALLS, "RND", "CHF", "CC"),
+    words=(
+        *("X+30", "X+10", "IX+5", "Y+40", "Y+20", "IY-4", "Z+5", "IZ-2", "PR+20", "IPR+3", "PA+30", "IPA-60"),
+        *("R+25", "R-25", "R0", "LEN10", "CCA90", "DR-", "DR+", "FMAX", "F100", "M99", "M91", "M3"),
+    ),
+    before=tuple(
+        "BEGIN PGM T MM\nTOOL CALL 0 Z S1000\nCYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=50\n" + each
+        for each in (
+            "L X+10 Y+20 Z+3 R0 FMAX\nCC X+30 Y+20\n",
+            "L X+8 Y+20 Z+3 R0 FMAX\nCC X+30 Y+20\nL X+10 F200\n",
+        )
+    ),
+    after="L X+1 Y+2 Z+30 F100\nL X+3\nM30\nEND PGM T MM\n",
+    leads=klartext_leads,
+)
+
+# -- ISO, Fanuc, LinuxCNC ---------------------------------------------------------------------------------------------
+
+TAKING = ("G4", "G92", "G52", "G10 L2 P1", "G43", "G17", "G90", "G40", "M3")
+"""What takes the words of its block for itself, or has no use for them."""
+
+
+def iso_leads(head: str, words: Sequence[str], mode: int) -> bool:
+    """Axis words lead somewhere unless a code takes them; arcs about a centre need none."""
+    if head in ("G28", "G30"):
+        return True
+    if head in TAKING:
+        return False
+    arc = head in ("G2", "G3") or (mode == 1 and head == "")
+    return any(word[0] in "XYZ" for word in words) or (arc and any(word[0] in "IJ" for word in words))
+
+
+def iso(dialect: str) -> Family:
+    """The statements of a dialect of RS274."""
+    heads = ("", "G0", "G1", "G2", "G3", "G28", "G30", "G53 G0", "G53 G1", "G73", "G81", "G82", "G83", "G85", "G33")
+    return Family(
+        dialect=dialect,
+        heads=(*heads, "G91 G1", "G38.2" if dialect == "linuxcnc" else "G31", *TAKING),
+        words=(
+            "X30.",
+            "X10.",
+            "Y40.",
+            "Y20.",
+            "Z5.",
+            "I20.",
+            "J0.",
+            "J10.",
+            "K1.",
+            "R25.",
+            "P1",
+            "Q2.",
+            "L2",
+            "F100.",
+            "H1",
+        ),
+        before=tuple(
+            f"G21 G17 G90 G40 G49 G80 G94\nG54 G0 X0. Y10. Z3.\nF200. S100 M3\n{each}"
+            for each in ("G1 X10. Y20.\n", "G2 X10. Y20. I5. J5.\n", "G81 X10. Y20. Z-5. R2.\n")
+        ),
+        after="G80\nG90 G1 X1. Y2. Z30. F100.\nX3.\nM30\n",
+        leads=iso_leads,
+    )
+
+
+# -- SINUMERIK --------------------------------------------------------------------------------------------------------
+
+FRAMES = ("TRANS", "ATRANS", "ROT", "MIRROR", "G4", "G110", "G111", "G17", "G90")
+SPLINES = ("ASPLINE", "BSPLINE", "CSPLINE", "POLY", "INVCW", "G33", "G331")
+
+
+def siemens_leads(head: str, words: Sequence[str], mode: int) -> bool:
+    """Axes, polar words and positioning axes lead somewhere; circles need no end point."""
+    if head in FRAMES:
+        return False
+    if head.startswith(("CYCLE", "G74")):
+        return head.startswith("CYCLE") or any(word[0] in "XYZ" for word in words)
+    starts = {re.match(r"[A-Z]+\d?", word)[0] for word in words}
+    circle = (head in ("G2", "G3") or (mode == 1 and head == "")) and starts & {"I", "J", "AR", "CR", "TURN"}
+    through = (head == "CIP" or (mode == 2 and head == "")) and starts & {"I1", "J1", "K1"}
+    return bool(starts & {"X", "Y", "Z", "AP", "RP", "POS", "PO", "ANG"} or circle or through)
+
+
+SIEMENS = Family(
+    dialect="siemens",
+    heads=("", "G0", "G1", "G2", "G3", "CIP", "CT", *SPLINES, "SUPA G0", "G74", "CYCLE81(10,0,2,-5)", *FRAMES),
+    words=(
+        *("X30", "X10", "X=IC(5)", "Y40", "Y20", "Y=AC(7)", "Z5", "I20", "J0", "J10", "I=AC(30)", "K1", "CR=25"),
+        *("AR=90", "TURN=1", "I1=20", "J1=30", "K1=3", "AP=30", "RP=20", "RND=1", "ANG=45", "F100"),
+        *("POS[X]=30", "PO[X]=(30,2)"),
+    ),
+    before=tuple(
+        f"G17 G90 G40 G71 G94 G54\nT1 D1 S100 M3\nG0 X0 Y10 Z3 F200\nG111 X30 Y20\n{each}"
+        for each in ("G1 X10 Y20\n", "G1 X0\nG2 X10 Y20 I=AC(10) J=AC(10)\n", "CIP X10 Y20 I1=4 J1=17\n")
+    ),
+    after="G1 G90 X1 Y2 Z30 F100\nX3\nM30\n",
+    leads=siemens_leads,
+)
+
+FAMILIES = (KLARTEXT, SIEMENS, iso("fanuc"), iso("linuxcnc"), iso("iso"))
