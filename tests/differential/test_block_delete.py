@@ -282,6 +282,15 @@ def klartext_family(root: Path) -> Family:
     return Family("heidenhain", source, groups, test_tnc.FILE, test_tnc.SETUP)
 
 
+@pytest.mark.parametrize(("family", "seed"), [("siemens", 125), ("heidenhain", 121)])
+def test_what_cannot_be_proven_in_all_positions_is_refused(family: str, seed: int, root: Path) -> None:
+    study = {"siemens": siemens_family, "heidenhain": klartext_family}[family](root)
+    program = read(study.source(seed).encode(), "part", study.dialect)
+    with pytest.raises(NcfixError) as raised:
+        fix_program(program, load(str(study.machine)), study.setup, FixOptions(verify=False))
+    assert raised.value.code == "NCF453"
+
+
 @pytest.mark.parametrize("strategy", STRATEGIES)
 @pytest.mark.parametrize("family", [fanuc_family, siemens_family, klartext_family])
 def test_both_positions_judged_by_the_second_controls(

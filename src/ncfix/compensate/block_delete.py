@@ -30,6 +30,7 @@ from ncfix.program.writer import Edit, Splices
 
 DIFFERS = "NCF451"
 TOO_MANY = "NCF452"
+NOT_IN_ALL = "NCF453"
 MOST_SWITCHES = 4
 """Switches of which all positions are followed: sixteen of them."""
 GRAIN = 9
@@ -210,6 +211,13 @@ def stamped(positions: Sequence[Position]) -> str:
     if len(positions) == 1:
         return f"block delete {positions[0].name}"
     return f"block delete on or off{'' if len(positions) == 2 else ' (all switches)'}"
+
+
+def not_in_all(why: Exception, program: Program) -> RefusedError:
+    """NCF453: what each position wants, put together, is not what the control makes of it in all of them."""
+    text = f"no text was found that is right in all positions of block delete: {why}"
+    hint = "--block-skip on or off corrects it for one position, if the switch always stands so"
+    return RefusedError.of(NOT_IN_ALL, text, Place(program.path), hint)
 
 
 # -- one text for all positions ---------------------------------------------------------------------------------------

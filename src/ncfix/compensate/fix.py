@@ -24,6 +24,7 @@ from ncfix.compensate.block_delete import (
     assumed_of,
     messages_of,
     most_moves,
+    not_in_all,
     positions_of,
     settle_together,
     stamped,
@@ -98,7 +99,12 @@ def fix_program(
         together = settle_together(program, moves, on_machine, options, readings)
         return together, _written(program, together.splices, stamp_of(program, machine, options, *words))
 
-    proof = proven(program, attempt, [partial(follow, own=each.setup) for each in positions])
+    try:
+        proof = proven(program, attempt, [partial(follow, own=each.setup) for each in positions])
+    except SelfCheckError as error:
+        if len(positions) == 1:
+            raise
+        raise not_in_all(error, program) from error
     step, every = machine.least_increment[0], proof.together.settled
     numbers = numbers_at_the_beginning(program, every[0], step)
     suspicion = suspected(numbers, step, program.path, options.force)
