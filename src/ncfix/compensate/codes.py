@@ -186,8 +186,8 @@ CODES = {
         "no text is right in all positions of block delete",
         "The program was corrected for each position of its switches, and what was put together was read again: in one "
         "of them the control would make something else of it. So nothing is written.",
-        "`--block-skip on` or `off`, if the switch always stands so; or fewer blocks with `/` that change modes, poles, "
-        "frames or where arcs begin.",
+        "`--block-skip on` or `off`, if the switch always stands so; or fewer blocks with `/` that change modes, "
+        "poles, frames or where arcs begin.",
     ),
     "NCF446": Code(
         "length offset that is no length",
