@@ -101,10 +101,10 @@ def fix_program(
 
     try:
         proof = proven(program, attempt, [partial(follow, own=each.setup) for each in positions])
-    except SelfCheckError as error:
+    except SelfCheckError as why:
         if len(positions) == 1:
             raise
-        raise not_in_all(error, program) from error
+        raise not_in_all(why, program) from why
     step, every = machine.least_increment[0], proof.together.settled
     numbers = numbers_at_the_beginning(program, every[0], step)
     suspicion = suspected(numbers, step, program.path, options.force)
