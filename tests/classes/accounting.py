@@ -44,12 +44,16 @@ class Account:
 
     files      read, of another family, unreadable, and those that the control would stop in
     blocks     corrected, passed, refused
+    rules      by which blocks were passed
+    unseen     motions at feed without a figure, by reason
     reasons    of refused blocks
     stopped    why the control would stop, or what is not given
     """
 
     files: Counter[str] = field(default_factory=Counter)
     blocks: Counter[str] = field(default_factory=Counter)
+    rules: Counter[str] = field(default_factory=Counter)
+    unseen: Counter[str] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
     stopped: Counter[str] = field(default_factory=Counter)
 
@@ -69,8 +73,15 @@ class Account:
         blocks = ", ".join(f"{self.blocks[what]} {what}" for what in ("corrected", "passed", "refused"))
         kept = [each for each in self.reasons.most_common() if BEYOND not in each[0]]
         reasons = [f"    {count} {reason}" for reason, count in kept[:10]]
+        passed = ", ".join(f"{count} {rule}" for rule, count in self.rules.most_common())
+        unseen = ", ".join(f"{count} {reason}" for reason, count in self.unseen.most_common())
         far = f"{self.beyond} of them beyond the travel, {100 * self.refused:.2f} % of the others"
-        return [f"{name}: files: {files}; motion blocks: {blocks} ({far})", *reasons]
+        return [
+            f"{name}: files: {files}; motion blocks: {blocks} ({far})",
+            f"  passed by rule: {passed or 'none'}",
+            f"  at feed without a figure: {unseen or 'none'}",
+            *reasons,
+        ]
 
 
 def dialect_of(source: bytes, name: str, dialect: str) -> str:
@@ -116,6 +127,8 @@ def account(
         books.files["followed"] += 1
         refused = {each.line: each.reason for each in report.refused}
         books.blocks.update(corrected=report.compensated, passed=report.passed, refused=len(refused))
+        books.rules.update(report.passed_by_rule)
+        books.unseen.update(report.no_figure)
         books.reasons.update(refused.values())
     return books
 

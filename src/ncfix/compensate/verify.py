@@ -169,11 +169,15 @@ def _uneasy(written: Written) -> Mask:
 
 
 def _leaps(written: Written, which: Index) -> Mask:
-    """Of pieces with which motions begin, those that lead a cut to where it should begin, from where axes were left."""
+    """Of pieces with which motions begin, those that lead a cut to where it should begin.
+
+    They come from where axes were left, or from a hole: the place is right at its bottom, and not at the level to which
+    the cycle goes back.
+    """
     moves, move = written.intent.moves, written.pieces.move[which]
-    behind = (move > 0) & ((moves.rule[move - 1] == Rule.PASS) | some(moves.wordless[move - 1]))
+    behind = (moves.rule[move - 1] == Rule.PASS) | (moves.kind[move - 1] == Kind.CYCLE) | some(moves.wordless[move - 1])
     leads = (written.span[which] <= 2 * INSTANT) | ~written.intent.moving(move)
-    leaps: Mask = behind & leads & finite(picked(moves.start, move))
+    leaps: Mask = (move > 0) & behind & leads & finite(picked(moves.start, move))
     return leaps
 
 
