@@ -18,6 +18,8 @@ from ncfix.machine import Machine, State
 Floats = NDArray[np.float64]
 STEP = 0.2
 """mm between places that are looked at."""
+NEAR = 0.3
+"""mm round a corner that belong to it."""
 OFF = 400
 """The code of G40."""
 
@@ -90,14 +92,18 @@ def _bulge(rng: np.random.Generator, here: Floats, there: Floats) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """How far the tool is from where it should be along a contour, both ways, um; and where that is most."""
+    """How far the tool is from where it should be beside a contour, both ways, um.
+
+    most     anywhere
+    corners  (c,) at each corner, within `NEAR` of it, of the path that is meant
+    """
 
     most: float
-    place: tuple[float, ...]
+    corners: Floats
 
 
-def centres(canon: Canon, machine: Machine, *, real: bool, length: float) -> tuple[Floats, Floats]:
-    """Tips (k, 3) at places along the motions that are offset, and (k,) whether one goes on from the one before."""
+def tips(canon: Canon, machine: Machine, length: float, *, real: bool) -> Floats:
+    """Tips (k, 3) of a machine at places along the motions that are offset, in order."""
     rows = np.flatnonzero((canon.side != OFF) & (canon.kind != RAPID))
     way = np.linalg.norm(canon.end[rows, :3] - canon.start[rows, :3], axis=1)
     arcs = canon.kind[rows] == ARC
@@ -105,30 +111,35 @@ def centres(canon: Canon, machine: Machine, *, real: bool, length: float) -> tup
         spoke = np.linalg.norm(canon.start[rows[arcs], :3] - canon.centre[rows[arcs]], axis=1)
         way[arcs] = spoke * np.abs(paths.sweep(canon, rows[arcs]))
     counts = np.ceil(way / STEP).astype(int) + 1
-    row = np.repeat(rows, counts)
     share = np.concatenate([np.linspace(0, 1, each) for each in counts])
-    at = paths.at(canon, row, share)[:, [machine.axis_names.index(c) for c in "XYZ"]]
-    if not real:
-        return machine.tip(at, length), row
-    return machine.actual_tip(at, State(length)), row
+    at = paths.at(canon, np.repeat(rows, counts), share)[:, ["XYZ".index(letter) for letter in machine.axis_names]]
+    return machine.actual_tip(at, State(length)) if real else machine.tip(at, length)
+
+
+def corners(canon: Canon, machine: Machine, length: float) -> Floats:
+    """(c, 3) where one offset motion goes on from another, but for the first, which leads in, and the last."""
+    rows = np.flatnonzero((canon.side != OFF) & (canon.kind != RAPID))[1:-1]
+    at = canon.end[rows][:, ["XYZ".index(letter) for letter in machine.axis_names]]
+    return machine.tip(at, length)
 
 
 def apart(points: Floats, path: Floats) -> Floats:
     """The distance of points (k, 3) from a path through other points (m, 3), mm."""
-    result = np.full(len(points), np.inf)
-    a, d = path[:-1], np.diff(path, axis=0)
-    square = np.maximum((d * d).sum(axis=1), 1e-30)
+    begin, way = path[:-1], np.diff(path, axis=0)
+    square = np.maximum((way * way).sum(axis=1), 1e-30)
+    result = np.empty(len(points))
     for k, point in enumerate(points):
-        share = np.clip(((point - a) * d).sum(axis=1) / square, 0, 1)
-        result[k] = np.sqrt((((a + share[:, None] * d) - point) ** 2).sum(axis=1).min())
+        share = np.clip(((point - begin) * way).sum(axis=1) / square, 0, 1)
+        result[k] = np.sqrt((((begin + share[:, None] * way) - point) ** 2).sum(axis=1).min())
     return result
 
 
 def judged(canon: Canon, meant: Canon, machine: Machine, length: float) -> Judged:
     """A run of the control on this machine against what another run means."""
-    made, _ = centres(canon, machine, real=True, length=length)
-    ideal, _ = centres(meant, machine, real=False, length=length)
+    made, ideal = tips(canon, machine, length, real=True), tips(meant, machine, length, real=False)
     there, back = apart(made, ideal), apart(ideal, made)
-    worst = max(float(there.max()), float(back.max()))
-    place = made[there.argmax()] if there.max() >= back.max() else ideal[back.argmax()]
-    return Judged(worst * 1e3, tuple(np.round(place, 3).tolist()))
+    found = []
+    for corner in corners(meant, machine, length):
+        near = [np.linalg.norm(points - corner, axis=1) < NEAR for points in (made, ideal)]
+        found.append(max(there[near[0]].max(initial=0.0), back[near[1]].max(initial=0.0)))
+    return Judged(1e3 * float(max(there.max(), back.max())), 1e3 * np.array(found))

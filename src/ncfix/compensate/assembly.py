@@ -33,6 +33,7 @@ class Plan:
     oriented   (n,) the tool direction is corrected too, without damping or limits
     findings   what is wrong, by motion; `pieces.kept` tells what was left as it was
     known      what is known of the ends of motions
+    corners    what rounding may do at corners that the control offsets, in half output steps; 0 where there are none
     """
 
     pieces: Pieces
@@ -41,6 +42,7 @@ class Plan:
     oriented: Mask
     findings: tuple[Finding, ...]
     known: Known | None = None
+    corners: float = 0.0
 
 
 def untouched(moves: Moves, kept: Mask) -> Plan:

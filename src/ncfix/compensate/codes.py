@@ -197,4 +197,18 @@ CODES = {
         "difference between that and the offset: with H1 = -300 and a tool of 120 mm, Z of the work offset is 420 mm "
         "lower. With G44 use G43 and such a length.",
     ),
+    "NCF454": Code(
+        "a contour that the control would make worse",
+        "Cutter radius compensation is on, and the control takes the tool beside the contour. At a corner it goes "
+        "where the lines beside two motions meet; these turn with the corrected ends, and a sharp corner makes much of "
+        "it. The tool would be beyond the tolerance there, and farther off than without a correction, so the whole "
+        "contour is left as it is.",
+        "Let the CAM system compensate the cutter radius, or ask for a larger tolerance.",
+    ),
+    "NCF455": Code(
+        "the radius of the tool is not known",
+        "Cutter radius compensation is on. The contour is corrected, and the figures are those of the contour; where "
+        "the control takes the tool beside it cannot be said without the radius.",
+        "`--tool NUMBER=LENGTH,RADIUS`, or `radius` in the setup file.",
+    ),
 }

@@ -108,6 +108,8 @@ class Corrector:
 
     def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
         """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
+        if unit.head is not None and unit.head.moves.beside is not None:
+            raise NotInPartsError("the control offsets a contour from one part into the next")
         course = None if self.planner is None else self.planner.plan(unit)
         agreed = None if course is not None else self._agreed(unit)
         before = share.before(number)

@@ -247,7 +247,7 @@ def _report(
         strategy=options.strategy,
         leaves=get_strategy(options.strategy).leaves,
         left=left,
-        rounding_um=max(rounding_along(Intent(machine, each.moves, State()), each.plan.pieces) for each in every) * 1e3,
+        rounding_um=max(rounding_along(Intent(machine, each.moves, State()), each.plan) for each in every) * 1e3,
         block_delete=tuple(sorted(each.on) for each in positions if each.on is not None),
         passed_by_rule=Counter(account.rules.values()),
         no_figure=no_figure,

@@ -13,7 +13,7 @@ from ncfix.program.tree import Program
 
 ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),
-    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF413", "NCF409", "NCF410"),
+    *("NCF414", "NCF402", "NCF403", "NCF415", "NCF454", "NCF413", "NCF455", "NCF409", "NCF410"),
 )
 """Findings in the order in which they are reported: those of limits, then those of a plan."""
 ONCE = frozenset({"NCF409"})

@@ -22,8 +22,10 @@ from ncfix.compensate.ends import corrected, with_closed_circles, with_rotary_as
 from ncfix.compensate.findings import Array, Finding, Index, Mask
 from ncfix.compensate.grids import Cutter, Split, joined, split, taken
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.judge import beside, deviations, uneasy_starts
+from ncfix.compensate.judge import beside as left_beside
+from ncfix.compensate.judge import deviations, uneasy_starts
 from ncfix.compensate.known import Known
+from ncfix.compensate.offset import Beside, beside_contours
 from ncfix.compensate.round import may_be_round
 from ncfix.compensate.rows import every, finite, vector_product
 from ncfix.compensate.sampling import too_long
@@ -107,6 +109,11 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
     if (broken & bound).any():
         again = _plan(intent, strategy, demands, kept | (broken & bound))
         return replace(again, findings=(*ends.findings, _stuck(np.flatnonzero(broken & bound)), *again.findings))
+    beside = beside_contours(intent, real) if strategy.follows_path else None
+    worse = _worse_contours(intent, beside, kept, demands)
+    if len(worse):
+        again = _plan(intent, strategy, demands, _with(kept, worse.moves))
+        return replace(again, findings=(*ends.findings, worse, *again.findings))
     followed = _followed(intent, real, kept, strategy, demands)
     deviation = _judged(intent, real, kept, broken, followed, demands)
     limit = demands.budget.path
@@ -122,8 +129,42 @@ def _plan(intent: Intent, strategy: Strategy, demands: Demands, kept: Mask) -> P
         return replace(again, findings=(*ends.findings, _too_long(unseen), *again.findings))
     findings = (*ends.findings, *_remarks(intent, deviation, ends.oriented, kept, strategy, demands))
     planned = assembled(intent.moves, real, kept, over, parts, deviation, ends.oriented, findings)
-    known = Known(ends.before, ends.wanted, beside(intent, real, np.flatnonzero(followed)))
-    return with_approaches(replace(planned, known=known), approaches)
+    known = Known(ends.before, ends.wanted, left_beside(intent, real, np.flatnonzero(followed)))
+    return with_approaches(replace(planned, known=known, corners=_digits_at_corners(beside, kept)), approaches)
+
+
+def _with(kept: Mask, rows: Index) -> Mask:
+    also = kept.copy()
+    also[rows] = True
+    return also
+
+
+def _worse_contours(intent: Intent, beside: Beside | None, kept: Mask, demands: Demands) -> Finding:
+    """NCF454: contours (k,) with a corner that the control would make worse of what is corrected than it is without.
+
+    Worse is what is beyond the tolerance, and more than before and what the control's digits do there.
+    """
+    text = "beside this contour the control would take the tool up to {value:.1f} um off, farther than uncorrected"
+    none = Finding("NCF454", np.zeros(0, dtype=np.intp), np.zeros(0), text)
+    if beside is None or intent.moves.beside is None:
+        return none
+    digits = 0.5 * intent.machine.least_increment[0] * beside.rounding
+    worse = beside.corner & (beside.after > demands.budget.tolerance) & (beside.after > beside.before + digits)
+    if not worse.any():
+        return none
+    offset = np.nan_to_num(intent.moves.beside, nan=1.0) != 0
+    contour = np.cumsum(np.diff(offset.astype(np.int8), prepend=0) == 1)
+    most = np.zeros(int(contour[-1]) + 1)
+    np.maximum.at(most, contour[beside.move[worse]], beside.after[worse])
+    rows = np.flatnonzero(offset & (most[contour] > 0) & ~kept)
+    return Finding("NCF454", rows, most[contour[rows]] * 1e3, text)
+
+
+def _digits_at_corners(beside: Beside | None, kept: Mask) -> float:
+    """What the control's digits may do at corners of corrected contours, in half steps."""
+    if beside is None:
+        return 0.0
+    return float(beside.rounding[~kept[beside.move]].max(initial=0.0))
 
 
 def _real(
@@ -241,6 +282,11 @@ def _remarks(
     over = np.flatnonzero((deviation > budget.path) & (intent.moves.compensated | crooked(intent)))
     if over.size:
         remarks.append(not_split(over, deviation[over]))
+    unknown = _unknown_radius(intent, kept)
+    if unknown.size:
+        text = "the radius of the tool is not known: what the control makes of corners beside it is not in the figures"
+        hint = "give it as --tool NUMBER=LENGTH,RADIUS"
+        remarks.append(Finding("NCF455", unknown, np.zeros(len(unknown)), text, hint=hint))
     done = np.flatnonzero(~kept)
     if not budget.fine and done.size:
         text = (
@@ -252,3 +298,12 @@ def _remarks(
         text = "the tool direction is not, or not fully, corrected here"
         remarks.append(Finding("NCF410", held, np.zeros(len(held)), text))
     return remarks
+
+
+def _unknown_radius(intent: Intent, kept: Mask) -> Index:
+    """The first corrected motions of contours beside which the tool goes by a radius that is not known."""
+    beside = intent.moves.beside
+    if beside is None:
+        return np.zeros(0, dtype=np.intp)
+    unknown = np.isnan(beside) & ~kept
+    return np.flatnonzero(unknown & ~np.append(False, unknown[:-1]))

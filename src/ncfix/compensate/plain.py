@@ -124,7 +124,7 @@ class Planner:
         """The plan of a part behind the last motion of the one before; None if it needs the long way."""
         part, moves = unit.part, unit.part.moves
         plain = None if unit.head is None else plain_ones(unit.head.moves, moves)
-        if unit.head is None or plain is None:
+        if unit.head is None or plain is None or moves.beside is not None:
             return None
         commands, led = np.concatenate([unit.head.moves.end, moves.end]), bool(moves.tcp[0])
         poses = Poses.of(self.machine, float(moves.tool_length[0]), commands, led)

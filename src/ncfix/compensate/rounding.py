@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from ncfix.compensate.assembly import Plan
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import lengths, picked, some
@@ -35,19 +36,20 @@ def rounding(machine: Machine) -> float:
     return float(half * max(lengths(corners).max(), min(len(ways), 3) ** 0.5))
 
 
-def rounding_along(intent: Intent, pieces: Pieces, own: Mask | None = None) -> float:
+def rounding_along(intent: Intent, plan: Plan, own: Mask | None = None) -> float:
     """How far the tip may be off along corrected motions because numbers are rounded, mm; 0 where there are none.
 
     own  (n,) motions that count; all if not given
     """
-    machine, moves = intent.machine, intent.moves
+    machine, moves, pieces = intent.machine, intent.moves, plan.pieces
     rows = np.flatnonzero(~pieces.kept & (moves.kind != Kind.DWELL)[pieces.move])
     rows = rows if own is None else rows[own[pieces.move[rows]]]
     if not rows.size:
         return 0.0
     arcs = rows[pieces.arc[rows]]
     round_ = rounding_of_arcs(machine, _turns(moves, pieces, arcs)) if arcs.size else 0.0
-    return max(rounding(machine) + _rounding_of_turns(intent, pieces, rows), round_)
+    corners = 0.5 * machine.least_increment[0] * plan.corners
+    return max(rounding(machine) + _rounding_of_turns(intent, pieces, rows), round_, corners)
 
 
 def rounding_of_arcs(machine: Machine, sweep: Array) -> float:

@@ -88,7 +88,7 @@ class Tally:
     def add(self, program: Program, settled: Settled, own: Mask, machine: Machine) -> None:
         """Take in a part; `own` (n,) motions that were not the last of the part before."""
         moves = settled.moves
-        self.rounding = max(self.rounding, rounding_along(Intent(machine, moves, State()), settled.plan.pieces, own))
+        self.rounding = max(self.rounding, rounding_along(Intent(machine, moves, State()), settled.plan, own))
         lacking = left_by_motion(settled, increments(machine), own)
         self.left = joined(self.left, left_where_they_stand(program, moves, lacking))
         self.unseen += without_figure(moves, settled.kept, lacking.axes if lacking else None, own)
@@ -111,7 +111,7 @@ class Tally:
 
         largest  shift of a linear command, mm
         """
-        self.rounding = max(self.rounding, rounding_along(intent, settled.plan.pieces))
+        self.rounding = max(self.rounding, rounding_along(intent, settled.plan))
         self.moves += len(settled.moves)
         self.compensated += int(np.count_nonzero(~settled.kept))
         self.inserted += settled.emission.added_blocks

@@ -17,6 +17,7 @@ from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import uneasy_starts
 from ncfix.compensate.known import Known
+from ncfix.compensate.offset import beside_contours
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import finite, lengths, picked, some, vector_product
 from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
@@ -108,7 +109,24 @@ def path_error(
     which = np.flatnonzero(chosen & (moves.kind != Kind.DWELL)[pieces.move])
     for part in samples(written, which, density, tilts, known):
         tally.add(part)
+    found = _beside(written, chosen)
+    if found is not None:
+        tally.add(found)
     return tally.result()
+
+
+def _beside(written: Written, chosen: Mask) -> Samples | None:
+    """Where the tool goes beside contours, of pieces `chosen` (m,): for the largest errors, and no share of the way."""
+    moves = written.intent.moves
+    if moves.beside is None:
+        return None
+    last = np.searchsorted(written.pieces.move, np.arange(len(moves)), side="right") - 1
+    found = beside_contours(written.intent, written.segments.rows(last))
+    if found is None:
+        return None
+    shown = chosen[last][found.move]
+    before, after, move = found.before[shown], found.after[shown], found.move[shown]
+    return Samples(move, np.ones(len(move)), before, after, np.zeros(len(move)), 0.0, 0.0) if len(move) else None
 
 
 def samples(

@@ -156,6 +156,9 @@ class Moves:
     counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
     resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`), or that have no
                  words in such a block: rotary axes in many cycles. None: none
+    beside       (n,) radius by which the control offsets the contour to the left of the way, mm: negative to the right,
+                 NaN where it is not known, 0 where nothing is offset. None: nowhere
+    across       (n,) which of X Y Z of the program is normal to the plane of such contours. None: nothing is offset
     passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
     measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
                  and the words stay as they are, since what was measured has the machine's error in it. None: none
@@ -201,6 +204,8 @@ class Moves:
     resting: NDArray[np.bool_] | None = None
     angles: NDArray[np.float64] | None = None
     passing: NDArray[np.int8] | None = None
+    beside: NDArray[np.float64] | None = None
+    across: NDArray[np.int8] | None = None
     call: NDArray[np.int32] | None = None
     calls: tuple[CycleCall, ...] = ()
     spelled: NDArray[np.bool_] | None = None

@@ -223,6 +223,8 @@ LACKING: dict[str, Callable[[Moves], NDArray[Any]]] = {
     "resting": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "measured": lambda moves: np.zeros(moves.end.shape, dtype=np.bool_),
     "passing": lambda moves: np.zeros(len(moves), dtype=np.int8),
+    "beside": lambda moves: np.zeros(len(moves)),
+    "across": lambda moves: np.full(len(moves), 2, dtype=np.int8),
     "fixed_centre": lambda moves: np.zeros(len(moves), dtype=np.bool_),
     "call": lambda moves: np.full(len(moves), -1, dtype=np.int32),
     "counted": lambda moves: np.repeat(moves.incremental[:, None], len(moves.axes), axis=1),

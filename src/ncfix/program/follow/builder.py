@@ -35,6 +35,8 @@ class Style(NamedTuple):
     modal: int
     held: bool = False
     passing: Pass = Pass.NONE
+    beside: float = 0.0
+    across: int = 2
 
 
 DTYPES: dict[str, type[np.generic]] = {
@@ -47,6 +49,8 @@ DTYPES: dict[str, type[np.generic]] = {
     "feed_mode": np.int8,
     "modal": np.int16,
     "passing": np.int8,
+    "beside": np.float64,
+    "across": np.int8,
 }
 """The types of the columns of `Moves` that styles hold; the others are flags."""
 
@@ -240,6 +244,8 @@ class Builder:
         styles: dict[str, Any] = self._style_columns(style)
         if not styles["passing"].any():
             styles["passing"] = None
+        if not styles["beside"].any():
+            styles["beside"] = styles["across"] = None
         programmed, counted = (
             named.take(mask, axis=0, mode="clip"),
             self._mask_column(self._counted, styles["incremental"]),

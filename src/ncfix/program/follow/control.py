@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -29,6 +30,8 @@ TAKEN = (
 ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
 """Why a motion is left as it is, or refused, that moves an axis without naming it."""
 
+RIGHT = 42
+"""The control offsets the contour to the right of the way."""
 SQUARE = 1 - 1e-12
 """A component of a turned axis that is no less lies along the axis itself."""
 
@@ -291,5 +294,12 @@ class Control(Standing):
                 code,
                 self.tilted,
                 passing,
+                self._beside(),
+                modal.plane.across if modal.compensated else 2,
             )
         )
+
+    def _beside(self) -> float:
+        """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""
+        radius = self.tool_radius() if self.modal.compensated else 0.0
+        return -radius if self.modal.compensated == RIGHT and not math.isnan(radius) else radius

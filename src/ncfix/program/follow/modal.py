@@ -102,6 +102,8 @@ class Offsets:
 class Tools:
     """Tool numbers: prepared with T, in the spindle, and of the length offset in force.
 
+    register  the number by which contours get their radius (D), where that is not the tool's
+    cutter    the radius by which contours are offset, mm, where the program says it; NaN where it does not
     lengths   lengths that the program has set (G10 L1), mm
     measured  tools whose length it has set from what is known only at run time
     """
@@ -109,5 +111,7 @@ class Tools:
     selected: int = 0
     spindle: int = 0
     offset: int | None = None
+    register: int | None = None
+    cutter: float = math.nan
     lengths: dict[int, float] = field(default_factory=dict)
     measured: set[int] = field(default_factory=set)

@@ -199,3 +199,11 @@ class Standing(ABC):
             return self.tools.offset, self.offsets.tool[2]
         known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
         return self.tools.spindle, math.nan if known is None else known
+
+    def tool_radius(self) -> float:
+        """The radius by which the control offsets contours, mm; NaN where it is not known."""
+        if not math.isnan(self.tools.cutter):
+            return self.tools.cutter
+        number = self.tool_length()[0] if self.tools.register is None else self.tools.register
+        known = self.knowledge.known_tool_radius(number)
+        return math.nan if known is None else known

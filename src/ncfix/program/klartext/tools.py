@@ -5,6 +5,8 @@ The control applies the length along the tool axis from TOOL CALL on; there is n
 
 from __future__ import annotations
 
+import math
+
 from ncfix.program.follow import tcp
 from ncfix.program.follow.coordinates import Z, zeros
 from ncfix.program.follow.places import mask_of
@@ -31,6 +33,8 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     """TOOL CALL: without a number only speed, feed or oversizes are new."""
     if "F" in words.values:
         control.auto_feed = words.values["F"] * control.unit
+    if tool is None and "DR" in words.values:
+        control.tools.cutter = math.nan
     if tool is None and "DL" not in words.values:
         return
     control.suspended.pop(TOOL, None)
@@ -50,16 +54,20 @@ def call_tool(control: Control, tool: str | float | None, words: Words, flags: f
     control.tool_called = True
     control.tools.offset = control.tools.spindle
     tell_radius(control, words.values.get("DR", 0.0))
+    named = control.setup.named_tools.get(tool.upper()) if isinstance(tool, str) else None
+    if named is not None and named.radius is not None:
+        control.tools.cutter = named.radius + words.values.get("DR", 0.0) * control.unit
     length = length_by_name(control, tool) if isinstance(tool, str) else length_of(control, int(control.tools.spindle))
     set_length(control, length + words.values.get("DL", 0.0) * control.unit)
 
 
 def tell_radius(control: Control, oversize: float) -> None:
-    """Q108 is the radius of the active tool, in the unit of the program."""
+    """Q108 is the radius of the active tool, in the unit of the program; and contours are offset by it."""
     number = int(control.tools.spindle)
     defined = control.defined_tools.get(number, Tool())
     radius = control.knowledge.known_tool_radius(number)
     radius = defined.radius if radius is None else radius
+    control.tools.cutter = math.nan if radius is None else radius + oversize * control.unit
     control.scope.parameters.assign("Q108", (radius or 0.0) / control.unit + oversize, runtime=radius is None)
 
 

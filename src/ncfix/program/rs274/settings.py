@@ -6,6 +6,7 @@ Source: LinuxCNC documentation, "G-codes" and "M70 .. M73".
 from __future__ import annotations
 
 import copy
+import math
 
 from ncfix.program.follow.coordinates import INCH, PLANES
 from ncfix.program.follow.faults import Fault
@@ -77,6 +78,12 @@ def compensation(control: Control, block: Block, code: int) -> None:
             raise Fault(BAD_SETTING, "cutter compensation works in the planes G17 and G18 only")
     if not side:
         control.end_compensation()
+    number, tools = block.values.get("D"), control.tools
+    tools.register, tools.cutter = None, math.nan
+    if number is not None and code % 10:
+        tools.cutter = number / 2 * control.modal.unit
+    elif number is not None:
+        tools.register = round(number)
     control.modal.compensated = side
 
 

@@ -23,6 +23,7 @@ from ncfix.program.follow.places import mask_of
 from ncfix.program.language import Run
 from ncfix.program.moves import Kind, Rule
 from ncfix.program.passing import Pass
+from ncfix.program.setup import Tool
 from ncfix.program.sinumerik import heading
 from ncfix.program.sinumerik.affine import WORLD, shifted
 from ncfix.program.sinumerik.increments import Footing, footings, stand
@@ -330,13 +331,21 @@ class Sinumerik(Control):
 
     def given_length(self, number: int, edge: int = 1) -> float | None:
         """The length of a tool, mm, if the setup gives it."""
+        tool = self._given(number, edge)
+        return None if tool is None else tool.length
+
+    def tool_radius(self) -> float:
+        """As of every control; of the cutting edge in force."""
+        tool = self._given(self.tools.spindle, self.edge)
+        return math.nan if tool is None or tool.radius is None else tool.radius
+
+    def _given(self, number: int, edge: int) -> Tool | None:
+        """A tool with one of its edges, if the setup has it."""
         tools = self.setup.named_tools
         name = self.named.name(number)
         if edge != 1:
-            tool = tools.get(f"{name} D{edge}".upper())
-        else:
-            tool = tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
-        return None if tool is None else tool.length
+            return tools.get(f"{name} D{edge}".upper())
+        return tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
 
     def tool_length(self) -> tuple[int, float]:
         """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown.
