@@ -186,7 +186,7 @@ def test_axes_that_rest_beside_an_offset_contour(machine: Machine, monkeypatch: 
         ways = [rng.uniform(0.01, 0.2) for _ in at]
         at = [value + way * (k % 7 > 0 or axis > 1) for axis, (value, way) in enumerate(zip(at, ways, strict=True))]
         blocks.append("G1 " + " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZBC", at, strict=True)))
-    head = ["%", "G21 G90 G94 G54 G17 F800.", "G0 X20. Y20. Z5. B10. C30.", "G41.1 D2."]
+    head = ["%", "G21 G90 G94 G54 G17 F800.", "G0 X20. Y20. Z5. B10. C30.", "G41"]
     source = "\n".join([*head, *blocks, "G40", "M30", "%", ""]).encode()
     found = streamed(source, machine, 2500)
     assert_as_by_the_long_way(found, source, machine, 2500, OPTIONS, monkeypatch)

@@ -12,6 +12,7 @@ from ncfix.compensate.before import Before, Round
 from ncfix.compensate.crew import Read, Share
 from ncfix.compensate.findings import Mask
 from ncfix.compensate.fix import stamp_of, strays
+from ncfix.compensate.offset import is_offset
 from ncfix.compensate.partition import Part
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.plain_figures import figures
@@ -108,7 +109,7 @@ class Corrector:
 
     def _corrected(self, unit: Unit, number: int, share: Share, foreign: bool) -> Done:
         """Correct a part, hand on what the next one has to know, and prove it; `foreign`: the one before was not."""
-        if unit.head is not None and unit.head.moves.beside is not None:
+        if unit.head is not None and is_offset(unit.head.moves).any():
             raise NotInPartsError("the control offsets a contour from one part into the next")
         course = None if self.planner is None else self.planner.plan(unit)
         agreed = None if course is not None else self._agreed(unit)

@@ -23,7 +23,7 @@ from ncfix.compensate.rows import lengths, picked
 from ncfix.compensate.sampling import interior
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable
-from ncfix.program.moves import Kind
+from ncfix.program.moves import Kind, Moves
 
 NO_WAY = 1e-9
 """mm in the plane; a motion that goes no farther makes no corner."""
@@ -47,7 +47,7 @@ class Beside:
     move      (k,) the motion, or the one that ends at the corner
     before    (k,) mm: how far the tool is off without a correction
     after     (k,) mm: with it
-    corner    (k,) at a corner
+    corner    (k,) at a corner at which the contour turns
     rounding  (k,) what there half a step in each word may do, in half steps
     """
 
@@ -122,6 +122,14 @@ class Course:
         return _unit(way)
 
 
+def is_offset(moves: Moves) -> Mask:
+    """(n,) motions beside which the control takes the tool by a radius that is known."""
+    if moves.beside is None:
+        return np.zeros(len(moves), dtype=bool)
+    offset: Mask = np.nan_to_num(moves.beside) != 0
+    return offset
+
+
 def beside_contours(intent: Intent, real: Segments) -> Beside | None:
     """How far the tool is off beside contours of which its radius is known; None if there are none.
 
@@ -130,7 +138,7 @@ def beside_contours(intent: Intent, real: Segments) -> Beside | None:
     moves = intent.moves
     if moves.beside is None or moves.across is None:
         return None
-    rows = np.flatnonzero((np.nan_to_num(moves.beside) != 0) & (moves.kind != Kind.DWELL) & (moves.kind != Kind.CYCLE))
+    rows = np.flatnonzero(is_offset(moves) & (moves.kind != Kind.DWELL) & (moves.kind != Kind.CYCLE))
     columns = intent.columns
     known = np.isfinite(
         np.hstack([table[rows][:, columns] for table in (moves.start, moves.end, real.start, real.end)])
@@ -200,7 +208,7 @@ def _at_corners(
     ends = [each.at(rows, ones) for each in (intent.segments, real)]
     ways = first.heading(first.end), second.heading(second.start)
     turn = np.arctan2(_dot(np.cross(ways[0], ways[1]), first.up), _dot(ways[0], ways[1]))
-    inner = turn * first.radius > 0
+    inner, sharp = turn * first.radius > 0, np.abs(turn) >= SMOOTH
     half = np.maximum(np.cos(turn / 2), SHARPEST)
     shortest = np.minimum(lengths(first.end - first.start), lengths(second.end - second.start))
     beyond = np.where(inner, 0.0, 2 * np.abs(first.radius) * np.sin(np.abs(turn) / 2) / half)
@@ -221,7 +229,7 @@ def _at_corners(
             _in_tip(intent, rows[wedge], places[0][wedge], each.taken(wedge).beside_heading(at)) for each in pairs[0]
         ]
         sizes = _from_wedge(before, *rays), _from_wedge(after, *rays)
-        found.append(Beside(rows[wedge], *sizes, np.ones(len(wedge), dtype=bool), digits[wedge]))
+        found.append(Beside(rows[wedge], *sizes, sharp[wedge], digits[wedge]))
     # round it, and where the tool comes from and goes on; all the more where nothing meets
     round_ = np.flatnonzero(~inner | leads_in | ~(arrived[0] & arrived[1]))
     for share in (0.0, 0.5, 1.0):
@@ -236,7 +244,7 @@ def _at_corners(
         before, after = _gaps(intent, rows[round_], ones[round_], *places)
         tangent = _in_tip(intent, rows[round_], places[0], np.cross(way, up))
         sizes = _across(before, tangent), _across(after, tangent)
-        found.append(Beside(rows[round_], *sizes, np.ones(len(round_), dtype=bool), np.full(len(round_), 3**0.5)))
+        found.append(Beside(rows[round_], *sizes, sharp[round_], np.full(len(round_), 3**0.5)))
     return found
 
 

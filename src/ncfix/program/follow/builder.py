@@ -246,10 +246,8 @@ class Builder:
             styles["passing"] = None
         if not styles["beside"].any():
             styles["beside"] = styles["across"] = None
-        programmed, counted = (
-            named.take(mask, axis=0, mode="clip"),
-            self._mask_column(self._counted, styles["incremental"]),
-        )
+        programmed = named.take(mask, axis=0, mode="clip")
+        counted = self._mask_column(self._counted, styles["incremental"])
         angles = self._keep_whole(styles, programmed, counted, start, end, block)
         centre, normal, sweep = self._arc_columns(len(block))
         return Moves(
