@@ -217,9 +217,9 @@ def siemens_leads(head: str, words: Sequence[str], mode: int) -> bool:
         return False
     if head.startswith(("CYCLE", "G74")):
         return head.startswith("CYCLE") or any(word[0] in "XYZ" for word in words)
-    starts = {re.match(r"[A-Z]+\d?", word)[0] for word in words}
+    starts = {re.match(r"[A-Z]+(?:\d(?==))?", word)[0] for word in words}
     circle = (head in ("G2", "G3") or (mode == 1 and head == "")) and starts & {"I", "J", "AR", "CR", "TURN"}
-    through = (head == "CIP" or (mode == 2 and head == "")) and starts & {"I1", "J1", "K1"}
+    through = (head == "CIP" or (mode == 2 and head == "")) and starts & {"I1", "J1", "K1", "I", "J", "K", "AR", "CR"}
     return bool(starts & {"X", "Y", "Z", "AP", "RP", "POS", "PO", "ANG"} or circle or through)
 
 

@@ -289,7 +289,7 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
 def is_circle(control: Sinumerik, words: Words) -> bool:
     """An arc with no end point: it ends where it began, or where its angle leads."""
     if control.modal.motion == motion.CIP:
-        return not words.values.keys().isdisjoint(VIA)
+        return not words.values.keys().isdisjoint((*VIA, *CIRCLE))
     return control.modal.motion in (20, 30) and bool(words.values.keys() & CIRCLE)
 
 
