@@ -13,6 +13,7 @@ from ncfix.machine import Machine, load
 from ncfix.program.moves import Moves
 from ncfix.program.reader import read
 from ncfix.program.setup import Setup, Tool
+from ncfix.program.trace import trace
 
 SETUP = Setup(assume_zero=True, no_point="calculator", tools={number: Tool(80.0, 3.0) for number in (0, 1)})
 ALIKE = "X40. Y5.\nX40. Z-10.\nX40. Y5. Z-90.\nG91 X0. Z20.\nG90 Z-30.\nX40. Y5.\nY40.\nG40 X60.\n"
@@ -69,3 +70,31 @@ def test_both_lanes_agree(name: str, machine: Machine) -> None:
     assert single.resting is not None
     assert np.array_equal(many.resting, single.resting)
     assert 20 < many.resting.any(axis=1).sum() < 60
+
+
+@pytest.mark.parametrize(
+    ("dialect", "text", "radius"),
+    [
+        ("fanuc", "G43 H1 Z9. D7\nG41 G1 X10. Y10. F100.\nX20.\nG40 X30.\nM30\n", 6.0),
+        ("fanuc", "D7\nG41 D1 G1 X10. Y10. F100.\nX20.\nG40 X30.\nM30\n", 5.0),
+        ("fanuc", "G43 H1 Z9.\nG41 G1 X10. Y10. F100.\nX20.\nG40 X30.\nM30\n", None),
+        ("fanuc", "D#500\nG41 G1 X10. Y10. F100.\nX20.\nG40 X30.\nM30\n", None),
+        ("siemens", "T1 D1\nM6\nOFFN=0.5\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM30\n", 5.5),
+        ("siemens", "T1 D1\nM6\nOFFN=$AA_IW[X]\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM30\n", None),
+        ("linuxcnc", "T1 M6\nG41 G1 X10 Y10 F100\nX20\nG40 X30\nM2\n", 5.0),
+        ("linuxcnc", "T1 M6\nG42.1 D8 G1 X10 Y10 F100\nX20\nG40 X30\nM2\n", -4.0),
+    ],
+)
+def test_the_radius_of_contours(dialect: str, text: str, radius: float | None) -> None:
+    """What contours are offset by is what D, the tool or an allowance says, whichever block says it."""
+    setup = Setup(assume_zero=True, no_point="calculator", tools={1: Tool(100.0, 5.0), 7: Tool(0.0, 6.0)})
+    program = read(
+        ("G21 G90 G17 G0 X0. Y0. Z9.\n" if dialect != "siemens" else "G0 X0 Y0 Z9\n").encode() + text.encode(),
+        "part",
+        dialect,
+    )
+    moves = trace(program, setup, tuple("XYZ"), frozenset()).moves
+    assert moves.beside is not None
+    offsets = moves.beside[moves.beside != 0]
+    assert len(offsets) == 2
+    assert np.isnan(offsets).all() if radius is None else np.allclose(offsets, radius)

@@ -34,6 +34,7 @@ from ncfix.program.rs274.settings import (
     distance,
     plane,
     retract,
+    select_radius,
     spindle_or_state,
     unfollowed,
     units,
@@ -46,8 +47,8 @@ Step = Callable[[Control, Block, int], None]
 FIRST: tuple[tuple[str, Step], ...] = ((groups.FEED_MODE, feed_mode),)
 """What comes before the words F, S and T, by G group."""
 
-WORDS: tuple[tuple[str, Step], ...] = (("F", feed), ("S", speed), ("T", select_tool))
-"""F, S and T."""
+WORDS: tuple[tuple[str, Step], ...] = (("F", feed), ("S", speed), ("T", select_tool), ("D", select_radius))
+"""F, S, T and D."""
 
 INPUTS = 5399
 """The parameter in which M66 leaves what it read."""

@@ -68,6 +68,10 @@ def retract(control: Control, block: Block, code: int) -> None:
     control.modal.retract_to_r = code == 990
 
 
+NO_REGISTER = -1
+"""The D of a program that has named none: no tool has this number, so the radius is not known."""
+
+
 def compensation(control: Control, block: Block, code: int) -> None:
     """G40 to G42.1: the programmed contour is followed, the control offsets it."""
     side = 0 if code == 400 else code // 10
@@ -79,12 +83,22 @@ def compensation(control: Control, block: Block, code: int) -> None:
     if not side:
         control.end_compensation()
     number, tools = block.values.get("D"), control.tools
-    tools.register, tools.cutter = None, math.nan
+    tools.cutter = math.nan
+    if control.rules.strict:
+        tools.register = None
+    elif side and tools.register is None:
+        tools.register = NO_REGISTER
     if number is not None and code % 10:
         tools.cutter = number / 2 * control.modal.unit
     elif number is not None:
         tools.register = round(number)
     control.modal.compensated = side
+
+
+def select_radius(control: Control, block: Block, code: int) -> None:
+    """D, by which ISO controls know the radius of the cutter from there on; LinuxCNC takes it beside G41 only."""
+    if not control.rules.strict:
+        control.tools.register = NO_REGISTER if "D" in block.runtime else round(block.values["D"])
 
 
 def unfollowed(control: Control, block: Block, code: int) -> None:

@@ -51,6 +51,7 @@ class Sinumerik(Control):
     lost        letter index -> why that coordinate of the program's frame is not known
     over        rotary axes that the last motion took past a full turn
     edge        cutting edge in force (D), 0 for none
+    allowance   what contours are offset by besides the radius of the tool (OFFN), mm; NaN where that is not known
     at_start    the tool is still that with which the program began, with its edge D1
     whole       the motion must not be split
     cornered    the last motion ended at a corner that the control rounds or breaks
@@ -72,6 +73,7 @@ class Sinumerik(Control):
         self.lost: Unknown = {}
         self.over: tuple[int, ...] = ()
         self.edge = 0
+        self.allowance = 0.0
         self.at_start = True
         self.fresh_tool = self.changed_by_cycle = False
         self.pattern: tuple[tuple[float, float], ...] = ()
@@ -335,9 +337,9 @@ class Sinumerik(Control):
         return None if tool is None else tool.length
 
     def tool_radius(self) -> float:
-        """As of every control; of the cutting edge in force."""
+        """As of every control; of the cutting edge in force, and with the allowance of the contour (OFFN)."""
         tool = self._given(self.tools.spindle, self.edge)
-        return math.nan if tool is None or tool.radius is None else tool.radius
+        return math.nan if tool is None or tool.radius is None else tool.radius + self.allowance
 
     def _given(self, number: int, edge: int) -> Tool | None:
         """A tool with one of its edges, if the setup has it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -272,6 +273,9 @@ def finish_block(control: Sinumerik, turn: Turn) -> None:
         return
     framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
     feed(control, turn)
+    if "OFFN" in words.values:
+        allowance = words.values["OFFN"]
+        control.allowance = math.nan if allowance is None else control.modal.unit * allowance
     if "RNDM" in words.values:
         control.modes.rounds = words.values["RNDM"] != 0.0
     if motion.REFERENCE.keys().isdisjoint(plan.g):
