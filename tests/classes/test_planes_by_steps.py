@@ -124,7 +124,7 @@ def test_another_length_moves_x_and_y_of_a_plane_to_which_the_tool_is_not_square
     moves = follow(program, machine, known).trace.moves
     plunge = text.split("\n").index("G1 Z0. F200.") + 1
     rules = {program.line(block): rule for block, rule in zip(moves.block.tolist(), moves.rule.tolist(), strict=True)}
-    assert rules[plunge] == Rule.PASS
+    assert rules[plunge] == Rule.REFUSE  # X and Y have not been said since, and it cuts
 
 
 def test_the_end_of_a_tilt_that_has_not_begun_asks_for_nothing(machine: Machine) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from measure.poses import machine, perfect, plan
 from ncfix.diagnose import result, words
+from ncfix.diagnose.carriers import ALONG
 from ncfix.diagnose.catalogue import catalogue, without
 from ncfix.diagnose.checks import remarks
 from ncfix.diagnose.diagnosis import AMBIGUOUS, FOUND, NOTHING, Diagnosis, diagnose
@@ -66,7 +67,7 @@ def test_the_result_has_the_fields_of_the_contract(backlash: Diagnosis) -> None:
     assert wanted <= set(found["effects"][0])
     assert found["findable_um"]["backlash X"] <= 3.0  # 150 poses, 2 um of noise
     assert found["effects"][0]["plausible"]["is"]
-    assert found["effects"][0]["targets"] == ["fix", "export linuxcnc", "export fanuc-pitch", "export siemens"]
+    assert found["effects"][0]["targets"] == ["fix", *(f"export {name}" for name in ALONG)]
     assert result.with_provenance(backlash).provenance["added"] == "backlash X"
 
 
