@@ -207,7 +207,7 @@ class Tnc:
         elif name.startswith("CYCL CALL") or 99 in codes or ((self.modal or 89 in codes) and (axes or polar)):
             self.modal = (self.modal or 89 in codes) and 99 not in codes
             self.hole(self.led(axes, polar), by_height="POS" in name)
-        elif axes or polar:
+        elif axes or polar or name == "C":
             sense = -1 if "DR-" in block else 1 if "DR+" in block else 0
             self.path(name, self.led(axes, polar), words, sense, fast=bool(re.search(r"F\s*MAX", block)))
         return bool(codes & {2, 30})

@@ -108,6 +108,7 @@ class Maker:
             [f"CC {xy(pole - at, 'I')}", f"C {xy(end - at, 'I', 4)} {word}"],
             [f"CC {xy(pole)}", f"C {xy(2 * pole - at, digits=4)} {word}"],
             [f"CC {xy(pole)}", f"C {xy(at, digits=6)} {word}"],
+            [f"CC {xy(pole)}", f"C {word}"],
             [f"CR {xy(end)} R{radius:+.3f} {word}"],
             [f"CC {xy(pole)}", f"CP IPA{sense * angle:+.3f} {word}"],
             [f"CC {xy(pole)}", f"CP PA{angle:+.3f} {word}"],
