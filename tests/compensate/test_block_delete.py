@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from ncfix.compensate.checking import check_on
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import traced
 from ncfix.diagnostics import RefusedError, SourceError, UsageError
 from ncfix.machine import Machine, load
@@ -172,3 +174,20 @@ def test_check_looks_at_both_positions(machine: Machine) -> None:
     text = RETRACTED.replace("G1 X20 Y25 Z0", "G1 X20")
     found = check_on(read(text.encode(), "p.ngc", "linuxcnc"), machine, SETUP)
     assert {"NCF235", "NCF451"} <= {each.code for each in found.findings}
+
+
+VARIABLE = (
+    "o1 sub\nG1 X#1 Y#2 F200\no1 endsub\n#3=80\nG0 X0 Y0 Z10\nG1 Z0 F100\n"
+    "o1 call [10] [5]\n/#3=20\no1 call [#3] [25]\nM2\n"
+)
+
+
+def test_a_flat_program_would_have_the_numbers_of_one_position(machine: Machine) -> None:
+    program = read(VARIABLE.encode(), "p.ngc", "linuxcnc")
+    both = fix_flat(program, machine, SETUP, FixOptions())
+    assert both.report.refused
+    assert "NCF447" in [warning.code for warning in both.report.warnings]
+    for skipped, end in ((True, "X80"), (False, "X20")):
+        one = fix_flat(program, machine, replace(SETUP, block_skip=skipped), FixOptions())
+        assert not one.report.refused
+        assert end in one.text.decode() or f"X{int(end[1:]) - 1}.9" in one.text.decode()

@@ -189,6 +189,12 @@ CODES = {
         "`--block-skip on` or `off`, if the switch always stands so; or fewer blocks with `/` that change modes, "
         "poles, frames or where arcs begin.",
     ),
+    "NCF447": Code(
+        "not written out flat",
+        "A program with / lines has to be right with block delete on and off. Written out flat it would have the numbers "
+        "of one of these positions in it, also in blocks that both execute.",
+        "Say --block-skip on or off: the stamp says which one the program is for.",
+    ),
     "NCF446": Code(
         "length offset that is no length",
         "The length offset in force is below zero: a distance by which the tool was touched off, or one that is taken "

@@ -20,6 +20,7 @@ from ncfix.program.setup import Setup
 from ncfix.program.tree import Program
 
 FLATTENED = "NCF445"
+ONE_POSITION = "NCF447"
 
 
 def fix_flat(
@@ -27,12 +28,17 @@ def fix_flat(
 ) -> Fixed:
     """As `fix_program`; where that refuses motions, the program is written out flat and corrected so.
 
-    The flat program is kept only if it helps. The report speaks of the lines of the original.
+    The flat program is kept only if it helps. The report speaks of the lines of the original. A flat program has the
+    numbers of one position of block delete, so a program that is to be right in several stays as it is.
     Raises what `fix_program` and `flatten` raise.
     """
     fixed = fix_program(program, machine, setup, options, resolve)
     if not fixed.report.refused:
         return fixed
+    if len(fixed.report.block_delete) > 1:
+        text = "not written out flat: its numbers would be those of one position of block delete"
+        note = Message(ONE_POSITION, text, Place(program.path), "--block-skip on or off says which one")
+        return replace(fixed, report=replace(fixed.report, warnings=(note, *fixed.report.warnings)))
     steps = steps_of(machine)
     flat = flatten(program, setup, machine.axis_names, rotary_names(machine), steps, resolve, kinematics_of(machine))
     again = fix_program(flat.program, machine, setup, options, resolve)
