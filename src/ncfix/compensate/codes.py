@@ -191,8 +191,8 @@ CODES = {
     ),
     "NCF447": Code(
         "not written out flat",
-        "A program with / lines has to be right with block delete on and off. Written out flat it would have the numbers "
-        "of one of these positions in it, also in blocks that both execute.",
+        "A program with / lines has to be right with block delete on and off. Written out flat it would have the "
+        "numbers of one of these positions in it, also in blocks that both execute.",
         "Say --block-skip on or off: the stamp says which one the program is for.",
     ),
     "NCF446": Code(
