@@ -139,7 +139,7 @@ def test_one_set_of_one_setting_says_what_it_hides(good: Measurement) -> None:
 
 def test_one_target_of_a_tracker_does_not_show_angles() -> None:
     """Of the last axis of its body: what a turn does to one point, shifts do too. Three targets tell them apart."""
-    poses = plan(FIVE, "tool", ROWS)
+    poses = plan(FIVE, "tool", ROWS).with_header("carried_by", "spindle")  # in tools of two lengths one is two points
     alone = poses.rows([row for row, target in enumerate(poses.labels["target"]) if target == "1"])
     held = []
     for each in (alone, poses):

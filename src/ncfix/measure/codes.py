@@ -190,7 +190,8 @@ CODES = {
         "targets whose place the readings leave open",
         "Where only linear axes move what carries the targets, readings show how targets lie to each other, not where "
         "they are. Angles act on them by levers, so that estimated angles and displacements go with the place that was "
-        "taken: as near the tip of a tool of no length, or the origin of the workpiece, as the readings allow.",
+        "taken: as near the tip of the row's `tool_length`, or the base origin (`carried_by: spindle` or `workpiece`), "
+        "as the readings allow.",
         "A line `# target: NAME x y z` in the header says where one of them nearly is.",
     ),
 }

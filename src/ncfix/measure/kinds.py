@@ -89,6 +89,6 @@ CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
         "length": ("known", "unknown", "none"),
     },
     "frame": {"tcp": ("workpiece", "base"), "tcp6": ("workpiece", "base"), "points": ("instrument", "base")},
-    "carried_by": {"points": ("tool", "workpiece")},
+    "carried_by": {"points": ("tool", "spindle", "workpiece")},
 }
 """What a header line may say, by kind; the first is the default."""

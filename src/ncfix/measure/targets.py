@@ -2,6 +2,9 @@
 
 A laser tracker reads x = Q (B p) + s: p the target's place on its body, B the body's real pose in the base frame, Q and
 s how the instrument stands. Places and stand are unknown. Three or more targets show all six errors of a body.
+
+Places are those in the base frame with all axes at zero. A target that the tool carries is there with the tool of its
+first row; a longer one moves it away from the spindle along the tool. One on the spindle head stays where it is.
 """
 
 from __future__ import annotations
@@ -33,9 +36,11 @@ class Targets(Observation):
         self.body, self.axes = branch(machine, self.side)
         self.own = self.q[:, self.axes]
         direction = np.asarray(self.state.direction)[:, self.axes]
-        self.own_state = State(0.0, direction, {**self._other_axes(), **self.state.inputs})
-        self.poses = self._base_from_body(self.body.nominal(self.own, 0.0))
+        self.lengths = measurement.column("tool_length")
+        self.own_state = State(self.lengths, direction, {**self._other_axes(), **self.state.inputs})
         self.names, self.index = groups(measurement.labels["target"])
+        self.first_tip = self.body.tool.tip(self.lengths[np.unique(self.index, return_index=True)[1]])
+        self.poses = self._base_from_body(self.body.nominal(self.own, self.lengths))
         self.set_names, self.set_index = groups(measurement.sets)
         stated = self._stated()
         known = np.array([name in stated for name in self.names])
@@ -73,7 +78,7 @@ class Targets(Observation):
 
     def design(self, effects: Sequence[Effect]) -> Array:
         """See `Observation`; the errors of the other branch are not seen."""
-        joints = {axis.name for axis in self.body.axes} | ({"S"} if self.side == TOOL else set())
+        joints = {axis.name for axis in self.body.axes} | (set() if self.side == WORKPIECE else {"S"})
         parts = [np.zeros((3 * len(self.measurement), 0))]
         for effect in effects:
             seen = effect.joint in joints
@@ -110,22 +115,20 @@ class Targets(Observation):
         return parts[0], parts[1], parts[2]
 
     def _base_from_body(self, poses: Array) -> Array:
-        """base_from_body; the tool branch's zero pose is made the identity."""
-        if self.side == WORKPIECE:
-            return se3.inverse(poses)
-        tip = self.machine.tool.tip(np.zeros(()))
-        return poses @ se3.shift(-np.asarray(tip))
+        """base_from_body of poses (n, 4, 4) of each row's tip; with all axes at zero places are those in the base."""
+        tips = self.first_tip[self.index] if self.side == TOOL else self.body.tool.tip(self.lengths)
+        shifted: Array = poses @ se3.shift(-tips)
+        return se3.inverse(shifted) if self.side == WORKPIECE else shifted
 
     def _columns(self, effect: Effect) -> Array:
         """What one effect moves, seen from the instrument at its first guess: (m, k)."""
         error = self.body.design(self.own, self.own_state, [effect])
         places = self.places[self.index]
+        at = self.body.nominal(self.own, self.lengths)[:, :3, 3]
         if self.side == WORKPIECE:
-            at = self.body.nominal(self.own, 0.0)[:, :3, 3]
             moved = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(places - at), error[:, 3:])
             base = -np.einsum("nij,njk->nik", self.poses[:, :3, :3], moved)
         else:
-            at = self.body.nominal(self.own, 0.0)[:, :3, 3]
             points = np.einsum("nij,nj->ni", self.poses[:, :3, :3], places) + self.poses[:, :3, 3]
             base = error[:, :3] + np.einsum("nij,njk->nik", -se3.skew(points - at), error[:, 3:])
         seen = np.einsum("nij,njk->nik", self.stands[self.set_index][:, :3, :3], base)
@@ -139,7 +142,8 @@ class Targets(Observation):
 
     def _first_guess(self, stated: dict[str, list[float]]) -> tuple[Array, Array]:
         """Stand per set (s, 4, 4) and places (t, 3): from the header, and from a perfect machine's motions."""
-        places = np.array([stated.get(name, [0.0, 0.0, 0.0]) for name in self.names])
+        likely = self.first_tip if self.side == TOOL else np.zeros_like(self.first_tip)
+        places = np.array([stated.get(name, place) for name, place in zip(self.names, likely.tolist(), strict=True)])
         if not all(name in self.measurement.columns for name in READ):
             return np.broadcast_to(np.eye(4), (len(self.set_names), 4, 4)).copy(), places
         along_base = self.measurement.header("frame") == "base"
