@@ -7,8 +7,8 @@ hardly ever look like one of these few, a mistake is explained by it nearly all.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -30,6 +30,8 @@ LIKELY = 0.5
 """The same where the file itself looks like a mistake: positions out of range or like radians, errors like um."""
 LARGE = 2.5
 """Squares a value, in units of the noise, below which there is nothing to explain."""
+WORTH = 0.95
+"""Squares left by one more set of the other sign, of those before, up to which the next is looked for."""
 ENOUGH = 600
 """Rows of a file that are looked at."""
 MOST_SETS = 12
@@ -40,9 +42,12 @@ TURN_RAD = 2 * np.pi + 0.01
 
 @dataclass(frozen=True)
 class Suspect:
-    """A mistake that may have been made in one file: what it is, how to repair it, and the file without it.
+    """A mistake that may have been made in a file, or in several alike: what it is, how to repair it, and the files
+    without it.
 
+    file    the first of them
     scaled  lengths of these values of the file (m,) may be longer by a common factor
+    others  the other files without the same mistake
     """
 
     text: str
@@ -50,6 +55,7 @@ class Suspect:
     file: int
     measurement: Measurement
     scaled: Array | None = None
+    others: Mapping[int, Measurement] = field(default_factory=dict)
 
 
 def suspected(problem: Problem) -> tuple[Message, ...]:
@@ -60,11 +66,12 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
         return ()
     tried = []
     for each in _suspects(data, problem.machine):
-        changed = [*data[: each.file], each.measurement, *data[each.file + 1 :]]
+        repaired = {each.file: each.measurement, **each.others}
+        changed = [repaired.get(file, measurement) for file, measurement in enumerate(data)]
         left = _left(changed, problem, each)
         if left is not None:
             tried.append((left[0] / max(left[1], 1), each))
-    exchanged = [each for file in range(len(data)) for each in _exchanged(data, file, problem)]
+    exchanged = [*_exchanged(data, problem), *_negated(data, problem)]
     count = len(tried) + sum(each[2] for each in exchanged)
     tried += [(size / max(now[1], 1), each) for size, each, _ in exchanged]
     if not tried:
@@ -110,11 +117,16 @@ def _left(data: Sequence[Measurement], problem: Problem, suspect: Suspect | None
 
 
 def _suspects(data: Sequence[Measurement], machine: Machine) -> Iterator[Suspect]:
+    alike: dict[str, list[Suspect]] = {}
     for file, measurement in enumerate(data):
-        yield from _units(file, measurement, machine)
-        yield from _turned(file, measurement, machine)
-        yield from _swapped(file, measurement, machine)
+        for make in (_units, _turned, _swapped):
+            for each in make(file, measurement, machine):
+                alike.setdefault(each.text, []).append(each)
+                yield each
         yield from _series(file, measurement, len(data))
+    for first, *others in alike.values():
+        if others:
+            yield replace(first, others={each.file: each.measurement for each in others})
 
 
 def _units(file: int, measurement: Measurement, machine: Machine) -> Iterator[Suspect]:
@@ -180,34 +192,92 @@ def _series(file: int, measurement: Measurement, files: int) -> Iterator[Suspect
             yield Suspect(text, "which way was the instrument set up there?", file, measurement.with_columns(columns))
 
 
-def _exchanged(data: Sequence[Measurement], file: int, problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
-    """The measured columns of a file in the order and with the signs that leave least; the squares, of how many."""
-    measurement = data[file]
-    if measurement.kind != "tcp":
-        return
-    seen = Problem.of(data, problem.machine, problem.selection)
-    observation = seen.observations[file]
-    size = len(observation.components)
-    columns = orthonormal(np.concatenate([seen.design, seen.nuisance(seen.start)], axis=1) / seen.sigma[:, None])
-    known = seen.values - seen.residual(problem.selection.start, seen.start)
-    first = sum(len(each.values) for each in seen.observations[:file])
-    mine = slice(first, first + len(observation.values))
-    rows = observation.values.reshape(-1, size)
+@dataclass(frozen=True)
+class _Readings:
+    """What is left of other readings of the same positions: positions, effects and set-ups stay, so this is linear."""
 
-    def left(order: tuple[int, ...], signs: tuple[int, ...]) -> float:
-        values = seen.values.copy()
-        values[mine] = (rows[:, order] * signs).ravel()
-        rest = np.abs(without(columns, (values - known) / seen.sigma))
+    seen: Problem
+    columns: Array
+    known: Array
+
+    @staticmethod
+    def of(data: Sequence[Measurement], problem: Problem) -> _Readings:
+        seen = Problem.of(data, problem.machine, problem.selection)
+        columns = np.concatenate([seen.design, seen.nuisance(seen.start)], axis=1) / seen.sigma[:, None]
+        known = seen.values - seen.residual(problem.selection.start, seen.start)
+        return _Readings(seen, orthonormal(columns), known)
+
+    def left(self, values: Array) -> float:
+        """The squares, as `_left` counts them."""
+        rest = np.abs(without(self.columns, (values - self.known) / self.seen.sigma))
         most = max(4 * float(np.median(rest)) / 0.6745, 1e-12)
         return float((np.minimum(rest, most) ** 2).sum())
 
+    def part(self, file: int) -> slice:
+        """Where the values of a file are."""
+        first = sum(len(each.values) for each in self.seen.observations[:file])
+        return slice(first, first + len(self.seen.observations[file].values))
+
+
+def _exchanged(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
+    """The measured columns of a file, or of all, in the order and with the signs that leave least; of how many."""
+    files = [file for file, measurement in enumerate(data) if measurement.kind == "tcp"]
+    if not files:
+        return
+    readings = _Readings.of(data, problem)
+    names = readings.seen.observations[files[0]].components
+    size = len(names)
     ways = list(product(permutations(range(size)), product((1, -1), repeat=size)))
-    tried = {way: left(*way) for way in ways if way != (tuple(range(size)), (1,) * size)}
-    least = min(tried.values())
-    close = [(way, squares) for way, squares in tried.items() if squares <= ALIKE * least]
-    (order, signs), squares = min(close, key=lambda pair: (_changes(*pair[0]), pair[1]))
-    names = observation.components
-    yield squares, replace(_look(names, order, signs), file=file, measurement=measurement), len(ways)
+    for together in [[file] for file in files] + ([files] if len(files) > 1 else []):
+        tried = {}
+        for order, signs in ways[1:]:
+            values = readings.seen.values.copy()
+            for file in together:
+                mine = readings.part(file)
+                values[mine] = (values[mine].reshape(-1, size)[:, order] * signs).ravel()
+            tried[order, signs] = readings.left(values)
+        least = min(tried.values())
+        close = [(way, squares) for way, squares in tried.items() if squares <= ALIKE * least]
+        (order, signs), squares = min(close, key=lambda pair: (_changes(*pair[0]), pair[1]))
+        look = _look(names, order, signs)
+        yield squares, replace(look, file=together[0], measurement=data[together[0]]), len(ways)
+
+
+def _negated(data: Sequence[Measurement], problem: Problem) -> Iterator[tuple[float, Suspect, int]]:
+    """Several sets that were read with the other sign: the one that helps most, then the next, as long as one does."""
+    kinds = ("tcp", "tcp6", "axis")
+    every = [
+        (file, name)
+        for file, measurement in enumerate(data)
+        if measurement.kind in kinds
+        for name in list(dict.fromkeys(measurement.sets))[:MOST_SETS]
+    ]
+    if len(every) < 3:
+        return
+    readings = _Readings.of(data, problem)
+    signs: dict[tuple[int, str], Array] = {}
+    for file, name in every:
+        observation = readings.seen.observations[file]
+        there = np.array([each == name for each in data[file].sets])
+        sign = np.ones(len(readings.seen.values))
+        sign[readings.part(file)] = np.where((observation.rows >= 0) & there[observation.rows], -1.0, 1.0)
+        signs[file, name] = sign
+    values, least = readings.seen.values, readings.left(readings.seen.values)
+    turned: list[tuple[int, str]] = []
+    tries = 0
+    while len(turned) < len(every) // 2:
+        tried = {each: readings.left(values * sign) for each, sign in signs.items() if each not in turned}
+        tries += len(tried)
+        best = min(tried, key=lambda each: tried[each])
+        if tried[best] > WORTH * least:
+            break
+        values, least = values * signs[best], tried[best]
+        turned.append(best)
+    if len(turned) > 1:
+        names = ", ".join(name for _, name in sorted(turned))
+        text = f"the readings of sets {names} have the other sign than the others"
+        file = min(turned)[0]
+        yield least, Suspect(text, "which way was the instrument set up there?", file, data[file]), tries
 
 
 def _changes(order: tuple[int, ...], signs: tuple[int, ...]) -> int:
