@@ -85,6 +85,7 @@ MISTAKES: dict[str, dict[str, Callable[[str], tuple[Change, ...]]]] = {
         "an axis turned round": lambda t: (times([turning(t)], -1),),
         "a set of the other sign": lambda t: (one_set(times(SHIFTS, -1)),),
         "two sets of the other sign": lambda t: (two_sets(times(SHIFTS, -1)),),
+        "positions exchanged": lambda t: (exchanged("X", "Y"),),
         "nothing measured": lambda t: (filled(SHIFTS, "0.0"),),
         "every row a set": lambda t: (each_its_set,),
     },

@@ -32,6 +32,12 @@ LARGE = 2.5
 """Squares a value, in units of the noise, below which there is nothing to explain."""
 WORTH = 0.95
 """Squares left by one more set of the other sign, of those before, up to which the next is looked for."""
+GATHERED_MM = 1.0
+"""Tips of a set that are nearer to each other were on a ball: errors and a ball's place are far smaller."""
+GATHERED = 0.05
+"""Of the spread of the tips as the file has them: what is left where a mistake was undone."""
+ROWS = 5
+"""Rows of a set from which on it can be said whether its tips stay where they are."""
 ENOUGH = 600
 """Rows of a file that are looked at."""
 MOST_SETS = 12
@@ -61,6 +67,9 @@ class Suspect:
 def suspected(problem: Problem) -> tuple[Message, ...]:
     """NCF617: the mistake that explains the readings, if one does far better than the files as they are."""
     data = [_thinned(each.measurement) for each in problem.observations]
+    scattered = _scattered(data, problem.machine)
+    if scattered:
+        return scattered
     now = _left(data, problem)
     if now is None or (now[0] < LARGE * now[1] and problem.noise_known):
         return ()
@@ -85,6 +94,31 @@ def suspected(problem: Problem) -> tuple[Message, ...]:
     return (
         Message("NCF617", f"{found.text}: that explains {100 * (1 - ratio):.0f} % of what is left", place, found.hint),
     )
+
+
+def _scattered(data: Sequence[Measurement], machine: Machine) -> tuple[Message, ...]:
+    """NCF617: the tips of each set stay at one place, as on a ball, but only once the positions are repaired.
+
+    This needs no reading: where errors hardly depend on these positions, no fit would tell.
+    """
+    for each in _suspects(data, machine):
+        before = data[each.file]
+        if before.kind != "tcp" or each.measurement is before:
+            continue
+        after = _spread(each.measurement, machine)
+        if after < GATHERED_MM and after < GATHERED * _spread(before, machine):
+            text = f"{each.text}: the tip stays at one place in each set then, as on a ball, and goes about as it is"
+            return (Message("NCF617", text, before.place(0), each.hint),)
+    return ()
+
+
+def _spread(measurement: Measurement, machine: Machine) -> float:
+    """How far the tips are from the middle of their set, the median over sets of the root mean square, mm."""
+    tips = machine.tip(measurement.positions(machine), measurement.column("tool_length"))
+    names = np.array(measurement.sets)
+    every = [tips[names == name] for name in dict.fromkeys(measurement.sets)]
+    large = [each - each.mean(axis=0) for each in every if len(each) >= ROWS]
+    return float(np.median([np.sqrt((each**2).sum(axis=1).mean()) for each in large])) if large else np.inf
 
 
 def _thinned(measurement: Measurement) -> Measurement:
