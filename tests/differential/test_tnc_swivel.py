@@ -28,6 +28,7 @@ SETUP = Setup(
     work_offsets={f"PRESET{row or ''}": dict(zip("XYZ", place, strict=True)) for row, place in PRESETS.items()},
     tools={number: Tool(length, 3.0) for number, length in LENGTHS.items()},
     initial={"X": 0.0, "Y": 0.0, "Z": 300.0, "B": 0.0, "C": 0.0},
+    block_skip=False,
 )
 SEEDS = (100, 103, 105)
 

@@ -172,6 +172,9 @@ def test_what_is_nearly_unobservable_is_held_and_named() -> None:
     rounded = data.with_columns({"radius": np.round(data.columns["radius"][:1], 3).repeat(300)})
     for each in (data, rounded, _on_a_sphere(known)):
         found = calibrate([each.with_header("setup", "unknown")], known, "EXX,EYY,EZZ")
+        if refusals(found, []):  # the radius is rounded by far more than its noise: nothing is written
+            assert each is rounded
+            continue
         at = 0
         for effect in found.problem.selection.estimated:
             size = np.abs(found.estimate.coefficients[at : at + effect.basis.size])

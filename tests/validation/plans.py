@@ -15,7 +15,7 @@ import numpy as np
 from measure.poses import machine
 from ncfix.machine import Machine
 from ncfix.measure.calibrate import Problem
-from ncfix.measure.candidates import Room, at_balls, candidates
+from ncfix.measure.candidates import Room, at_balls, candidates, has_r_test, r_test
 from ncfix.measure.measurement import Measurement
 from ncfix.measure.observe import observe
 from ncfix.measure.plan import CANDIDATES, Planned, plan, pool_of
@@ -96,7 +96,9 @@ class Comparison:
 
 
 def random_poses(case: Case, seed: int) -> Measurement:
-    """Poses drawn evenly over the travels; for probing those that reach a ball drawn at random."""
+    """Poses drawn evenly over the travels; for probing and R-tests those that reach a ball drawn at random."""
+    if case.kind == "tcp" and has_r_test(case.known):
+        return r_test(case.known, COUNT, case.room, seed)
     known, random = case.known, np.random.default_rng(seed)
     count = 20 * COUNT if case.kind == "probe" else COUNT
     columns = {axis.name: random.uniform(*case.room.of(axis), count) for axis in known.axes}
