@@ -39,7 +39,7 @@ ROUNDING = 1e-9
 
 HOPELESS = 240.0
 """A coefficient whose standard deviation is so many times what is much is held. What is held leads the others astray by
-what it really is, so this is beyond all that can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
+what it really is, so this is beyond what can be told together (Esmaeili 2021, 84 errors by 109 probings: 200 times),
 and before single ones come out as centimetres, since only their sum is seen."""
 
 
