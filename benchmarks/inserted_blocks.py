@@ -18,10 +18,10 @@ from pathlib import Path
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.proof import SelfCheckError
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 ROOT = Path(__file__).resolve().parent.parent
 MACHINE = Path(__file__).with_name("five_axis.toml")

@@ -3,8 +3,8 @@
 import sys
 from itertools import islice
 
-from ncfix.program import dialects
-from ncfix.program.grammar import parse, squeeze
+from ncfix.text import dialects
+from ncfix.text.grammar import parse, squeeze
 
 dialect = dialects.get("linuxcnc")
 with open(sys.argv[1]) as program:

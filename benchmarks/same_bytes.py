@@ -30,10 +30,10 @@ from ncfix.cli import console
 from ncfix.cli.job import Job
 from ncfix.cli.targets import Target
 from ncfix.compensate.options import FixOptions
+from ncfix.control.parts import NotInPartsError
+from ncfix.control.setup import Setup
+from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import Machine, load
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.setup import Setup
-from ncfix.program.setup_file import load as load_setup
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "performance.md"

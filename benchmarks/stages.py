@@ -16,10 +16,11 @@ from ncfix import fast
 from ncfix.compensate import corrector, plain, settle, stream
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.task import Task
+from ncfix.control import parts
+from ncfix.control.setup import Setup
 from ncfix.machine import load
-from ncfix.program import dialects, parts
-from ncfix.program.rs274.following import RS274Follower
-from ncfix.program.setup import Setup
+from ncfix.text import dialects
+from ncfix_iso.rs274.following import RS274Follower
 
 SETUP = Setup(work_offsets={"G54": dict.fromkeys("XYZBC", 0.0)}, assume_zero=True)
 MACHINE = Path(__file__).with_name("five_axis.toml")

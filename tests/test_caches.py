@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from ncfix import caches
-from ncfix.program import grammar
+from ncfix.text import grammar
 
 
 @pytest.fixture

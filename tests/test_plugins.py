@@ -16,7 +16,7 @@ from ncfix.plugins import PluginWarning, collect
 
 GOOD = """
 from ncfix.hookspecs import hookimpl
-from ncfix.program.dialect import Dialect
+from ncfix.text.dialect import Dialect
 
 @hookimpl
 def register_dialects(register):
@@ -53,7 +53,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 
 def test_every_hook_is_a_documented_kind() -> None:
     assert set(plugins.KINDS) == {
-        "bases", "commands", "controls", "dialects", "effects", "executors", "readers", "reporters",
+        "bases", "codes", "commands", "controls", "dialects", "effects", "executors", "readers", "reporters",
     }  # fmt: skip
     for kind in plugins.KINDS:
         hook = getattr(hookspecs, f"register_{kind}")

@@ -1,5 +1,5 @@
 from ncfix.hookspecs import hookimpl
-from ncfix.program.dialect import Dialect
+from ncfix.text.dialect import Dialect
 
 GRBL = Dialect(
     name="grbl",

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import FOREIGN, TURNING, Dialect
+from ncfix.text.dialect import FOREIGN, TURNING, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,7 +35,7 @@ FANUC = Dialect(
     foreign=(*FOREIGN, VERICUT, O_WORDS, *TURNING),
     upper_case=True,
     closure_mm=0.01,
-    language="ncfix.program.fanuc.language:FANUC",
+    language="ncfix_fanuc.macro.language:FANUC",
     semantics="fanuc",
     understands=(
         "G0 G1 G2 G3 with centre or radius, helices, full circles, G17 G18 G19",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import FOREIGN, TURNING, Dialect
+from ncfix.text.dialect import FOREIGN, TURNING, Dialect
 
 if TYPE_CHECKING:
     from collections.abc import Callable

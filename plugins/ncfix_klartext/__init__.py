@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import Dialect
+from ncfix.text.dialect import Dialect
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ncfix.diagnostics import Code
 
 BEGIN_PGM = rb"(?im)^[ \t]*(?:/?[ \t]*\d+[ \t]*)?BEGIN[ \t]+PGM\b"
 """The first block of every Klartext program."""
@@ -46,7 +53,7 @@ HEIDENHAIN = Dialect(
         "what depends on Q parameters that the control sets, blocks executed from several states",
         "a line that is no Klartext: the control stops there; one that is not understood, by what may be in it",
     ),
-    language="ncfix.program.klartext.language:KLARTEXT",
+    language="ncfix_heidenhain.klartext.language:KLARTEXT",
 )
 
 
@@ -54,3 +61,16 @@ HEIDENHAIN = Dialect(
 def register_dialects(register: Register[Dialect]) -> None:
     """Bring the dialect `heidenhain`."""
     register(HEIDENHAIN)
+
+
+@hookimpl
+def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
+    """Bring what the messages about Klartext programs mean."""
+    register(message_codes, name="klartext")
+
+
+def message_codes() -> Mapping[str, Code]:
+    """The codes, imported when they are asked for."""
+    from ncfix_heidenhain.klartext.message_codes import KLARTEXT_CODES
+
+    return KLARTEXT_CODES

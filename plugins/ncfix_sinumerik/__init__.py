@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from ncfix.hookspecs import Register, hookimpl
-from ncfix.program.dialect import FOREIGN, Dialect
+from ncfix.text.dialect import FOREIGN, Dialect
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from ncfix.diagnostics import Code
 
 SIEMENS = Dialect(
     name="siemens",
@@ -48,7 +55,7 @@ SIEMENS = Dialect(
         "everything after a block or synchronized action that is not understood",
         "blocks executed from several states, without --flatten",
     ),
-    language="ncfix.program.sinumerik.language:SINUMERIK",
+    language="ncfix_siemens.sinumerik.language:SINUMERIK",
 )
 
 
@@ -56,3 +63,16 @@ SIEMENS = Dialect(
 def register_dialects(register: Register[Dialect]) -> None:
     """Bring the dialect `siemens`."""
     register(SIEMENS)
+
+
+@hookimpl
+def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
+    """Bring what the messages about SINUMERIK programs mean."""
+    register(message_codes, name="sinumerik")
+
+
+def message_codes() -> Mapping[str, Code]:
+    """The codes, imported when they are asked for."""
+    from ncfix_siemens.sinumerik.message_codes import SINUMERIK_CODES
+
+    return SINUMERIK_CODES

@@ -16,9 +16,9 @@ KERNELS = (
     "ncfix.compensate.nearest_kernels",
     "ncfix.compensate.plain_kernels",
     "ncfix.machine.kernels",
-    "ncfix.program.follow.lane_kernel",
-    "ncfix.program.kernels",
-    "ncfix.program.writing_kernels",
+    "ncfix.control.lane_kernel",
+    "ncfix.text.kernels",
+    "ncfix.writer.writing_kernels",
 )
 """The modules that have kernels: all are compiled when one is asked for, side by side."""
 FAILED = "The loops of ncfix[fast] cannot be compiled here; without them it takes two or three times as long."

@@ -14,17 +14,18 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import pluggy
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from concurrent.futures import Executor
 
     import click
 
+    from ncfix.diagnostics import Code
     from ncfix.machine.basis import Basis
     from ncfix.machine.library import PluginEffect
     from ncfix.measure.measurement import Measurement
-    from ncfix.program.dialect import Dialect
     from ncfix.report.document import Document
     from ncfix.tables.control import Control
+    from ncfix.text.dialect import Dialect
 
 GROUP = "ncfix"
 """The entry-point group, and the name of the pluggy project."""
@@ -45,6 +46,11 @@ class Register(Protocol[Thing]):
 @hookspec
 def register_dialects(register: Register[Dialect]) -> None:
     """Controls' languages for `--dialect`: a `Dialect` names its grammar, its file suffixes and its limits."""
+
+
+@hookspec
+def register_codes(register: Register[Callable[[], Mapping[str, Code]]]) -> None:
+    """Explanations of message codes for `ncfix explain`: functions that return code -> `Code`, with a name."""
 
 
 @hookspec

@@ -16,11 +16,11 @@ from pathlib import Path
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text import dialects
+from ncfix.text.reader import read
 
 FAMILIES = {
     "linuxcnc": "linuxcnc",

@@ -15,10 +15,10 @@ import numpy as np
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 Lines = np.typing.NDArray[np.int64]
 

@@ -13,12 +13,12 @@ import numpy as np
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, loads
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 
 SHIFT = {"X": -0.0124, "Y": 0.0213, "Z": 0.0085}
 """mm, added to commands: minus the errors of the machine."""

@@ -16,10 +16,10 @@ from itertools import combinations
 from classes.judging import SETUP, machine
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.moves import Kind
+from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
-from ncfix.program.moves import Kind
-from ncfix.program.reader import read
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 
 MACHINE = machine()
 WORDS_AT_ONCE = 4

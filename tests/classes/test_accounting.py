@@ -11,7 +11,7 @@ import pytest
 from classes.accounting import FAMILIES, FOREIGN, account
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 
 MOST, MOST_FLAT = 0.05, 0.01
 """The share of the motion blocks within the travel that may be refused, without and with --flatten."""

@@ -7,9 +7,9 @@ import pytest
 
 from classes.judging import SHIFT, Case, followed, judged, machine
 from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.program.moves import Kind
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.control.moves import Kind
+from ncfix.control.setup import Setup, Tool
+from ncfix.text.reader import read
 
 HEAD = "BEGIN PGM C MM\nTOOL CALL 0 Z S1000\nL X+1 Y+2 Z+50 FMAX\n"
 """Three lines; the third is the motion to the start."""

@@ -12,10 +12,10 @@ from classes.accounting import Account
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 NO_KLARTEXT = "antlr__75f6ad_sapf-bif-examples.txt"
 LARGE = "DigiLiner__91853f_5axis_BC.ptp"

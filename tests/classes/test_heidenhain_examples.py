@@ -11,11 +11,11 @@ import pytest
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow, placed
 from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import State, load
-from ncfix.program.dialects import detect
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup_file import load as load_setup
+from ncfix.text.dialects import detect
+from ncfix.text.reader import read
 
 PROGRAMS = ("klartext_tcp.h", "klartext_tilted.h")
 

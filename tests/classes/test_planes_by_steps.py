@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Moves, Rule
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Moves, Rule
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(
     work_offsets={"G54": dict.fromkeys("XYZAC", 0.0)},

@@ -9,11 +9,11 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Kind
+from ncfix.control.setup_file import load as load_setup
 from ncfix.machine import load
-from ncfix.program.dialects import detect
-from ncfix.program.moves import Kind
-from ncfix.program.reader import read
-from ncfix.program.setup_file import load as load_setup
+from ncfix.text.dialects import detect
+from ncfix.text.reader import read
 
 PROGRAMS = ("siemens_traori.mpf", "siemens_swivel.mpf")
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from ncfix.hookspecs import hookimpl
 from ncfix.machine.basis import Basis
-from ncfix.program.dialect import Dialect
+from ncfix.text.dialect import Dialect
 from ncfix.tables.control import Control, Properties, Written
 
 
@@ -217,8 +217,8 @@ def met(case: Case, tmp_path: Path, ncfix: Any, monkeypatch: pytest.MonkeyPatch)
 @pytest.fixture(autouse=True)
 def forgotten() -> Iterator[None]:
     """The languages and grammars of these plugins are not kept."""
-    from ncfix.program.grammar import parser
-    from ncfix.program.language import language_of
+    from ncfix.text.grammar import parser
+    from ncfix.text.language import language_of
 
     yield
     parser.cache_clear()

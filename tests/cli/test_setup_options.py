@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from ncfix.cli.setup_options import SetupOptions, setup_options
-from ncfix.program.setup import Setup, Tool
+from ncfix.control.setup import Setup, Tool
 
 
 def given(*arguments: str) -> SetupOptions:

@@ -12,8 +12,8 @@ from ncfix.compensate.along import Along
 from ncfix.compensate.cuts import Cut
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.side_by_side import SideBySide
+from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
 
 NEAR = 1e-5
 """mm: of distances below it is not found out whether another point is nearer."""

@@ -13,11 +13,11 @@ from ncfix.compensate.crew import Ground
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.stream import Stream, Streamed, Task
+from ncfix.control.parts import NotInPartsError
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine
-from ncfix.program import dialects
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text import dialects
+from ncfix.text.reader import read
 
 OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
 SETUP = Setup(assume_zero=True)

@@ -12,10 +12,10 @@ from compensate.side import compared
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 ZERO = dict.fromkeys("XYZACB", 0.0)
 SETUP = Setup(

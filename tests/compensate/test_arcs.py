@@ -12,9 +12,9 @@ from ncfix.compensate.assembly import Plan
 from ncfix.compensate.budget import Closure
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Polynomial
-from ncfix.program.moves import Kind, Moves
 
 TOLERANCE = 1e-3
 DIGIT = 1e-3

@@ -12,10 +12,10 @@ from ncfix.compensate.checking import check_on
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import traced
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import RefusedError, SourceError, UsageError
 from ncfix.machine import Machine, load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(
     work_offsets={"G54": dict.fromkeys("XYZ", 0.0), "G55": {"X": 20.0, "Y": -5.0, "Z": 0.0}, "PRESET": {}, "G500": {}},

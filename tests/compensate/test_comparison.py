@@ -13,10 +13,10 @@ from compensate.side import compared
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True)
 HEAD = "G21 G90 G94 G17\nG0 X117.0 Y0 Z60\nG1 X117.05 Y0 Z7.15 B4.53 C{c} F2000\n"

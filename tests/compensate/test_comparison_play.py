@@ -18,10 +18,10 @@ from compensate.test_comparison import fixed, moves_of
 from ncfix.compensate.bodies import Bodies
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.stretches import Stretches
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine, State, load
 from ncfix.machine.effect import Effect
 from ncfix.machine.smooth import Backlash
-from ncfix.program.moves import Kind, Moves
 
 PLAY = {"X": 7.2e-3, "Y": -7.2e-3, "Z": -4e-3}
 """mm: what the error changes by as the axis turns from minus to plus; the body of X, a table, goes the other way."""

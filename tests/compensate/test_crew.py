@@ -25,11 +25,11 @@ from ncfix.compensate.corrector import Corrector, Done
 from ncfix.compensate.post import GoneError, Post, lines_between
 from ncfix.compensate.stream import Stream
 from ncfix.compensate.task import Task
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError, UsageError
 from ncfix.machine import Machine, load
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text import dialects
+from ncfix.text.reader import read
 
 SECONDS = 20
 """Far more than any of these takes on a computer that does much else, and far less than for ever."""

@@ -17,11 +17,11 @@ import pytest
 from compensate.cycles_at_random import LANGUAGES
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 PROGRAMS = int(os.environ.get("NCFIX_CYCLES", "12"))
 SETUP = Setup(

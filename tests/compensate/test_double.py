@@ -13,11 +13,11 @@ from compensate.streaming import run
 from ncfix.compensate import double, stream
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.task import Task
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import Machine, load
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text import dialects
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, initial={"X": 0.0, "Y": 0.0, "Z": 100.0})
 

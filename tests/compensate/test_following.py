@@ -7,11 +7,11 @@ import pytest
 
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow, kinematics_of
+from ncfix.control.moves import Rule, TcpState
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
 from ncfix.machine import loads
-from ncfix.program.moves import Rule, TcpState
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 ROTARY_TABLE = """
 ncfix = 1

@@ -9,9 +9,9 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={0: Tool(80.0, 3.0), 1: Tool(80.0, 3.0)})
 HEAD = "G21 G90 G17 G94\nT1 M6\nG54 G43 H1\nG0 X10. Y20. Z60. A5. C10.\n"

@@ -9,11 +9,11 @@ import pytest
 
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.idle import idle, without_idle
+from ncfix.control.setup import Setup
 from ncfix.machine import loads
-from ncfix.program.emit import Emission
-from ncfix.program.pieces import Pieces
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
+from ncfix.writer.emit import Emission
+from ncfix.writer.pieces import Pieces
 
 MACHINE = """
 topology = "w C B F X Y Z t"

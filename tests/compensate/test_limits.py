@@ -14,10 +14,10 @@ from ncfix.compensate.findings import Finding
 from ncfix.compensate.limits import FUZZ, findings
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import Place
 from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Backlash, Polynomial
-from ncfix.program.moves import Moves
 
 XYZ = [0, 1, 2]
 

@@ -15,10 +15,10 @@ from ncfix.compensate.sampling import MOST_SHOWN
 from ncfix.compensate.simulation import samples
 from ncfix.compensate.split import STRETCH, Grid, fewest
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Moves
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.piecewise import Table
 from ncfix.machine.smooth import Polynomial
-from ncfix.program.moves import Moves
 
 TOLERANCE = 1e-3
 TURN = 2 * np.pi

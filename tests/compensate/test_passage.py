@@ -17,12 +17,12 @@ from ncfix.compensate.partition import Part
 from ncfix.compensate.passage import Passage
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
+from ncfix.control.moves import Moves
+from ncfix.control.parts import TABLES
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program import dialects
-from ncfix.program.moves import Moves
-from ncfix.program.parts import TABLES
-from ncfix.program.rs274.following import RS274Follower
+from ncfix.text import dialects
+from ncfix_iso.rs274.following import RS274Follower
 
 SIZE = 1200
 

@@ -9,9 +9,9 @@ from compensate.machines_at_random import SMOOTH, TOPOLOGIES, perfect, random_ma
 from compensate.motions import Arc, changed, dense_errors, motions
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.smooth import Polynomial
-from ncfix.program.moves import Kind, Moves, Rule
 
 TOLERANCE = 1e-3
 CONTROLS = [(kind, tcp) for kind in TOPOLOGIES for tcp in (False, True) if not (tcp and kind == "three-axis")]

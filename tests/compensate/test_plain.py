@@ -21,10 +21,10 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.plain import Course, Planner
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.units import Unit
+from ncfix.control.moves import Kind
+from ncfix.control.parts import NotInPartsError
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Kind
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.writer import Splices, spliced
+from ncfix.text.writer import Splices, spliced
 
 FIGURES = ("error_before_um", "error_after_um")
 

@@ -12,11 +12,11 @@ import pytest
 
 from compensate.streaming import streamed
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.control.parts import NotInPartsError
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import load
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 MACHINE = load(str(Path(__file__).parents[2] / "examples/machines/wCBXFZYSt.toml"))
 NOMINAL = Setup(assume_zero=True, no_point="calculator", probed={"Z": 0.0})

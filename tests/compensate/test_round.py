@@ -14,11 +14,11 @@ from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.path import plan
 from ncfix.compensate.round import SHORTEST, WIDEST
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Polynomial
-from ncfix.program.moves import Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 TOLERANCE = 1e-3
 TURN = 2 * np.pi

@@ -11,10 +11,10 @@ import pytest
 
 from compensate.machines_at_random import TOPOLOGIES, perfect, random_machine
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Constant, Polynomial
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={1: Tool(80.0, 3.0)})
 HEAD = "G21 G90 G17 G94 F500\nG0 X0 Y0 Z0\n"

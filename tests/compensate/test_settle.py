@@ -10,11 +10,11 @@ import pytest
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.following import follow
 from ncfix.compensate.options import FixOptions
+from ncfix.control.moves import Kind
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Kind
-from ncfix.program.pinning import LED, PINNED
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
+from ncfix.writer.pinning import LED, PINNED
 
 ZERO = dict.fromkeys("XYZ", 0.0)
 SETUP = Setup(work_offsets={"G54": ZERO}, initial=ZERO, assume_zero=True)

@@ -12,11 +12,11 @@ from ncfix.compensate.along import Along
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.simulation import TipError, tip_errors
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import DifferenceError
 from ncfix.machine import Machine, State, loads
-from ncfix.program.moves import Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 AXES = """
 topology = "w F X Y Z t"

@@ -8,8 +8,8 @@ from compensate.machines_at_random import TOPOLOGIES, perfect
 from compensate.motions import changed, motions
 from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands
 from ncfix.compensate.standing import Standing, standing
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
-from ncfix.program.moves import Kind, Moves
 
 MACHINE = perfect("w F X Y Z t")
 SHIFT = np.array([0.01, -0.02, 0.03])

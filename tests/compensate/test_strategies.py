@@ -11,10 +11,10 @@ from ncfix.compensate import ends
 from ncfix.compensate.findings import PoseError
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import RotaryThenLinear, Strategy, get_strategy, parted, strategies
+from ncfix.control.moves import Kind
 from ncfix.diagnostics import UsageError
 from ncfix.machine import Effect, Machine, State
 from ncfix.machine.piecewise import Step
-from ncfix.program.moves import Kind
 
 POSES = 1000
 NANOMETRE = 1e-6

@@ -18,14 +18,14 @@ from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.compensate.task import Task
+from ncfix.control.parts import NotInPartsError
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError, SourceError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Backlash
-from ncfix.program import dialects
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.writer import Splices, spliced
+from ncfix.text import dialects
+from ncfix.text.reader import read
+from ncfix.text.writer import Splices, spliced
 
 OPTIONS = FixOptions(tolerance_um=5.0, allow_refused=True)
 SETUP = Setup(assume_zero=True)

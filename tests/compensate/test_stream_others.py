@@ -15,14 +15,14 @@ import pytest
 from compensate.streaming import SETUP, compared, streamed, whole
 from ncfix import fast
 from ncfix.compensate.following import traced
+from ncfix.control.lane import take
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Backlash
-from ncfix.program import emit
-from ncfix.program.follow.lane import take
-from ncfix.program.reader import read
-from ncfix.program.sinumerik import vectors
-from ncfix.program.sinumerik.language import SINUMERIK
+from ncfix.text.reader import read
+from ncfix.writer import emit
+from ncfix_siemens.sinumerik import vectors
+from ncfix_siemens.sinumerik.language import SINUMERIK
 
 CALCULATOR = replace(SETUP, no_point="calculator")
 ELSEWHERE = "the program does not run straight from its first line to its last"

@@ -14,11 +14,11 @@ from ncfix.compensate.fix import fix_program
 from ncfix.compensate.path import plan
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import FigureTally, Samples, path_error
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.setup import Setup
 from ncfix.machine import Effect, Machine, load
 from ncfix.machine.smooth import Polynomial
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 TOLERANCE = 1e-3
 

@@ -19,12 +19,12 @@ from ncfix.compensate.flat import fix_flat
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.task import Task
+from ncfix.control.parts import NotInPartsError
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, State, loads
-from ncfix.program.dialects import get
-from ncfix.program.parts import NotInPartsError
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.dialects import get
+from ncfix.text.reader import read
 
 MACHINE = Path(__file__).parents[2] / "examples/machines/wCBXFZYSt.toml"
 ASSUMED = Setup(assume_zero=True, no_point="calculator")

@@ -44,10 +44,10 @@ from differential.sinumerik_frames import Floats
 from differential.test_fanuc import Fanuc
 from differential.test_siemens import apart
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 CASES = int(os.environ.get("NCFIX_DELETED", "2"))
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))

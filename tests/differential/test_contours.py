@@ -13,10 +13,10 @@ from differential.canon import Canon, Controls
 from differential.contours import contour, judged
 from ncfix.compensate.account import FixReport
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Effect, Machine
 from ncfix.machine.smooth import Periodic, Polynomial
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 CONTOURS = int(os.environ.get("NCFIX_CONTOURS", "16"))
 """So many are made; of those that the control accepts, about a third, all are judged."""

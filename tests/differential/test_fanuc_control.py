@@ -21,9 +21,9 @@ from differential.sinumerik_motions import Path as Way
 from differential.test_siemens import apart
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 PROGRAMS = int(os.environ.get("NCFIX_FANUC", "5"))
 FIRST = int(os.environ.get("NCFIX_SEED", "0"))

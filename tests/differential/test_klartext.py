@@ -15,10 +15,10 @@ from differential import klartext, product
 from differential.canon import ARC, Canon
 from differential.errors import Machine
 from differential.judge import Terms, judge
-from ncfix.program.moves import Kind
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.control.moves import Kind
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 
 FOLLOWED, CORRECTED = range(20), range(100, 105)
 EXACT = 1e-6

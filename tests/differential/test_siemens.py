@@ -19,9 +19,9 @@ from differential.sinumerik_motions import Path as Way
 from differential.sinumerik_programs import Author, looped, patterned
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 PROGRAMS = int(os.environ.get("NCFIX_SIEMENS", "8"))
 OFFSETS = {54: (0.0, 0.0, 60.0), 55: (5.0, -7.0, 70.0), 505: (-3.0, 4.0, 65.0)}

@@ -21,7 +21,7 @@ from differential.sinumerik_holes import COMBINATIONS, HEAD, program
 from differential.test_siemens import AT_ENDS, LENGTHS, MACHINE, OFFSETS, SETUP, START
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.machine import Machine, load
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 
 EACH = int(os.environ.get("NCFIX_SIEMENS_HOLES", "1"))
 FIGURE = 0.1e-3

@@ -20,9 +20,9 @@ from differential.tnc import Floats, Tnc, Way
 from differential.tnc_programs import Maker
 from ncfix.compensate.fix import Fixed, FixOptions
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 FILE = Path(__file__).parent / "machines" / "three.toml"
 LENGTHS, PRESETS = {0: 0.0, 1: 50.0, 2: 81.5}, {0: (10.0, -5.0, 20.0), 1: (-12.0, 7.0, 15.0)}

@@ -14,9 +14,9 @@ from differential.test_tnc import ALONG, HALF, farthest
 from differential.tnc import Floats
 from differential.tnc_five import FiveAxisTnc, Travel, program
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 FILE = Path(__file__).parent / "machines" / "five_bc.toml"
 LENGTHS, PRESET = {0: 0.0, 1: 60.0, 2: 90.0}, (5.0, -3.0, 40.0)

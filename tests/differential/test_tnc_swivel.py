@@ -18,9 +18,9 @@ from differential.test_tnc_five import ENDS, LENGTHS, tips
 from differential.tnc_swivel import Swivel, SwivelMaker
 from ncfix.compensate.fix import Fixed, FixOptions
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 FILE = Path(__file__).parent / "machines" / "five_bc.toml"
 MODEL = errors.load(FILE)

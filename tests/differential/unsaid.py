@@ -29,13 +29,13 @@ from differential.test_tnc_five import LENGTHS
 from differential.tnc_swivel import Swivel
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.passing import Pass
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.passing import Pass
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.tree import Program
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
 
 ROOT = Path(__file__).resolve().parents[2]
 FRAMES = ("plane", "swivel", "rotation", "tcp")

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import kinematics_of, placed, rotary_names
 from ncfix.compensate.kinematics import joints_from_commands
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.machine import Machine
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 
 PAIRS = int(os.environ.get("NCFIX_PAIRS", "3"))
 TOGETHER = 10

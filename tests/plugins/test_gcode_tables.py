@@ -9,13 +9,13 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import ConfigError, UsageError
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
 from ncfix.tables.control import Request, get_control
 from ncfix.tables.poses import random_poses, ranges_of
 from ncfix.testing import check_control, single_error
+from ncfix.text.reader import read
 
 CONTROL = get_control("gcode")
 

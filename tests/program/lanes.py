@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ncfix.program.reach import UNREAD
-from ncfix.program.reader import AFTER_TAPE
-from ncfix.program.templates import parse_block
-from ncfix.program.tree import Opaque, Program
-from ncfix.program.writer import apply
+from ncfix.text.reach import UNREAD
+from ncfix.text.reader import AFTER_TAPE
+from ncfix.text.templates import parse_block
+from ncfix.text.tree import Opaque, Program
+from ncfix.text.writer import apply
 
 
 def assert_read_right(program: Program) -> None:

@@ -7,9 +7,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from ncfix.program import shapes
-from ncfix.program.alike import FEWEST, LINE, SHARE, Example, alike
-from ncfix.program.shapes import Scan, scan_any, split_blocks, with_others
+from ncfix.text import shapes
+from ncfix.text.alike import FEWEST, LINE, SHARE, Example, alike
+from ncfix.text.shapes import Scan, scan_any, split_blocks, with_others
 
 USUAL = ("N{n} G1 X{x} Y{y} Z{z} F{f}", "G01X{x}Y{y}Z{z}", "n{n} g1 x{x}\ty{y}", "T{n} M6", "X{x} E{n} D{y}")
 NUMBERS = ("1.2345", "-0.0000", "+7.5", "123.4567", "-1234.5678", "0.0001", "98765.4321", "12.", "-3", ".5", "007.10")

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import ExitCode, SourceError, UsageError
-from ncfix.program.codes import CODES
-from ncfix.program.reader import read
+from ncfix.text.codes import CODES
+from ncfix.text.reader import read
 
 BAD = Path(__file__).parent / "bad"
 PROGRAMS = sorted(path for path in BAD.glob("*/*") if path.suffix != ".expected")

@@ -11,20 +11,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
-from ncfix.program import bulk, number_text
-from ncfix.program.bulk import Stretch
-from ncfix.program.bulk_arcs import CentreWords
-from ncfix.program.emit import Emission, emit
-from ncfix.program.language import language_of
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.number_style import NumberStyle
-from ncfix.program.pieces import Pieces
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Program
-from ncfix.program.writer import Edit, Splices, apply, spliced
+from ncfix.text import number_text
+from ncfix.text.language import language_of
+from ncfix.text.number_style import NumberStyle
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+from ncfix.text.writer import Edit, Splices, apply, spliced
+from ncfix.writer import bulk
+from ncfix.writer.bulk import Stretch
+from ncfix.writer.bulk_arcs import CentreWords
+from ncfix.writer.emit import Emission, emit
+from ncfix.writer.pieces import Pieces
 from program.arcs import full_of_arcs
 
 AXES, ROTARY = ("X", "Y", "Z", "B", "C"), frozenset("BC")
@@ -66,7 +67,7 @@ def in_all_ways(program: Program, moves: Moves, pieces: Pieces) -> tuple[Emissio
             found.append(emit(program, moves, pieces, STEPS))
     fast.disengage()
     one_by_one = replace(language_of(program.dialect), bulk=None)
-    with mock.patch("ncfix.program.emit.language_of", return_value=one_by_one):
+    with mock.patch("ncfix.writer.emit.language_of", return_value=one_by_one):
         return *found, emit(program, moves, pieces, STEPS)
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, no_point="calculator", tools={number: Tool(80.0, 3.0) for number in (0, 1)})
 ALIKE = "X40. Y5.\nX40. Z-10.\nX40. Y5. Z-90.\nG91 X0. Z20.\nG90 Z-30.\nX40. Y5.\nY40.\nG40 X60.\n"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 from program.lanes import assert_read_right
 
 FAMILIES = ("linuxcnc", "iso", "grbl")

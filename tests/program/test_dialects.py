@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from ncfix.program import dialects
-from ncfix.program.content import check_content
-from ncfix.program.dialect import Dialect
-from ncfix.program.grammar import find_grammar, parser
-from ncfix.program.reader import read
-from ncfix.program.tree import Word
+from ncfix.text import dialects
+from ncfix.text.content import check_content
+from ncfix.text.dialect import Dialect
+from ncfix.text.grammar import find_grammar, parser
+from ncfix.text.reader import read
+from ncfix.text.tree import Word
 from program.lanes import assert_read_right
 
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from ncfix.program.emit import SEVERAL_STATES, emit
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.pieces import Pieces
-from ncfix.program.reader import read
-from ncfix.program.render import NO_TIME
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.writer import apply
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
+from ncfix.text.writer import apply
+from ncfix.writer.emit import SEVERAL_STATES, emit
+from ncfix.writer.pieces import Pieces
+from ncfix.writer.render import NO_TIME
 
 AXES = ("X", "Y", "Z")
 STEP = np.full(3, 0.001)

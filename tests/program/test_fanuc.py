@@ -11,13 +11,13 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError, UsageError
 from ncfix.machine import load, loads
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
-from ncfix.program.tree import Opaque, Word
+from ncfix.text import dialects
+from ncfix.text.reader import read
+from ncfix.text.tree import Opaque, Word
 from program.lanes import assert_read_right
 from program.tracing import KNOWN, ends, follow, last, reasons
 

@@ -9,10 +9,10 @@ import pytest
 
 from ncfix.compensate.fix import fix_program
 from ncfix.compensate.options import FixOptions
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
-from ncfix.program.fanuc.corners import axes_of_corner
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
+from ncfix_fanuc.macro.corners import axes_of_corner
 from program.tracing import follow, reasons
 
 HEAD = "G21 G90 G17 G94 G54\nG0 X-150. Y-120. Z5.\nG1 Z-1. F300.\n"

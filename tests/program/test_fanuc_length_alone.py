@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 
 HEAD = "%\nO1\nG21 G90 G94 G17 G54\nT1 M6\nG43 H1 G0 Z50.\nG1 Z5. F100.\n"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError
-from ncfix.program.setup import Setup, Tool
 from program.tracing import ends, follow, last, reasons
 
 SETUP = Setup(

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from conftest import missing
-from ncfix.program.moves import Kind
-from ncfix.program.reader import read
-from ncfix.program.trace import trace
+from ncfix.control.moves import Kind
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 from program import interpreter
 from program.tracing import KNOWN
 

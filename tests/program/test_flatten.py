@@ -8,13 +8,13 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.flatten import flatten
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError, RefusedError
 from ncfix.machine import load
-from ncfix.program.flatten import flatten
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Assignment, Constant, Flow, Literal
+from ncfix.text.reader import read
+from ncfix.text.tree import Assignment, Constant, Flow, Literal
 from program.generated import Generator
 from program.tracing import KNOWN
 

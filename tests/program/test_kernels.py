@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
-from ncfix.program.shapes import Scan, scan, split_blocks
+from ncfix.text.shapes import Scan, scan, split_blocks
 
 pytest.importorskip("numba", reason="the `fast` extra is not installed")
 

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.lark import from_lark
 
 from ncfix.diagnostics import SourceError
-from ncfix.program import dialects
-from ncfix.program.content import check_content
-from ncfix.program.dialect import Dialect
-from ncfix.program.faults import BlockError
-from ncfix.program.grammar import parser_of
-from ncfix.program.reader import read
-from ncfix.program.templates import parse_block
+from ncfix.text import dialects
+from ncfix.text.content import check_content
+from ncfix.text.dialect import Dialect
+from ncfix.text.faults import BlockError
+from ncfix.text.grammar import parser_of
+from ncfix.text.reader import read
+from ncfix.text.templates import parse_block
 from program.lanes import assert_read_right
 
 unkept = cache(parser_of)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ncfix import fast
-from ncfix.program.writer import Edit, Splices, left_alone, spliced
+from ncfix.text.writer import Edit, Splices, left_alone, spliced
 
 pytest.importorskip("numba", reason="the `fast` extra is not installed")
 

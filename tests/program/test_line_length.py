@@ -6,8 +6,8 @@ import pytest
 
 from classes.judging import machine
 from ncfix.compensate.fix import FixOptions, fix_program
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.control.setup import Setup, Tool
+from ncfix.text.reader import read
 
 LIMIT = 252
 SETUP = Setup(work_offsets={"G54": {}}, tools={0: Tool(0.0)}, initial={"X": 0.0, "Y": 0.0, "Z": 200.0})

@@ -130,8 +130,8 @@ STOPS = {
 
 @pytest.mark.parametrize("text", STOPS)
 def test_where_the_control_stops(text: str) -> None:
-    from ncfix.program import trace as tracing
-    from ncfix.program.reader import read
+    from ncfix.control import trace as tracing
+    from ncfix.text.reader import read
     from program.tracing import KNOWN
 
     program = read(f"{text}\nM30\n".encode(), "part", "fanuc")

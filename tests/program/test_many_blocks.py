@@ -12,10 +12,10 @@ from random import Random
 import pytest
 
 from ncfix import fast
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.templates import shapes_of
-from ncfix.program.tree import Literal, Template, Word
+from ncfix.text import dialects
+from ncfix.text.reader import read
+from ncfix.text.templates import shapes_of
+from ncfix.text.tree import Literal, Template, Word
 from program.lanes import assert_read_right
 
 MANY = int(os.environ.get("NCFIX_MANY_BLOCKS", "600"))

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.program.numbers import NUMERIC, find_numbers, table
-from ncfix.program.shapes import FIXED
+from ncfix.text.numbers import NUMERIC, find_numbers, table
+from ncfix.text.shapes import FIXED
 
 DECIMALS = st.from_regex(r"[0-9]{1,25}\.?[0-9]{0,25}|\.[0-9]{1,25}", fullmatch=True)
 

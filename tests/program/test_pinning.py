@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.pinning import closure_of_refusals
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
+from ncfix.writer.pinning import closure_of_refusals
 
 HEAD = "G21 G90 G94 G17 F100\nG0 X0 Y0 Z0\n"
 

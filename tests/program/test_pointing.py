@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.moves import TcpState
+from ncfix.control.pointing import Pointing, within
+from ncfix.control.pointing_angles import led, nearest
 from ncfix.machine import Machine, load
-from ncfix.program.moves import TcpState
-from ncfix.program.pointing import Pointing, within
-from ncfix.program.pointing_angles import led, nearest
 
 MACHINES = ("wCAYFXZSt", "wCBXFZYSt", "dmu50", "angle_head")
 LENGTH = 128.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.reach import UNREAD
-from ncfix.program.reader import read
-from ncfix.program.tree import Opaque, Program
+from ncfix.text.reach import UNREAD
+from ncfix.text.reader import read
+from ncfix.text.tree import Opaque, Program
 from program.lanes import assert_read_right
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.reader import read
-from ncfix.program.tree import (
+from ncfix.text.reader import read
+from ncfix.text.tree import (
     Assignment,
     Binary,
     Comment,
@@ -263,7 +263,7 @@ def test_programs_do_not_disturb_each_other() -> None:
 def test_parts_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
     source = b"".join(b"N%d G1 X%d.5 Y 1 %d ; %d\n" % (i, i, i % 7, i) for i in range(100))
     whole = read(source, dialect="linuxcnc")
-    monkeypatch.setattr("ncfix.program.reader.PART_BYTES", 100)
+    monkeypatch.setattr("ncfix.text.reader.PART_BYTES", 100)
     parts = read(source, dialect="linuxcnc")
     assert_read_right(parts)
     for name in ("template", "blocks", "first_number", "number_spans", "numbers"):

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from ncfix.control.moves import Moves, Rule
+from ncfix.control.recurrence import ENDLESS as CODE
+from ncfix.control.recurrence import MOST, NEVER_ENDS, WAITS, Recurrence
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
-from ncfix.program.moves import Moves, Rule
-from ncfix.program.reader import read
-from ncfix.program.recurrence import ENDLESS as CODE
-from ncfix.program.recurrence import MOST, NEVER_ENDS, WAITS, Recurrence
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 
 SETUP = Setup(
     work_offsets={name: dict.fromkeys("XYZ", 0.0) for name in ("G54", "G500", "PRESET")},

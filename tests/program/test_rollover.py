@@ -9,9 +9,9 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine, load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, no_point="calculator")
 HEAD = "G21 G90 G17 G54\nG0 X0. Y0. Z50. A0. C0.\nG1 F500.\n"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.setup_file import load, load_tool_table, loads
 from ncfix.diagnostics import ConfigError, ExitCode, SourceError
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.setup_file import load, load_tool_table, loads
 
 FULL = """
 ncfix = 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.program.shapes import KINDS, LONG, distinct
+from ncfix.text.shapes import KINDS, LONG, distinct
 
 
 def lines(rng: np.random.Generator, kinds: int, longest: int, n: int) -> list[bytes]:

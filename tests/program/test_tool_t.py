@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from ncfix.control.setup import Tool
+from ncfix.control.tool_table import load_tool_table
 from ncfix.diagnostics import ConfigError
-from ncfix.program.setup import Tool
-from ncfix.program.tool_table import load_tool_table
 
 TABLE = """\
 BEGIN TOOL .T {unit}

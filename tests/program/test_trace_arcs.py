@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ncfix.control.arcs import centre_from_radius, check_closure, sweep_angle
+from ncfix.control.faults import Fault
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import SourceError
-from ncfix.program.follow.arcs import centre_from_radius, check_closure, sweep_angle
-from ncfix.program.follow.faults import Fault
-from ncfix.program.moves import Moves
 from program.tracing import follow
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ncfix.program.moves import Kind, Rule, Trace
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.control.moves import Kind, Rule, Trace
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 
 AXES = tuple("XYZABCUVW")
 SETUP = Setup(tools={number: Tool(0.0) for number in range(100)}, assume_zero=True)

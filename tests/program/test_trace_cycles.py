@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ncfix.control.moves import Kind, Rule
 from ncfix.diagnostics import SourceError
-from ncfix.program.moves import Kind, Rule
 from program.tracing import ends, follow, last
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import ExitCode, SourceError, UsageError
-from ncfix.program.codes import CODES
+from ncfix.text.codes import CODES
 from program.tracing import follow
 
 SOURCES = Path(__file__).parents[2] / "src" / "ncfix" / "program"
@@ -105,9 +105,9 @@ def test_every_code_that_is_raised_is_explained() -> None:
 
 
 def test_an_axis_name_that_is_no_letter() -> None:
-    from ncfix.program.reader import read
-    from ncfix.program.setup import Setup
-    from ncfix.program.trace import trace
+    from ncfix.control.setup import Setup
+    from ncfix.control.trace import trace
+    from ncfix.text.reader import read
 
     with pytest.raises(UsageError) as caught:
         trace(read(b"M2\n", "part.ngc"), Setup(), ("X", "Q1"), frozenset())

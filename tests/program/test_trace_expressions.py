@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ncfix.diagnostics import SourceError
-from ncfix.program.rs274 import arithmetic
+from ncfix_iso.rs274 import arithmetic
 from program.tracing import follow, last, reasons
 
 AXIS = "where the axis {} stands is known only at run time"

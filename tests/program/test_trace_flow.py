@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from ncfix.control.trace import trace
 from ncfix.diagnostics import SourceError
-from ncfix.program.reader import read
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 from program.tracing import KNOWN, ends, follow, last, reasons
 
 

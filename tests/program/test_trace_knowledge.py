@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ncfix.control.moves import Rule, Trace
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import UsageError
-from ncfix.program.moves import Rule, Trace
-from ncfix.program.setup import Setup, Tool
 from program.tracing import KNOWN, NOTHING, ZERO, ends, follow, reasons
 
 G54 = {"G54": ZERO}

@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ncfix import fast
+from ncfix.control import lane
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
-from ncfix.program.follow import lane
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.rs274 import arc_motion
-from ncfix.program.setup import Setup
+from ncfix_iso.rs274 import arc_motion
 from program.arcs import full_of_arcs
 from program.tracing import KNOWN, ZERO, follow
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ncfix.program.moves import Kind, Rule
+from ncfix.control.moves import Kind, Rule
 from program.tracing import ends, follow, last, reasons
 
 

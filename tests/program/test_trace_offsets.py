@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from ncfix.control.setup import Tool
 from ncfix.diagnostics import SourceError
-from ncfix.program.setup import Tool
 from program.tracing import KNOWN, ZERO, ends, follow, last, reasons
 
 HALF = math.sqrt(0.5)

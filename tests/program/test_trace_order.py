@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ncfix.program.moves import FeedMode, Kind
+from ncfix.control.moves import FeedMode, Kind
 from program.tracing import ends, follow, last
 
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from conftest import missing
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 from program import interpreter
 from program.generated import Generator
 from program.tracing import KNOWN

@@ -7,15 +7,15 @@ import re
 import numpy as np
 import pytest
 
-from ncfix.program.emit import emit
-from ncfix.program.moves import FeedMode, Kind, Moves
-from ncfix.program.pieces import Pieces
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Program
-from ncfix.program.turns import UNTIMED
-from ncfix.program.writer import apply
+from ncfix.control.moves import FeedMode, Kind, Moves
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.control.turns import UNTIMED
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+from ncfix.text.writer import apply
+from ncfix.writer.emit import emit
+from ncfix.writer.pieces import Pieces
 
 AXES = ("X", "Y", "Z", "A")
 STEP = np.array([0.001, 0.001, 0.001, np.deg2rad(0.001)])

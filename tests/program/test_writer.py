@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.program.writer import Edit, apply
+from ncfix.text.writer import Edit, apply
 
 
 def test_replace_insert_remove() -> None:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ncfix.program.moves import Trace
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.control.moves import Trace
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 
 LETTERS = "XYZABC"
 ZERO = dict.fromkeys(LETTERS, 0.0)

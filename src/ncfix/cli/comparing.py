@@ -17,7 +17,7 @@ from ncfix.diagnostics import Message, SourceError
 if TYPE_CHECKING:
     from ncfix.compensate.coverage import Why
     from ncfix.compensate.side_by_side import SideBySide
-    from ncfix.program.tree import Program
+    from ncfix.text.tree import Program
 
 
 Said = tuple[Sequence[Message], ...]

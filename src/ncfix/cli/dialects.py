@@ -12,7 +12,7 @@ from ncfix.cli.options import json_option
 from ncfix.plugins import registry
 
 if TYPE_CHECKING:
-    from ncfix.program.dialect import Dialect
+    from ncfix.text.dialect import Dialect
 
 PARTS = (("understands", "corrected"), ("passes", "passed by rule"), ("refuses", "refused, with the line"))
 """Fields of `Dialect`, and what they are called for people."""
@@ -34,7 +34,7 @@ def dialects(name: str | None, as_json: bool) -> None:
 
 
 def _known(name: str) -> Dialect:
-    from ncfix.program.dialects import get
+    from ncfix.text.dialects import get
 
     return get(name)
 

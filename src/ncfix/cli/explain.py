@@ -12,17 +12,32 @@ from ncfix.cli import console
 from ncfix.cli.completion import OneOf
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import Code, UsageError
+from ncfix.plugins import registry
 
-FLOORS = ("cli", "report", "diagnose", "batch", "compensate", "tables", "measure", "program", "machine")
+FLOORS = (
+    "cli",
+    "report",
+    "diagnose",
+    "batch",
+    "compensate",
+    "tables",
+    "measure",
+    "writer",
+    "control",
+    "text",
+    "machine",
+)
 
 
 def all_codes() -> dict[str, Code]:
-    """The codes of all floors, in order."""
+    """The codes of all floors and plugins, in order."""
     modules = ["ncfix.codes", *(f"ncfix.{floor}.codes" for floor in FLOORS)]
     found: dict[str, Code] = {}
     for module in modules:
         if find_spec(module):
             found |= import_module(module).CODES
+    for codes in registry("codes").values():
+        found |= codes()
     return dict(sorted(found.items()))
 
 

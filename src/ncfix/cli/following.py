@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from ncfix.compensate.block_delete import Position
     from ncfix.compensate.checking import Checked
     from ncfix.compensate.following import Followed
+    from ncfix.control.moves import Trace
+    from ncfix.control.setup import Setup
     from ncfix.machine import Machine
-    from ncfix.program.moves import Trace
-    from ncfix.program.setup import Setup
-    from ncfix.program.tree import Program, Template
+    from ncfix.text.tree import Program, Template
 
 LINEAR = ("X", "Y", "Z")
 ROTARY = ("A", "B", "C")
@@ -47,7 +47,7 @@ class Following:
     def trace(self, program: Program, path: str) -> Trace:
         """The motions of a program."""
         from ncfix.compensate.following import traced
-        from ncfix.program.trace import trace
+        from ncfix.control.trace import trace
 
         if self.machine is not None:
             return traced(program, self.machine, self.setup, subprograms(self.setup, path))

@@ -23,9 +23,9 @@ from ncfix.diagnostics import ExitCode, FaultError, Message, NcfixError, Place, 
 if TYPE_CHECKING:
     from ncfix.compensate.options import FixOptions
     from ncfix.compensate.stream import Stream
+    from ncfix.control.setup import Setup
     from ncfix.machine import Machine
-    from ncfix.program.dialect import Dialect
-    from ncfix.program.setup import Setup
+    from ncfix.text.dialect import Dialect
 
 FLATTEN = "--flatten may correct more: it writes out what cycles, loops and subprograms repeat; "
 ACCEPT = "--allow-refused writes the program with the refused motions as they were"
@@ -92,7 +92,7 @@ class Job:
 
     def _whole(self, source: Source, text: bytes, find: Find) -> Fixed:
         from ncfix.compensate.fix import fix_program
-        from ncfix.program.reader import read
+        from ncfix.text.reader import read
 
         path = shown(source.path)
         program = read(text, path, dialect_of(text, path, self.dialect, self.machine))
@@ -124,7 +124,7 @@ class Job:
 
     def _in_parts(self, source: Source, stream: Stream, outlet: Outlet, find: Find) -> Fixed:
         from ncfix.compensate.post import GoneError
-        from ncfix.program.parts import NotInPartsError
+        from ncfix.control.parts import NotInPartsError
 
         _let_stay()
         try:

@@ -18,10 +18,10 @@ from ncfix.cli.parts import part_bytes
 from ncfix.cli.targets import STREAM, read, shown
 
 if TYPE_CHECKING:
+    from ncfix.control.setup import Setup
     from ncfix.machine import Machine
-    from ncfix.program.dialect import Dialect
-    from ncfix.program.setup import Setup
-    from ncfix.program.tree import Program
+    from ncfix.text.dialect import Dialect
+    from ncfix.text.tree import Program
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead.")
 machine_option = click.option(
@@ -131,7 +131,7 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None,
 
     A control that has no dialect of its own leaves it to what the program looks like. `text`: what is in the file.
     """
-    from ncfix.program.reader import read as read_source
+    from ncfix.text.reader import read as read_source
 
     source = read(path) if text is None else text
     if len(source) >= part_bytes():
@@ -141,7 +141,7 @@ def read_program(path: str, dialect: str | None, machine: Machine | None = None,
 
 def dialect_of(head: bytes, path: str, name: str | None, machine: Machine | None) -> Dialect:
     """The dialect of that name, else what the beginning of a program shows, else that of the machine's control."""
-    from ncfix.program import dialects
+    from ncfix.text import dialects
 
     if name is not None:
         return dialects.get(name)

@@ -104,7 +104,7 @@ class Source:
         named  its dialect was said: of a pipe no more than a part is waited for; else, and of a file, there are enough
                of them to tell what the text is, whatever the size of a part
         """
-        from ncfix.program.content import PROBE_BYTES
+        from ncfix.text.content import PROBE_BYTES
 
         many = part_bytes()
         self.head = self._read(many if named and self.kept is not None else max(many, PROBE_BYTES))
@@ -112,7 +112,7 @@ class Source:
         return len(self.head) >= many
 
     def _stamp(self, first: Sequence[bytes]) -> Place | None:
-        from ncfix.program.stamp import SIGN
+        from ncfix.text.stamp import SIGN
 
         lines = enumerate((line.decode("latin-1") for line in first), start=1)
         return next((Place(shown(self.path), number, 0, line) for number, line in lines if SIGN.search(line)), None)

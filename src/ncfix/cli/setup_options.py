@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from ncfix.program.setup import Setup
+    from ncfix.control.setup import Setup
 from ncfix.cli.completion import PATH
 
 OFFSET_AXES = "XYZABCUVW"
@@ -204,16 +204,16 @@ class SetupOptions:
 
     def load(self) -> Setup:
         """The setup: the file, then the tool table, then the single options, each over the one before."""
-        from ncfix.program.setup import Setup, Tool
+        from ncfix.control.setup import Setup, Tool
 
         setup = Setup()
         if self.setup_file is not None:
-            from ncfix.program.setup_file import load
+            from ncfix.control.setup_file import load
 
             setup = load(self.setup_file)
         tools = dict(setup.tools)
         if self.tool_table is not None:
-            from ncfix.program.tool_table import load_tool_table
+            from ncfix.control.tool_table import load_tool_table
 
             tools |= load_tool_table(self.tool_table)
         given = {key.strip('"'): Tool(*values) for key, values in self.tools}

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from ncfix.compensate.fix import Fixed
     from ncfix.compensate.following import Followed
-    from ncfix.program.tree import Program
     from ncfix.tables.control import Control
     from ncfix.tables.neutral import Tables
+    from ncfix.text.tree import Program
 
 
 SAME = 0.5
@@ -99,7 +99,7 @@ def rewritten_file(following: Following, settings: Mapping[str, str], path: str)
 
 def _followed(following: Following, path: str) -> tuple[Program, Followed]:
     from ncfix.compensate.following import follow
-    from ncfix.program import stamp
+    from ncfix.text import stamp
 
     assert following.machine is not None
     program = following.read(path)

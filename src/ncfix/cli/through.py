@@ -16,7 +16,7 @@ from ncfix.diagnostics import DifferenceError, Message, NcfixError, UsageError
 if TYPE_CHECKING:
     from ncfix.compensate.partition import Part, Parts
     from ncfix.compensate.task import Task
-    from ncfix.program.dialect import Dialect
+    from ncfix.text.dialect import Dialect
 
 Found = TypeVar("Found")
 
@@ -28,7 +28,7 @@ def through(sources: Sequence[Source], in_parts: Callable[[], Found], as_wholes:
     """
     long = [source.looked_into() for source in sources]
     if any(long):
-        from ncfix.program.parts import NotInPartsError
+        from ncfix.control.parts import NotInPartsError
 
         fast.engage(console.forewarn)
         try:
@@ -73,8 +73,8 @@ def parts_of(following: Following, source: Source, dialect: Dialect) -> tuple[Pa
     from ncfix.compensate.checking import OPTIONS
     from ncfix.compensate.partition import Parts
     from ncfix.compensate.task import follower_of
-    from ncfix.program.language import Run
-    from ncfix.program.parts import NotInPartsError, PartReader
+    from ncfix.control.parts import NotInPartsError, PartReader
+    from ncfix.text.language import Run
 
     reader = PartReader(shown(source.path), dialect, source.head)
     axes: tuple[str, ...] | None = None

@@ -27,9 +27,9 @@ from ncfix.diagnostics import Message
 
 if TYPE_CHECKING:
     from ncfix.cli.table import Columns
+    from ncfix.control.moves import Moves
     from ncfix.machine import Machine
-    from ncfix.program.moves import Moves
-    from ncfix.program.tree import Program
+    from ncfix.text.tree import Program
 
 
 @click.command()
@@ -108,7 +108,7 @@ class Motions:
 def table_of(program: Program, moves: Moves, machine: Machine | None) -> Columns:
     """The motions by columns, mm and degrees; the tip only where the machine is known."""
     from ncfix.cli.table import Words, named
-    from ncfix.program.moves import FeedMode, Kind, Rule
+    from ncfix.control.moves import FeedMode, Kind, Rule
 
     positions, tip = _positions(moves, machine)
     columns: Columns = {"line": program.lines(moves.block), "kind": named(Kind, moves.kind)}

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ncfix.compensate.coverage import rule_of
 from ncfix.compensate.left import Left
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.diagnostics import Message, Place
-from ncfix.program.moves import Kind, Moves, Rule
 
 SEEN_UM = 0.001
 """By no more figures differ that are of the same path: they are of places looked at, and of errors to a nanometre."""

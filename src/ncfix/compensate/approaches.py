@@ -11,8 +11,8 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import commands_from_joints
 from ncfix.compensate.steer import steer
-from ncfix.program.frames import FrameMap
-from ncfix.program.moves import Moves
+from ncfix.control.moves import Moves
+from ncfix.writer.frames import FrameMap
 
 
 def corrected_approaches(intent: Intent, wanted: Array, kept: Mask) -> Array | None:

@@ -12,8 +12,8 @@ from ncfix.compensate.grids import INSTANT
 from ncfix.compensate.known import Known
 from ncfix.compensate.ragged import offsets, owners, places, sums
 from ncfix.compensate.rows import lengths, picked
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.pieces import Pieces
+from ncfix.control.moves import Kind, Moves
+from ncfix.writer.pieces import Pieces
 
 if TYPE_CHECKING:
     from ncfix.compensate.grids import Split

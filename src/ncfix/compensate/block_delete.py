@@ -19,14 +19,14 @@ from ncfix.compensate.account import Reason
 from ncfix.compensate.findings import Finding, Mask
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.settle import Settled, settle
+from ncfix.control.moves import Moves, Trace
+from ncfix.control.setup import Setup
+from ncfix.control.standing import BLOCK_DELETE, named_switches
 from ncfix.diagnostics import Message, Place, RefusedError, SourceError, UsageError
 from ncfix.machine import Machine
-from ncfix.program.follow.standing import BLOCK_DELETE, named_switches
-from ncfix.program.moves import Moves, Trace
-from ncfix.program.second_reading import SecondReading
-from ncfix.program.setup import Setup
-from ncfix.program.tree import Program, Skip
-from ncfix.program.writer import Edit, Splices
+from ncfix.text.tree import Program, Skip
+from ncfix.text.writer import Edit, Splices
+from ncfix.writer.second_reading import SecondReading
 
 DIFFERS = "NCF451"
 TOO_MANY = "NCF452"

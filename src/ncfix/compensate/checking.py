@@ -16,13 +16,13 @@ from ncfix.compensate.fix import fix_program, place_of
 from ncfix.compensate.following import Resolve, follow, placed
 from ncfix.compensate.limits import findings
 from ncfix.compensate.options import FixOptions
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine
-from ncfix.program import stamp
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Program
+from ncfix.text import stamp
+from ncfix.text.tree import Program
 
 SUSPECTED = "NCF438"
 """A program that seems to have been corrected: what nobody needs to guess of one that says so."""

@@ -23,16 +23,16 @@ from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Unit, Units
 from ncfix.compensate.verify import PathError, path_error
+from ncfix.control.moves import Moves
+from ncfix.control.parts import NotInPartsError, PartReader
 from ncfix.diagnostics import NcfixError
 from ncfix.files import put_at
 from ncfix.machine import State
-from ncfix.program import stamp
-from ncfix.program.emit import Emission
-from ncfix.program.language import language_of
-from ncfix.program.moves import Moves
-from ncfix.program.parts import NotInPartsError, PartReader
-from ncfix.program.tree import Program
-from ncfix.program.writer import Splices, left_alone, spliced
+from ncfix.text import stamp
+from ncfix.text.language import language_of
+from ncfix.text.tree import Program
+from ncfix.text.writer import Splices, left_alone, spliced
+from ncfix.writer.emit import Emission
 
 FRAMES = "the program takes frames or values from where the machine stands"
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ncfix.compensate.findings import Index, Mask
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.passing import PASS_RULES, Pass
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.passing import PASS_RULES, Pass
 
 REFUSED = "refused"
 LEFT = "an axis is left where it stands"

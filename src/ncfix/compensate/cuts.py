@@ -22,11 +22,11 @@ from ncfix.compensate.stretches import Stretches
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
 from ncfix.compensate.wordless import left_in_cuts
+from ncfix.control.moves import Moves
+from ncfix.control.parts import joined_moves, taken
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
-from ncfix.program.parts import joined_moves, taken
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 BESIDE = 64
 """Motions on both sides of one that are looked at to find out whether an axis turns round near it."""

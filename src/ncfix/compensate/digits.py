@@ -13,10 +13,10 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import picked, some
+from ncfix.control.moves import Moves
 from ncfix.machine import Machine
-from ncfix.program.moves import Moves
-from ncfix.program.number_style import decimals_for
-from ncfix.program.pieces import Pieces
+from ncfix.text.number_style import decimals_for
+from ncfix.writer.pieces import Pieces
 
 
 def on_digits(intent: Intent, pieces: Pieces, among: Index | None = None) -> Pieces:

@@ -18,9 +18,9 @@ from typing import Protocol
 import numpy as np
 
 from ncfix.compensate.findings import Array, Mask
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place, RefusedError
-from ncfix.program.moves import Moves
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 COARSE = 10
 """Steps of the grid of round numbers, in steps of the control's digits."""

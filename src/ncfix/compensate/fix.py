@@ -43,15 +43,15 @@ from ncfix.compensate.rows import lengths
 from ncfix.compensate.settle import Settled, increments
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.verify import Figures, PathError, path_error
+from ncfix.control.knowledge import PROBED
+from ncfix.control.moves import Moves, Trace
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import Place, RefusedError
 from ncfix.machine import Machine, State
-from ncfix.program import stamp
-from ncfix.program.follow.knowledge import PROBED
-from ncfix.program.language import language_of
-from ncfix.program.moves import Moves, Trace
-from ncfix.program.setup import Setup
-from ncfix.program.tree import Program
-from ncfix.program.writer import Splices, spliced
+from ncfix.text import stamp
+from ncfix.text.language import language_of
+from ncfix.text.tree import Program
+from ncfix.text.writer import Splices, spliced
 
 ASTRAY = 1.0
 """mm; no correction and no remainder of one is so large."""

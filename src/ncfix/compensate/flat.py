@@ -13,11 +13,11 @@ from ncfix.compensate.account import FixReport
 from ncfix.compensate.fix import Fixed, fix_program
 from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
 from ncfix.compensate.options import FixOptions
+from ncfix.control.flatten import Flat, flatten
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, Place
 from ncfix.machine import Machine
-from ncfix.program.flatten import Flat, flatten
-from ncfix.program.setup import Setup
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 FLATTENED = "NCF445"
 ONE_POSITION = "NCF447"

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.kinematics import commands_from_joints, joints_from_commands
+from ncfix.control.moves import Kinematics, Moves, Rule, TcpState, Trace
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine
-from ncfix.program.moves import Kinematics, Moves, Rule, TcpState, Trace
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 Resolve = Callable[[str], bytes | None]
 

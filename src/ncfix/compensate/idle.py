@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.compensate.findings import Array, Index, Mask
-from ncfix.program.emit import Emission
-from ncfix.program.moves import Moves
-from ncfix.program.pieces import Pieces
+from ncfix.control.moves import Moves
+from ncfix.writer.emit import Emission
+from ncfix.writer.pieces import Pieces
 
 
 def without_idle(moves: Moves, pieces: Pieces, emission: Emission, first: int = 0) -> Pieces:

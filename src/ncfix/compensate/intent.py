@@ -32,8 +32,8 @@ from ncfix.compensate.kinematics import (
 from ncfix.compensate.rows import picked, some
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.steer import rows_of, steer
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves
 
 INSTANT, WHILE = 1e-4, 1e-3
 """Fractions of a motion over which it is looked at which way its axes go: around an instant, and for a while before."""

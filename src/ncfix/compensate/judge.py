@@ -14,9 +14,9 @@ from ncfix.compensate.rows import every, farthest, lengths, picked, some
 from ncfix.compensate.sampling import MOST, bends, interior, merged, passed
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable, lacking
+from ncfix.control.moves import Kind
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.bow import Bow
-from ncfix.program.moves import Kind
 
 SURE = 0.5
 """A motion whose deviation at a first look is under this share of the tolerance is within it."""

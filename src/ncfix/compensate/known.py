@@ -10,7 +10,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import greatest, picked
 from ncfix.compensate.wordless import lacking
 from ncfix.compensate.written import Written
-from ncfix.program.moves import Kind
+from ncfix.control.moves import Kind
 
 TURNED = 1e-12
 """rad; a rotary axis that is so close to its number in the program stands there."""

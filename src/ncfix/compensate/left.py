@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ncfix.compensate.findings import Array, Mask
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message, Place
-from ncfix.program.moves import Moves
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 if TYPE_CHECKING:
     from ncfix.compensate.settle import Settled

@@ -13,9 +13,9 @@ from ncfix.compensate.ragged import distinct
 from ncfix.compensate.rows import finite, greatest, lengths, some
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.written import Written
+from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
-from ncfix.program.pieces import Pieces
+from ncfix.writer.pieces import Pieces
 
 FUZZ = 1e-9
 """mm or rad beyond a limit that count as on it: rounding of the arithmetic, a thousandth of any control's digit."""

@@ -16,7 +16,7 @@ from ncfix.compensate.curve import Curve, length
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import picked
-from ncfix.program.parts import NotInPartsError
+from ncfix.control.parts import NotInPartsError
 
 ALONG = 0.02
 """A point that is so much shorter or longer along the path counts as this share of that farther away."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ncfix.compensate.findings import MOST, Finding, Mask
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message
-from ncfix.program.moves import Moves
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 ORDER = (
     *("NCF408", "NCF405", "NCF404", "NCF406", "NCF407"),

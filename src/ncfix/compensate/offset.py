@@ -23,7 +23,7 @@ from ncfix.compensate.rows import lengths, picked
 from ncfix.compensate.sampling import interior
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.wordless import correctable
-from ncfix.program.moves import Kind, Moves
+from ncfix.control.moves import Kind, Moves
 
 NO_WAY = 1e-9
 """mm in the plane; a motion that goes no farther makes no corner."""

@@ -21,11 +21,11 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.ragged import distinct
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import agree
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.parts import taken
 from ncfix.machine import Machine
-from ncfix.program.dialect import Dialect
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.parts import taken
-from ncfix.program.pieces import Pieces
+from ncfix.text.dialect import Dialect
+from ncfix.writer.pieces import Pieces
 
 FEW = 16
 """Of so many motions at most one may be other than plain."""

@@ -12,9 +12,9 @@ from ncfix.compensate.findings import Index
 from ncfix.compensate.fix import refuse_stamped
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.passage import Passage
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, stretch
-from ncfix.program.tree import Program
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.parts import Follower, NotInPartsError, PartReader, joined, joined_moves, stretch
+from ncfix.text.tree import Program
 
 MOST_PENDING = 64
 """Parts that may be put together before one of them ends where it may."""

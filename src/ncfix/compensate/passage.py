@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ncfix.program.parts import Remains
+from ncfix.control.parts import Remains
 
 
 @dataclass(frozen=True, slots=True)

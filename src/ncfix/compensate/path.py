@@ -33,8 +33,8 @@ from ncfix.compensate.segments import Segments
 from ncfix.compensate.standing import standing
 from ncfix.compensate.strategies import Strategy
 from ncfix.compensate.wordless import crooked
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves, Rule
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,12 +36,12 @@ from ncfix.compensate.segments import Segments
 from ncfix.compensate.settle import Settled
 from ncfix.compensate.strategies import Strategy, get_strategy
 from ncfix.compensate.units import Unit
+from ncfix.control.moves import FeedMode, Kind, Moves, Rule
 from ncfix.machine import Machine, State
 from ncfix.machine.aim import CLOSE
 from ncfix.machine.bow import MORE
-from ncfix.program.emit import Emission
-from ncfix.program.moves import FeedMode, Kind, Moves, Rule
-from ncfix.program.pieces import Pieces
+from ncfix.writer.emit import Emission
+from ncfix.writer.pieces import Pieces
 
 Looked = tuple[Index, Split | None, tuple[Finding, ...]]
 """Motions that must be split, their pieces, and what there is to say; see `Planner._split`."""

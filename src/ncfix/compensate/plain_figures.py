@@ -23,9 +23,9 @@ from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, even, features,
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.verify import BATCH, STRAIGHT, FigureTally, PathError, Samples, errors_at, samples
 from ncfix.compensate.written import Written
-from ncfix.program.emit import Emission
-from ncfix.program.moves import Kind
-from ncfix.program.pieces import Pieces
+from ncfix.control.moves import Kind
+from ncfix.writer.emit import Emission
+from ncfix.writer.pieces import Pieces
 
 
 def figures(course: Course, text: Emission, rapids: bool) -> PathError:

@@ -8,9 +8,9 @@ from ncfix.compensate.findings import Array
 from ncfix.compensate.idle import standing_still
 from ncfix.compensate.plain import Course
 from ncfix.compensate.rows import squares
-from ncfix.program.bulk import Bulk
-from ncfix.program.emit import Emission, emit
-from ncfix.program.language import Language
+from ncfix.text.language import Language
+from ncfix.writer.bulk import Bulk
+from ncfix.writer.emit import Emission, emit
 
 
 def written(language: Language, course: Course, position: Array, steps: Array) -> Emission | None:

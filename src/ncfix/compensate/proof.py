@@ -12,11 +12,11 @@ from ncfix.compensate.block_delete import Readings, Together
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.rows import every, picked
 from ncfix.compensate.settle import Settled
+from ncfix.control.moves import Moves, Trace
 from ncfix.diagnostics import NcfixError
-from ncfix.program.moves import Moves, Trace
-from ncfix.program.reader import read
-from ncfix.program.second_reading import SecondReading
-from ncfix.program.tree import Program
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+from ncfix.writer.second_reading import SecondReading
 
 SAME = 1e-6
 """mm and rad; the emitter's book and a second reading differ by floating-point noise only."""

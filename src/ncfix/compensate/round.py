@@ -20,7 +20,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import largest, owners, places, sums
 from ncfix.compensate.segments import Segments, sweep_between
 from ncfix.compensate.split import Grid
-from ncfix.program.target import TANGENTIAL
+from ncfix.writer.target import TANGENTIAL
 
 WIDEST = 0.95 * np.pi
 """A piece turns by less than this: ends on opposite sides of a circle would not tell where its centre is."""

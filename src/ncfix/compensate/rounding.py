@@ -17,9 +17,9 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import lengths, picked, some
 from ncfix.compensate.sampling import reach
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.pieces import Pieces
+from ncfix.writer.pieces import Pieces
 
 CENTRE = 2.0
 """Half steps by which a centre may be off in its plane: one that a radius says is within an output step of its place,

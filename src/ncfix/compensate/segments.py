@@ -9,9 +9,9 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import owners
 from ncfix.compensate.rows import picked, spread, vector_product
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine.steps import dot
 from ncfix.machine.transport import turn
-from ncfix.program.moves import Kind, Moves
 
 
 @dataclass(frozen=True, slots=True)

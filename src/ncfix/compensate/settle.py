@@ -29,14 +29,14 @@ from ncfix.compensate.path import plan
 from ncfix.compensate.rounding import rounding
 from ncfix.compensate.rows import picked
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
-from ncfix.program.dialect import Dialect
-from ncfix.program.emit import Emission, emit
-from ncfix.program.language import language_of
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.pinning import LED, PINNED, closure_of_refusals
-from ncfix.program.second_reading import SecondReading
-from ncfix.program.tree import Program
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import language_of
+from ncfix.text.tree import Program
+from ncfix.writer.emit import Emission, emit
+from ncfix.writer.pinning import LED, PINNED, closure_of_refusals
+from ncfix.writer.second_reading import SecondReading
 
 RELATIVE_CYCLE = "the depth of a canned cycle with incremental words (G91) counts from where the cycle before ended"
 NONE: Mapping[int, Reason] = MappingProxyType({})

@@ -19,9 +19,9 @@ from ncfix.compensate.ragged import batches, owners
 from ncfix.compensate.sampling import MOST_SHOWN, closely, even, merged, with_kinks
 from ncfix.compensate.task import Task
 from ncfix.compensate.units import Units
+from ncfix.control.moves import Kind
 from ncfix.diagnostics import Message
 from ncfix.machine import State
-from ncfix.program.moves import Kind
 
 LEAST = 4
 """Fewest samples between the ends of a motion."""

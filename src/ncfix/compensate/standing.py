@@ -16,8 +16,8 @@ from ncfix.compensate.kinematics import commands_from_joints, reached_joints
 from ncfix.compensate.ragged import distinct
 from ncfix.compensate.rows import every
 from ncfix.compensate.wordless import stays
+from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine
-from ncfix.program.moves import Kind, Moves
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,9 +23,9 @@ from ncfix.compensate.double import LOOKED, suspected
 from ncfix.compensate.strategies import get_strategy
 from ncfix.compensate.tally import Tally
 from ncfix.compensate.task import Task
+from ncfix.control.parts import NotInPartsError
 from ncfix.diagnostics import Message
-from ncfix.program import stamp
-from ncfix.program.parts import NotInPartsError
+from ncfix.text import stamp
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from ncfix.compensate.intent import Intent
 from ncfix.compensate.ragged import owners
 from ncfix.compensate.rows import every, finite, picked, some
 from ncfix.compensate.sampling import MOST, MOST_SHOWN, arc_radii, bends, even, merged, reach, reversals, with_kinks
-from ncfix.program.moves import Kind
+from ncfix.control.moves import Kind
 
 ROUND, TWISTED = 1e-6, 2e-5
 """mm; so far a parabola may be from a circle on which the tip goes, and from a path on which it goes on besides."""

@@ -15,8 +15,8 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.ragged import slices
 from ncfix.compensate.simulation import BATCH, Tip
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.moves import Moves, Rule
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves, Rule
 
 Correct = Callable[[Array, Array, float], Array]
 """Positions of all axes (k, n_axes) [mm, rad], ways (k, n_axes), tool length [mm] -> what the control adds to them."""

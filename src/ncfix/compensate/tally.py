@@ -20,10 +20,10 @@ from ncfix.compensate.options import FixOptions
 from ncfix.compensate.rounding import rounding_along
 from ncfix.compensate.settle import Settled, increments
 from ncfix.compensate.verify import Figures, PathError
+from ncfix.control.moves import Moves
 from ncfix.diagnostics import Message
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves
-from ncfix.program.tree import Program
+from ncfix.text.tree import Program
 
 
 @dataclass(slots=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from ncfix.compensate.following import Resolve, kinematics_of, rotary_names
 from ncfix.compensate.options import FixOptions
 from ncfix.compensate.strategies import get_strategy
+from ncfix.control.parts import Follower, NotInPartsError
+from ncfix.control.setup import Setup
 from ncfix.machine import Machine
-from ncfix.program.dialect import Dialect
-from ncfix.program.language import Run, language_of
-from ncfix.program.parts import Follower, NotInPartsError
-from ncfix.program.setup import Setup
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run, language_of
 
 PART_BYTES = 3 << 20
 """How much text is a part: the columns of a part take about thirty times as much memory."""

@@ -14,11 +14,11 @@ from ncfix.compensate.following import placed, with_tool_lengths
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.partition import Part, Parts
 from ncfix.compensate.task import Task
+from ncfix.control.moves import Moves, Trace
+from ncfix.control.parts import NotInPartsError, PartReader, joined, joined_moves, last_of
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import Message, UsageError
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Moves, Trace
-from ncfix.program.parts import NotInPartsError, PartReader, joined, joined_moves, last_of
-from ncfix.program.setup import Setup
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,9 @@ from ncfix.compensate.rows import finite, lengths, picked, some, vector_product
 from ncfix.compensate.sampling import MOST_SHOWN, bends_closely, merged, passed
 from ncfix.compensate.wordless import correctable
 from ncfix.compensate.written import Written
+from ncfix.control.moves import Kind, Moves, Rule
 from ncfix.machine import Machine, State
-from ncfix.program.moves import Kind, Moves, Rule
-from ncfix.program.pieces import Pieces
+from ncfix.writer.pieces import Pieces
 
 BATCH = 16_384
 """Samples worked on at a time."""

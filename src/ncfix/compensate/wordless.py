@@ -13,7 +13,7 @@ import numpy as np
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.kinematics import solve
-from ncfix.program.moves import Moves, Rule
+from ncfix.control.moves import Moves, Rule
 
 SQUARE = 1 - 1e-9
 """An axis that makes no smaller a component of a unit normal is square to its plane."""

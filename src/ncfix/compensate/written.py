@@ -11,7 +11,7 @@ from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.rows import finite, picked, put
 from ncfix.compensate.segments import Segments, sweep_between
-from ncfix.program.pieces import Pieces
+from ncfix.writer.pieces import Pieces
 
 
 @dataclass(frozen=True)

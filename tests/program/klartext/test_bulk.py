@@ -9,14 +9,14 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from ncfix.program import bulk, emit
-from ncfix.program.dialects import get
-from ncfix.program.klartext.bulk import in_bulk
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
-from ncfix.program.trace import trace
-from ncfix.program.tree import Program
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup
+from ncfix.control.trace import trace
+from ncfix.text.dialects import get
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+from ncfix.writer import bulk, emit
+from ncfix_heidenhain.klartext.bulk import in_bulk
 from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, program
 from program.test_bulk import AXES, ROTARY, STEPS, assert_same, moved

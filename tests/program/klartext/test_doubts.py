@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ncfix.control.moves import Rule
+from ncfix.control.setup import Tool
 from ncfix.diagnostics import SourceError
-from ncfix.program.klartext.poles import is_relied_on
-from ncfix.program.moves import Rule
-from ncfix.program.setup import Tool
+from ncfix_heidenhain.klartext.poles import is_relied_on
 from program.klartext.test_following import reasons
 from program.klartext.test_writing import lines
 from program.klartext.tnc import KNOWN, ends, fixed, follow

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.setup import Setup, Tool
 from program.klartext.tnc import KNOWN, ends, follow
 
 
@@ -218,8 +218,8 @@ def test_what_is_not_sure_is_refused(body: str, reason: str) -> None:
     ],
 )
 def test_where_the_control_would_stop(body: str, code: str) -> None:
-    from ncfix.program.reader import read
-    from ncfix.program.trace import trace
+    from ncfix.control.trace import trace
+    from ncfix.text.reader import read
     from program.klartext.tnc import program
 
     with pytest.raises(SourceError) as error:

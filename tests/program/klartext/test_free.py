@@ -11,9 +11,9 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions
 from ncfix.compensate.flat import fix_flat
-from ncfix.program.klartext.free import Element, Leg, solved
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.reader import read
+from ncfix.control.moves import Kind, Rule
+from ncfix.text.reader import read
+from ncfix_heidenhain.klartext.free import Element, Leg, solved
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
 
 NEAR = 1e-3

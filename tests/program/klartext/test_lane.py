@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from ncfix import fast
+from ncfix.control.builder import Circles
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup
 from ncfix.diagnostics import NcfixError
-from ncfix.program.follow.builder import Circles
-from ncfix.program.klartext import lane
-from ncfix.program.klartext.control import Control
-from ncfix.program.klartext.units import Unit
-from ncfix.program.moves import Moves
-from ncfix.program.setup import Setup
+from ncfix_heidenhain.klartext import lane
+from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.units import Unit
 from program.arcs import full_of_klartext_arcs
 from program.klartext.tnc import KNOWN, follow
 

@@ -9,8 +9,8 @@ import pytest
 
 from compensate.streaming import assert_alike, compared, streamed, whole
 from ncfix import fast
+from ncfix.control.parts import NotInPartsError
 from ncfix.machine import Machine, load
-from ncfix.program.parts import NotInPartsError
 
 ODDS = (
     "; point 3",

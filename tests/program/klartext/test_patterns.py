@@ -9,8 +9,8 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions
 from ncfix.compensate.flat import fix_flat
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.reader import read
+from ncfix.control.moves import Kind, Rule
+from ncfix.text.reader import read
 from program.klartext.tnc import KNOWN, THREE, follow, program
 
 DRILL = "CYCL DEF 200 D Q200=2 Q201=-15 Q203=+1 Q204=10\nL X+0 Y+0 Z+50 FMAX\n"

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program import dialects
-from ncfix.program.reach import UNREAD
-from ncfix.program.reader import read
-from ncfix.program.tree import Assignment, Command, Flow, Opaque, Program, Word
-from ncfix.program.writer import apply
+from ncfix.text import dialects
+from ncfix.text.reach import UNREAD
+from ncfix.text.reader import read
+from ncfix.text.tree import Assignment, Command, Flow, Opaque, Program, Word
+from ncfix.text.writer import apply
 from program.klartext.tnc import program
 from program.lanes import assert_read_right
 

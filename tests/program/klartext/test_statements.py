@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.setup import Setup
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.setup import Setup
 from program.klartext.tnc import KNOWN, ends, fixed, follow
 
 

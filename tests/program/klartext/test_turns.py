@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
+from ncfix.control.setup import Setup
 from ncfix.machine import load
-from ncfix.program.klartext.turns import extremes, on_its_side
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup
+from ncfix.text.reader import read
+from ncfix_heidenhain.klartext.turns import extremes, on_its_side
 from program.klartext.tnc import program
 
 SETUP = Setup(work_offsets={"PRESET": {"Z": 120.0}}, initial=dict.fromkeys("XYZBC", 0.0), assume_zero=True)

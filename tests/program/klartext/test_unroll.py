@@ -7,9 +7,9 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.flatten import flatten
 from ncfix.diagnostics import RefusedError
-from ncfix.program.flatten import flatten
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 from program.klartext.tnc import KNOWN, THREE, follow, program
 
 STEPS = dict.fromkeys("XYZ", 0.001)

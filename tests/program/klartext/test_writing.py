@@ -10,12 +10,12 @@ import pytest
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.proof import SelfCheckError
 from ncfix.machine import loads
-from ncfix.program.klartext.arc_text import PieceOfArc, arc_text
-from ncfix.program.klartext.number_text import Style
-from ncfix.program.klartext.poles import pole_in_force
-from ncfix.program.klartext.render import NOT_CLOSED
-from ncfix.program.reader import read
-from ncfix.program.writer import apply
+from ncfix.text.reader import read
+from ncfix.text.writer import apply
+from ncfix_heidenhain.klartext.arc_text import PieceOfArc, arc_text
+from ncfix_heidenhain.klartext.number_text import Style
+from ncfix_heidenhain.klartext.poles import pole_in_force
+from ncfix_heidenhain.klartext.render import NOT_CLOSED
 from program.klartext.tnc import KNOWN, THREE, fixed, follow, program
 
 
@@ -78,7 +78,7 @@ def test_after_an_arc_without_a_pole_the_one_in_force_comes_back() -> None:
 
 
 def test_a_refused_block_that_would_lead_elsewhere_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ncfix.program.klartext.render.pole_in_force", lambda source, at: "X+50 Y+50")
+    monkeypatch.setattr("ncfix_heidenhain.klartext.render.pole_in_force", lambda source, at: "X+50 Y+50")
     with pytest.raises(SelfCheckError, match="would lead to"):
         fixed(AFTER_CR)
 

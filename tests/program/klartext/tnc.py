@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
+from ncfix.control.moves import Moves, Trace
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.machine import Machine, loads
-from ncfix.program.moves import Moves, Trace
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 from program.tracing import ZERO
 
 KNOWN = Setup(

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from ncfix.program.moves import Kinematics, Trace
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.control.moves import Kinematics, Trace
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 
 ZERO = dict.fromkeys("XYZABC", 0.0)
 SYSTEMS = ("G500", "G54", "G55", "G56", "G57", "G505", "G599")

@@ -9,10 +9,10 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import follow
+from ncfix.control.moves import Moves
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={0: Tool(80.0, 3.0), 1: Tool(80.0, 3.0)})
 HEAD = "G710 G17 G90 G94 G54\nT1 D1 M6\nG0 X-100 Y-150 Z50 A0 C0\nG1 F500\n"

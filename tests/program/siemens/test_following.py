@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ncfix.control.moves import Rule
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import SourceError, UsageError
-from ncfix.program.moves import Rule
-from ncfix.program.setup import Setup, Tool
 from program.siemens.following import KNOWN, ZERO, follow
 from program.tracing import ends, last, reasons
 

@@ -10,7 +10,7 @@ import pytest
 from classes.judging import SETUP, machine
 from ncfix.compensate.fix import Fixed, FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 
 MODAL = "MCALL CYCLE81(50,0,2,-20)"
 OWN = "MCALL CYCLE81(50,0,2,-19.991)"

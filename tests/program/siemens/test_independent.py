@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from conftest import missing
-from ncfix.program.reader import read
-from ncfix.program.trace import trace
+from ncfix.control.trace import trace
+from ncfix.text.reader import read
 from program.siemens.following import KNOWN
 
 PROGRAMS = 80

@@ -9,11 +9,11 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import traced
+from ncfix.control.setup import Setup, Tool
 from ncfix.diagnostics import RefusedError
 from ncfix.machine import load
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.sinumerik.numbering import renumbered
+from ncfix.text.reader import read
+from ncfix_siemens.sinumerik.numbering import renumbered
 
 
 @pytest.mark.parametrize(

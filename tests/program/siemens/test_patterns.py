@@ -9,10 +9,10 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.flat import fix_flat
+from ncfix.control.flatten import flatten
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import Machine, load
-from ncfix.program.flatten import flatten
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 SETUP = Setup(assume_zero=True, tools={0: Tool(80.0, 3.0), 1: Tool(80.0, 3.0)})
 HEAD = "G710 G17 G90 G94 G54\nT1 D1 M6\nG0 X0 Y0 Z40 A0 C0\nMCALL CYCLE81(10,0,2,-5)\n"

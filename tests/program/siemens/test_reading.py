@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from ncfix.diagnostics import SourceError
-from ncfix.program import dialects
-from ncfix.program.reader import read
-from ncfix.program.tree import Assignment, Call, Command, Flow, Literal, NamedParameter, Opaque, Program, Word
+from ncfix.text import dialects
+from ncfix.text.reader import read
+from ncfix.text.tree import Assignment, Call, Command, Flow, Literal, NamedParameter, Opaque, Program, Word
 from program.lanes import assert_read_right
 
 BLOCKS = """%_N_PART_MPF

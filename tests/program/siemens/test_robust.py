@@ -11,12 +11,12 @@ import pytest
 
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import kinematics_of
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.setup import Setup, Tool
+from ncfix.control.trace import trace
 from ncfix.diagnostics import NcfixError
 from ncfix.machine import Machine, load
-from ncfix.program.moves import Kind, Rule
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
-from ncfix.program.trace import trace
+from ncfix.text.reader import read
 from program.siemens.following import SYSTEMS, ZERO
 
 SETUP = Setup(

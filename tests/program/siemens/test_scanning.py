@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ncfix.program.sinumerik.scanning import in_names
+from ncfix_siemens.sinumerik.scanning import in_names
 
 NAME = re.compile(rb"[A-Za-z_$0-9]+")
 EXTENSION = re.compile(rb"(?<![A-Za-z_$])[A-Za-z](\d+)(?=[ \t]*=)")

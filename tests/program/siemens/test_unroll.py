@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from ncfix.control.flatten import flatten
 from ncfix.diagnostics import RefusedError
-from ncfix.program.flatten import flatten
-from ncfix.program.reader import read
+from ncfix.text.reader import read
 from program.siemens.following import KNOWN
 
 

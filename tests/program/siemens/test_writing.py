@@ -12,10 +12,10 @@ import pytest
 from classes.judging import SETUP, machine
 from ncfix.compensate.fix import FixOptions, fix_program
 from ncfix.compensate.following import traced
+from ncfix.control.moves import Kind, Moves
+from ncfix.control.setup import Setup, Tool
 from ncfix.machine import load
-from ncfix.program.moves import Kind, Moves
-from ncfix.program.reader import read
-from ncfix.program.setup import Setup, Tool
+from ncfix.text.reader import read
 
 
 def written(body: str) -> str:

@@ -1,0 +1,84 @@
+"""The control while it follows a program of the Fanuc family: what it keeps besides that of RS274."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from ncfix.control.coordinates import INDEX
+from ncfix.control.setup import POINTLESS
+from ncfix.diagnostics import Message
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+from ncfix.text.tree import Template
+from ncfix_fanuc.macro.rules import RULES
+from ncfix_fanuc.macro.scaling import Scaling
+from ncfix_fanuc.macro.squaring import stands_square
+from ncfix_fanuc.macro.variables import Variables
+from ncfix_iso.rs274.control import Block, Control
+
+NO_POINT = "NCF240"
+DEFAULT_SYSTEM = "IS-B"
+
+
+class MacroControl(Control):
+    """`Control` with the decimal-point rule, polar coordinates and the variables of Macro B.
+
+    polar   radius and angle last commanded while G16 is in force, program units and degrees; None otherwise
+    scaling        what G51 does to words; None without it
+    mirrored       letter index -> where the axis is mirrored (G51.1), mm in the program's frame
+    length_code    the code of the tool length offset in force (G43, G43.4, G44), 0 without
+    length_number  the last H; None if the program has named none
+    coming         gives the shapes of the blocks that follow in the text
+    defining, definition  P of the tilted plane that is being defined, and its blocks so far by their Q
+    dynamic        the work offset turns with the tables (G254 of Haas)
+    vectors        the direction of the tool is given by I J K (G43.5)
+    """
+
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect, RULES[dialect.semantics])
+        self.parameters: Variables = Variables()
+        self.polar: tuple[float, float] | None = None
+        self.scaling: Scaling | None = None
+        self.mirrored: dict[int, float] = {}
+        self.length_code = 0
+        self.length_number: int | None = None
+        self.coming: Callable[[], Iterable[Template]] = lambda: ()
+        self.defining = 0
+        self.definition: dict[int, Block] = {}
+        self.dynamic = False
+        self.vectors = False
+
+    @property
+    def probes_nominally(self) -> bool:
+        """Never: variables hold where the machine stands, besides what a probe finds."""
+        return False
+
+    def stands_square(self) -> bool:
+        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
+        return self.tilted and stands_square(self)
+
+    def refresh(self) -> None:
+        """Compose the offsets; a number without a point counts increments of the unit in force."""
+        steps = POINTLESS.get(self.setup.no_point)
+        if steps is not None:
+            self.increments = (steps.mm if self.modal.unit == 1.0 else steps.inch, steps.degree)
+        super().refresh()
+
+    def least_increment(self, address: str) -> float:
+        """The least increment of an address in its own unit, of the usual increment system if none is given."""
+        steps = POINTLESS.get(self.setup.no_point) or POINTLESS[DEFAULT_SYSTEM]
+        if address in INDEX and self.rotary[INDEX[address]]:
+            return steps.degree
+        return steps.mm if self.modal.unit == 1.0 else steps.inch
+
+    def without_point(self, address: str, value: float, *, angle: bool = False) -> float:
+        """What a number without a decimal point means; asked of the setup, for nobody can see it in the program."""
+        if value == 0.0 or self.setup.no_point == "calculator":
+            return value
+        if self.setup.no_point in POINTLESS:
+            turning = angle or (address in INDEX and self.rotary[INDEX[address]])
+            return value * self.increments[1 if turning else 0]
+        text = f"{address}{value:g} has no decimal point, and whether it counts units or least increments is not given"
+        hint = "--no-point IS-B: X50 is 0.050 mm; --no-point calculator: X50 is 50 mm"
+        self.knowledge.missing.setdefault(NO_POINT, Message(NO_POINT, text, self.place(), hint))
+        return value

@@ -1,0 +1,146 @@
+"""G10 of these controls: work offsets (L2, L20) and tool lengths (L10); the other kinds change what is not followed.
+
+Source: Fanuc 30i operator's manual (machining centre), "Programmable data input".
+"""
+
+from __future__ import annotations
+
+from ncfix.control.coordinates import DEGREE, LETTERS, X, Y, Z
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix.control.places import mask_of
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.settings import AFTER_UNFOLLOWED
+from ncfix_iso.rs274.systems import (
+    SYSTEM_NAMES,
+    activate,
+    extended_system,
+    first_parameter,
+    moved_while_turned,
+    store,
+    stored,
+    words_of,
+)
+
+WORK_OFFSETS = 6
+FIRST_EXTENDED, ALL_EXTENDED = 1100, 1540
+AFTER_MADE = "where the axis {} stands after motions that the control makes up is not followed"
+MADE = {
+    470: "engraving of text (G47)",
+    120: "a circular pocket (G12)",
+    130: "a circular pocket (G13)",
+    1500: "a pocket (G150)",
+    290: "return from the reference point (G29)",
+}
+"""Motions that the control makes up."""
+
+SETTING_ERRORS = {
+    542: "the dynamic offset of the rotary table (G54.2), whose data are in the control, is in force",
+    544: "the setting error of the workpiece (G54.4), whose data are in the control, is in force",
+}
+
+LENGTHS = (10,)
+UNFOLLOWED = {
+    11: "tool wear (G10 L11)",
+    50: "parameters of the control (G10 L50)",
+    52: "parameters of the control (G10 L52)",
+}
+CHANGED = "the length of the tool is changed while it is in force (G10 L10, #11001), which acts sooner or later"
+HARMLESS = frozenset({3, 12, 13})
+"""Tool life, and tool radii, which only the control's cutter compensation uses."""
+
+
+def extended(control: Control, block: Block, code: int) -> None:
+    """G154 Pn of Haas, and G110 (P1) to G129 (P20): an additional work offset."""
+    number = (code - FIRST_EXTENDED) / 10 + 1 if code < ALL_EXTENDED else block.get("P", 1.0)
+    extended_system(control, Block(block.index, {"P": number}, block.runtime, block.axes))
+
+
+def setting_error(control: Control, block: Block, code: int) -> None:
+    """G54.2 Pn and G54.4 Pn: offsets that turn with the tables; P0 ends them."""
+    if block.get("P") or block.runtime:
+        control.suspended[SETTING_ERRORS[code]] = SETTING_ERRORS[code]
+    elif control.suspended.pop(SETTING_ERRORS[code], None):
+        control.lose(control.machine, AFTER_UNFOLLOWED)
+
+
+def made(control: Control, block: Block, code: int) -> None:
+    """A text or a pocket that the control mills by itself, and the way back from a reference point."""
+    gone = {index for index in control.machine if block.axes >> index & 1 or index in (X, Y, Z)}
+    unknown = control.unknown | dict.fromkeys(sorted(gone), AFTER_MADE)
+    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, 0, refusal=MADE[code]))
+
+
+def set_data(control: Control, block: Block, code: int) -> None:
+    """G10; a block without L takes tool lengths on old controls."""
+    kind = whole(block.get("L", 10.0 if "P" in block.values else -1.0), "L of G10")
+    if kind == 2:
+        set_offset(control, block)
+    elif kind == 20:
+        set_extended(control, block)
+    elif kind in LENGTHS:
+        set_length(control, block)
+    elif kind not in HARMLESS:
+        what = UNFOLLOWED.get(kind, f"data of the control (G10 L{kind})")
+        control.refusal = control.refusal or f"the program sets {what}, which ncfix does not follow"
+
+
+def set_offset(control: Control, block: Block) -> None:
+    """L2 Pn: the words are the offset of G54 (P1) to G59 (P6), or are added to it in G91."""
+    system = whole(block.get("P"), "P of G10")
+    if not 1 <= system <= WORK_OFFSETS:
+        control.refusal = control.refusal or "the program sets the external work offset (G10 L2 P0)"
+        return
+    first = first_parameter(system)
+    before = stored(control, first)
+    if control.modal.incremental and SYSTEM_NAMES[system - 1] not in control.setup.work_offsets:
+        control.knowledge.work_offset(SYSTEM_NAMES[system - 1])
+    for index in words_of(block):
+        value = control.scale[index] * block.values[LETTERS[index]]
+        value += before[index] if control.modal.incremental else 0.0
+        store(control, first, index, value, LETTERS[index] in block.runtime)
+    if system == control.modal.system:
+        moved_while_turned(control, "G10")
+        activate(control, system)
+        control.places.shift(mask_of(words_of(block)))
+
+
+def set_extended(control: Control, block: Block) -> None:
+    """L20 Pn: the words are the offset of G54.1 Pn, or are added to it in G91."""
+    name = f"G54.1P{whole(block.get('P'), 'P of G10')}"
+    given = dict(control.setup.work_offsets.get(name, {}))
+    if control.modal.incremental and not given:
+        control.knowledge.work_offset(name)
+    for index in words_of(block):
+        letter = LETTERS[index]
+        value = control.scale[index] * block.values[letter] / (DEGREE if control.rotary[index] else 1.0)
+        given[letter] = value + (given.get(letter, 0.0) if control.modal.incremental else 0.0)
+    if block.runtime:
+        control.refusal = control.refusal or f"the work offset {name} is known only at run time"
+    control.extended[name] = given
+    if control.modal.system == 0 and control.extended_name == name:
+        moved_while_turned(control, "G10")
+        extended_system(control, block)
+        control.places.shift(mask_of(words_of(block)))
+
+
+def set_length(control: Control, block: Block) -> None:
+    """L10 Pn R: the length of tool offset n; in G91 it is added."""
+    number = whole(block.get("P"), "P of G10")
+    if "R" not in block.values:
+        control.refusal = control.refusal or "a tool is set by other words than R (G10 L10)"
+        return
+    length = control.modal.unit * block.values["R"]
+    if control.modal.incremental:
+        length += control.tools.lengths.get(number, control.knowledge.tool_length(number))
+    keep_length(control, number, length, runtime="R" in block.runtime)
+
+
+def keep_length(control: Control, number: int, length: float, *, runtime: bool) -> None:
+    """The program sets the length of a tool, mm; `runtime`: it is known at run time only."""
+    if control.tools.offset == number and (runtime or length != control.offsets.tool[Z]):
+        control.suspended[CHANGED] = CHANGED
+    control.tools.lengths[number] = length
+    if runtime:
+        control.tools.measured.add(number)

@@ -1,0 +1,368 @@
+"""The walk through a program of the Fanuc family."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from ncfix.control.coordinates import INCH, LETTERS, PLANES, Z
+from ncfix.control.faults import Fault
+from ncfix.control.places import mask_of
+from ncfix.text.tree import Literal, Opaque, Program, Span, Template, Word
+from ncfix_fanuc.macro import dynamic, polar, scaling, system, vectors
+from ncfix_fanuc.macro.arithmetic import variable_number
+from ncfix_fanuc.macro.calls import LENGTHS, local_variables
+from ncfix_fanuc.macro.control import MacroControl
+from ncfix_fanuc.macro.corners import CORNER
+from ncfix_fanuc.macro.flow import BAD_JUMP, MacroFlow
+from ncfix_fanuc.macro.lengths import LENGTH_IN_STEPS, lone_number
+from ncfix_fanuc.macro.points import G15, G16, is_angle, is_scaled
+from ncfix_fanuc.macro.rules import MACRO
+from ncfix_fanuc.macro.variables import POSITION_READ, is_system
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block
+from ncfix_iso.rs274.interpreter import LAST_PROGRAM, PROGRAM_ENDS, Interpreter
+from ncfix_iso.rs274.order import MACHINE
+from ncfix_iso.rs274.parameters import Store
+from ncfix_iso.rs274.plans import Codes, Plan, plan_of
+
+G20, G21, G90, G91 = 200, 210, 900, 910
+G65, G66_1, G67 = 650, 661, 670
+SUBPROGRAM, LOCAL_SUBPROGRAM, RETURN = (980, 1980), 970, 990
+NO_UNIT = "NCF215"
+NOT_SET = "NCF244"
+ANGLE = ",A"
+BY_ANGLE = "a line that is given by its angle (,A) is not followed"
+AFTER_ANGLE = "where the axis {} stands after a line that is given by its angle (,A) is not followed"
+COMMAND_NOT_KNOWN = "the command {} is not known, and may move axes or change coordinates"
+NAME = re.compile(r"<(?P<angle>[^<>]+)>|\"(?P<quoted>[^\"]+)\"")
+
+
+def is_called(program: Program) -> bool:
+    """Whether a text is no program of its own: it returns (M99) and never ends (M2, M30)."""
+    codes = {code for template in program.templates for code in template.m_codes}
+    return RETURN in codes and codes.isdisjoint(PROGRAM_ENDS)
+
+
+@dataclass(frozen=True, slots=True)
+class ModalCall:
+    """A macro that is called after every motion (G66)."""
+
+    label: str
+    times: int
+    arguments: Store
+    depth: int
+
+
+class MacroInterpreter(Interpreter):
+    """Follows one program."""
+
+    control: MacroControl
+    flow: MacroFlow
+
+    def __init__(
+        self,
+        control: MacroControl,
+        program: Program,
+        resolve: Callable[[str], bytes | None] | None,
+        max_blocks: int,
+    ) -> None:
+        super().__init__(control, program, resolve, max_blocks)
+        self.modal_calls: list[ModalCall] = []
+        self.reduced: dict[tuple[int, frozenset[Span]], Plan] = {}
+        self.moved = False
+        self.cornered = False
+        self.unit_said = False
+
+    def prepared(self) -> MacroFlow:
+        """Give the control its own variables; where execution begins."""
+        control = self.control
+        control.parameters.persistent = lambda number: None
+        control.parameters.live = system.getters(control)
+        control.parameters.position = self.position_read
+        control.parameters.unset = self.not_set
+        control.parameters.inherits = is_called(self.main.program)
+        control.coming = self.coming
+        return MacroFlow(control, self.main, self.find)
+
+    def coming(self) -> Iterator[Template]:
+        """The shapes of the blocks that follow in the text."""
+        unit = self.flow.unit
+        return (unit.program.templates[unit.program.template[block]] for block in range(self.flow.block, len(unit)))
+
+    def takes_stretches(self) -> bool:
+        """Not while a macro is called after every motion, words are polar or directions, or a corner is put in."""
+        control = self.control
+        special = control.polar is not None or control.scaling is not None or control.vectors
+        return super().takes_stretches() and not (special or self.modal_calls or self.cornered)
+
+    def position_read(self, number: int) -> None:
+        """The program reads where the machine stands, which compensation changes."""
+        text = f"the program reads the position #{number}: on the machine it finds the corrected one there"
+        self.control.warn(POSITION_READ, text, "motions that are computed from it are refused")
+
+    def not_set(self, number: int) -> None:
+        """The program reads a variable that somebody else may have set."""
+        text = f"the program reads #{number}, which it has not set: what is in it is known only at run time"
+        self.control.warn(NOT_SET, text, f'variables."#{number}" in the setup file')
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan) -> bool:
+        """Execute the block before `flow.block`; True if the program ends there."""
+        block, self.flow.passed = self.flow.block, False
+        ended = super().execute(plan)
+        if plan.flow is None or self.flow.block != block:
+            return ended
+        if plan.flow.keyword == "if then" and self.flow.passed:
+            return self.execute_words(plan, block - 1)
+        return ended
+
+    def execute_words(self, plan: Plan, index: int) -> bool:
+        """Execute a block of words and assignments."""
+        self.moved = False
+        self.note_command(plan)
+        plan = self.without_vacant(plan)
+        codes = plan.codes
+        if codes is not None and codes.g.get(MACRO) and plan.fault is None:
+            self.macro(plan, codes)
+            return False
+        refusal = self.control.refusal
+        if ANGLE in plan.letters:
+            self.control.refusal = refusal or BY_ANGLE
+        self.control.whole = self.cornered or bool(plan.letters & CORNER)
+        ended = super().execute_words(plan, index)
+        if self.moved:
+            self.cornered = bool(plan.letters & CORNER)
+        self.control.whole = False
+        if ANGLE in plan.letters:
+            self.control.refusal = refusal
+            self.note_angle(plan)
+        return ended
+
+    def note_angle(self, plan: Plan) -> None:
+        """A line given by its angle (,A): the coordinate that its block leaves out is not followed."""
+        plane = self.control.modal.plane
+        missing = [index for index in (plane.first, plane.second) if LETTERS[index] not in plan.letters]
+        self.control.lose(missing, AFTER_ANGLE)
+
+    def note_command(self, plan: Plan) -> None:
+        """A command of a machine's own: nobody knows what it does."""
+        for item in plan.template.items:
+            if isinstance(item, Opaque) and item.kind == "unknown command" and not self.control.refusal:
+                text = self.flow.unit.program.slice(self.flow.block - 1, item.span).strip()
+                self.control.refusal = COMMAND_NOT_KNOWN.format(text.split()[0][:30])
+                self.control.warn("NCF228", self.control.refusal, "all motions after it are refused")
+
+    def without_vacant(self, plan: Plan) -> Plan:
+        """The plan without the words whose value is a vacant variable: they count as not written."""
+        if not plan.computed and not plan.code_words:
+            return plan
+        spans = [span for _, function, span in plan.computed if math.isnan(function(self.control))]
+        spans += [word.span for word, function in plan.code_words if math.isnan(function(self.control))]
+        if not spans:
+            return plan
+        key = id(plan), frozenset(spans)
+        if key not in self.reduced:
+            items = plan.template.items
+            kept = tuple(item for item in items if not (isinstance(item, Word) and item.span in spans))
+            self.reduced[key] = plan_of(Template(kept, plan.template.n_numbers), self.control.rules)
+        return self.reduced[key]
+
+    def evaluate(self, plan: Plan, index: int) -> Block:
+        """The values of a block, by the decimal-point rule, polar coordinates made Cartesian."""
+        block = super().evaluate(plan, index)
+        if plan.assignments:
+            block.runtime |= {letter for letter, _, _ in plan.computed}  # set sooner or later than they are read
+        codes = set() if plan.codes is None else set(plan.codes.g.values())
+        self.at_once(codes)
+        self.take_points(plan, block)
+        if G16 in codes:
+            polar.switch(self.control, block, G16)
+        if self.control.polar is not None and G15 not in codes and plan.codes is not None and not plan.codes.takes:
+            block = polar.cartesian(self.control, block)
+        if scaling.ON in codes and "P" in plan.pointless:
+            block.runtime |= {"P"}  # thousandths or hundred-thousandths, as a parameter says
+        return block if plan.codes is None else scaling.scaled(self.control, block, plan.codes)
+
+    def take_points(self, plan: Plan, block: Block) -> None:
+        """Numbers without a decimal point count increments, or as the setup says."""
+        for letter in plan.pointless:
+            if is_scaled(self.control, plan, letter):
+                self.span = next(word.span for word in plan.template.words if word.address == letter)
+                angle = is_angle(self.control, plan, letter)
+                block.values[letter] = self.control.without_point(letter, block.values[letter], angle=angle)
+        self.span = None
+
+    def at_once(self, codes: set[int]) -> None:
+        """Unit, plane, G90 and G91 of a block already say what its own numbers mean."""
+        modal = self.control.modal
+        if codes & {G20, G21}:
+            self.unit_said = True
+            modal.unit = INCH if G20 in codes else 1.0
+            self.control.refresh()
+        if codes & {G90, G91}:
+            modal.incremental = G91 in codes
+        for code in codes & PLANES.keys():
+            modal.plane = PLANES[code]
+
+    def settings(self, codes: Codes, block: Block) -> None:
+        """What a block sets before its motion; H alone sets something, too."""
+        before = self.control.offsets.tool[Z]
+        super().settings(codes, block)
+        lone_number(self.control, block, codes)
+        if self.control.vectors and codes.takes and block.values.keys() & {*vectors.COMPONENTS}:
+            self.control.lose(self.control.turning, vectors.AFTER_VECTOR)
+        changed = self.control.offsets.tool[Z] != before and not codes.takes
+        if changed and self.control.modal.incremental and "Z" in block.values:
+            self.control.lose((Z,), LENGTH_IN_STEPS)
+
+    def assign(self, plan: Plan) -> None:
+        """Set the variables that a block sets, one after the other."""
+        parameters = self.control.parameters
+        for target, function, span in plan.assignments:
+            self.span = span
+            parameters.touched = False
+            number = variable_number(target(self.control)) if callable(target) else int(target)
+            parameters.check_writable(number)
+            value = function(self.control)
+            runtime = parameters.touched
+            parameters.assign(number, value, runtime)
+            if is_system(number):
+                system.was_set(self.control, number, value, runtime)
+
+    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+        """The motion code that a block executes; a direction of the tool (G43.5) is a motion, too."""
+        found = super().motion_of(plan, codes)
+        vector = self.control.vectors and not plan.letters.isdisjoint(vectors.COMPONENTS)
+        if found is None and vector and codes.motion is None and not codes.takes:
+            return self.control.modal.motion if self.control.modal.motion in vectors.STRAIGHT else None
+        return found
+
+    def move(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block."""
+        before = self.control.builder.count
+        if dynamic.turned(self.control, block):
+            self.control.suspended[dynamic.KEY] = dynamic.MOVED
+        if self.control.vectors:
+            self.by_vector(block, codes, motion)
+        else:
+            super().move(block, codes, motion)
+        self.moved = self.control.builder.count > before
+        if self.moved and not self.unit_said:
+            text = "the program does not say whether it is in inches or millimetres, and is taken as millimetres"
+            self.control.warn(NO_UNIT, text, "put G20 or G21 at its beginning")
+
+    def by_vector(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block while I J K say where the tool points; rotary axes never get words of their own."""
+        control, axes = self.control, self.control.turning
+        before, why = control.refusal, "" if MACHINE in codes.g.values() else vectors.directed(control, block, motion)
+        control.refusal = before or why
+        super().move(block, codes, motion)
+        if why:
+            control.refusal = before
+            control.lose(axes if why != vectors.ON_ARC or block.values.keys() & {*"IJK"} else (), vectors.AFTER_VECTOR)
+        control.places.lose(mask_of(axes))
+
+    # -- calls and ends -----------------------------------------------------------------------------------------------
+
+    def after(self, codes: Codes, block: Block) -> bool:
+        """What a block does last: M2, M30, calls and returns. True if the program ends."""
+        if codes.stop in PROGRAM_ENDS:
+            return True
+        if codes.call == RETURN:
+            return self.returned(block)
+        if codes.call in SUBPROGRAM:
+            self.subprogram(block)
+        elif codes.call == LOCAL_SUBPROGRAM:
+            self.flow.enter_local(whole(block.get("P"), "P of M97"), whole(block.get("L", 1.0), "L of M97"))
+        else:
+            self.call_modal()
+        return False
+
+    def returned(self, block: Block) -> bool:
+        """M99: back to the caller; in the main program, to block P or to the start, where ncfix takes it as the end."""
+        target = whole(block.get("P"), "P of M99") if "P" in block.values else None
+        if self.flow.calls:
+            self.flow.finish(target)
+            return False
+        if target is None:
+            return True
+        self.flow.go_to(target)
+        return False
+
+    def subprogram(self, block: Block) -> None:
+        """M98 Pn Ln Qn; the repeats may stand before four digits of the number, Q is the block to begin at."""
+        if "H" in block.values:
+            raise Fault(BAD_JUMP, "M98 with H means other things on other controls", "split the subprogram in two")
+        name, times = self.named_program(), whole(block.get("L", 1.0), "L of M98")
+        if not name:
+            number = whole(block.get("P"), "P of M98")
+            if "L" not in block.values and number > LAST_PROGRAM and not self.is_there(str(number)):
+                times, number = divmod(number, LAST_PROGRAM + 1)
+            name = str(number)
+        self.flow.begin(name, times, None)
+        if "Q" in block.values:
+            if times != 1:
+                raise Fault(BAD_JUMP, "where a repeated call begins that names a block (Q of M98) is not certain")
+            self.flow.go_to(whole(block.values["Q"], "Q of M98"))
+
+    def is_there(self, label: str) -> bool:
+        """Whether there is a program of that number."""
+        outline = self.flow.outline_of(self.main)
+        return label in outline.programs or self.find(label) is not None
+
+    def named_program(self) -> str:
+        """The name of a program that is called by name, `M98<NAME>`."""
+        unit, block = self.flow.unit, self.flow.block - 1
+        for item in unit.program.items_of(block):
+            if isinstance(item, Opaque) and item.kind == "text word":
+                found = NAME.search(unit.program.slice(block, item.span))
+                return (found["angle"] or found["quoted"]) if found else ""
+        return ""
+
+    # -- macros -------------------------------------------------------------------------------------------------------
+
+    def macro(self, plan: Plan, codes: Codes) -> None:
+        """G65 calls a macro once, G66 after every motion that follows, G67 ends that."""
+        code = codes.g[MACRO]
+        if code == G67:
+            if self.modal_calls:
+                self.modal_calls.pop()
+            return
+        values = {word.address: self.argument(word) for word in plan.template.words if word.address not in "GMN"}
+        name = self.named_program()
+        label = name or str(whole(values.get("P", (0.0, False))[0], f"P of G{code // 10}"))
+        times = whole(values.get("L", (1.0, False))[0], "L")
+        store = local_variables(self.arguments(plan))
+        if code == G65:
+            self.flow.begin(label, times, store)
+            return
+        if code == G66_1:
+            self.control.refusal = self.control.refusal or "a macro is called by every block (G66.1)"
+        self.modal_calls.append(ModalCall(label, times, store, len(self.flow.calls)))
+
+    def arguments(self, plan: Plan) -> Iterator[tuple[str, float, bool]]:
+        """The arguments of a macro call in the order written; vacant ones are not passed."""
+        for word in plan.template.words:
+            if word.address not in "GMNPL":
+                value, runtime = self.argument(word)
+                if not math.isnan(value):
+                    yield word.address, value, runtime
+
+    def argument(self, word: Word) -> tuple[float, bool]:
+        """The value of a word of a macro call, and whether it is known only at run time."""
+        value, at_runtime = self.control.value_of(self.control.rules.compiled(word.value, word.address))
+        if isinstance(word.value, Literal) and word.value.pointless and word.address in LENGTHS:
+            value = self.control.without_point(word.address, value)
+        return value, at_runtime
+
+    def call_modal(self) -> None:
+        """After a motion, call the macro that G66 named, unless it is running."""
+        if not self.moved or not self.modal_calls:
+            return
+        call = self.modal_calls[-1]
+        if len(self.flow.calls) <= call.depth:
+            self.flow.begin(call.label, call.times, call.arguments)

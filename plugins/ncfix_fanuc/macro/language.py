@@ -1,0 +1,93 @@
+"""The Fanuc family as a `Language`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.finish import finished
+from ncfix.control.moves import Kind, Moves, Trace
+from ncfix.text.language import BulkLayout, Run
+from ncfix.text.layout import CENTRE_LETTERS, Layout
+from ncfix.text.shapes import Scan, scan
+from ncfix.text.tree import Literal, Program
+from ncfix.writer.pieces import Pieces
+from ncfix_fanuc.macro.blocks import parse_block
+from ncfix_fanuc.macro.control import MacroControl
+from ncfix_fanuc.macro.corners import axes_of_corner, has_corners
+from ncfix_fanuc.macro.following import MacroFollower, runs_straight_on
+from ncfix_fanuc.macro.interpreter import MacroInterpreter
+from ncfix_fanuc.macro.render import render
+from ncfix_iso.rs274.language import RS274, writable
+
+if TYPE_CHECKING:
+    from ncfix.control.flatten import FlatLine
+    from ncfix.text.language import Language
+
+
+def scanned(source: bytes, blocks: NDArray[np.int64]) -> Scan:
+    """The shapes of blocks, in which numbers with and without a decimal point differ."""
+    return scan(source, blocks, pointless=True)
+
+
+def following(program: Program, run: Run) -> MacroInterpreter:
+    """The control's walk through a program, before its first step."""
+    control = MacroControl(run, program.dialect)
+    return MacroInterpreter(control, program, run.resolve, run.budget(program))
+
+
+def follow(program: Program, run: Run) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    walk = following(program, run)
+    walk.run()
+    return finished(walk.control, program, walk.control.moves())
+
+
+def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
+    """The blocks of a program of this family as they are executed."""
+    from ncfix_iso.rs274.unroll import unrolled
+
+    return unrolled(following(program, run), steps, limit)
+
+
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What blocks need to be written many at a time; those with a number without a point are not."""
+    words = program.templates[int(program.template[block])].words
+    if any(isinstance(word.value, Literal) and word.value.pointless for word in words if word.address not in "NFS"):
+        return None
+    assert RS274.bulk is not None
+    return None if has_corners(program) else RS274.bulk(program, block)
+
+
+def one_by_one(program: Program, moves: Moves, _pieces: Pieces, _first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) straight motions with I J K: there these give the direction of the tool (G43.5)."""
+    shapes = [any(word.address in CENTRE_LETTERS for word in template.words) for template in program.templates]
+    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    pointed &= moves.kind != Kind.ARC
+    return pointed
+
+
+def layout(program: Program, block: int) -> Layout | None:
+    """The layout of a block; at a corner that the control rounds, axes outside its plane get no words."""
+    found = writable(program, block)
+    return None if found is None else replace(found, allowed=axes_of_corner(program, block))
+
+
+FANUC: Language = replace(
+    RS274,
+    scan=scanned,
+    parse=parse_block,
+    follow=follow,
+    layout=layout,
+    alike=False,
+    render=render,
+    bulk=in_bulk,
+    one_by_one=one_by_one,
+    unroll=unroll,
+    follower=MacroFollower,
+    straight=runs_straight_on,
+)

@@ -1,0 +1,119 @@
+"""Tool lengths of these controls: H stays in force, and another H alone is another length at once.
+
+Source: Fanuc 30i operator's manual (machining centre), "Tool length offset": the number of H is modal, H0 is no offset.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.control.coordinates import Z
+from ncfix.control.places import mask_of
+from ncfix.text.tree import Comment, Tape, Word
+from ncfix_fanuc.macro.data import CHANGED
+from ncfix_fanuc.macro.vectors import INCLINED
+from ncfix_iso.rs274 import lengths
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.groups import LENGTH
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+    from ncfix_iso.rs274.control import Block
+    from ncfix_iso.rs274.plans import Codes
+
+LENGTH_ALONE = "NCF214"
+ALONE = "a tool length without a Z word (G43, G49) is taken not to move the axis: up to the next Z word that matters"
+LENGTH_IN_STEPS = "where the axis {} stands after a tool length together with an increment (G91) is not certain"
+NO_NUMBER = "NCF217"
+SPINDLE = "a tool length without H is taken as that of the tool in the spindle"
+TURNED = "NCF218"
+TURNED_TEXT = (
+    "rotary axes stand turned where G43.4 is switched on; X Y Z are taken to ride on the workpiece as it lies with all"
+    " of them at zero (parameters 19696 WKP, 19754 RPS)"
+)
+BY_ANGLE, BY_VECTOR = 434, 435
+HAAS_TIP = 2340
+TIP_CONTROL = (BY_ANGLE, BY_VECTOR)
+NOTHING = 1e-12
+PLAIN_CANCEL = 490
+CANCEL = (PLAIN_CANCEL, 491)
+SAME = {491: PLAIN_CANCEL, BY_VECTOR: BY_ANGLE, HAAS_TIP: BY_ANGLE}
+"""What codes do to the length of the tool."""
+
+G91 = 910
+REFERENCE = frozenset((280, 300, 530))
+ENDS = frozenset((20, 300))
+CALLS = frozenset((970, 980, 990, 1980))
+MOVING = frozenset("XYABCUVWIJKRP")
+"""Addresses of blocks that move something, or call what may."""
+
+
+def tool_offset(control: MacroControl, block: Block, code: int) -> None:
+    """G43 to G49. Without a Z word the axis moves by the change of the length, or only its coordinate does."""
+    before = control.offsets.tool[Z]
+    control.suspended.pop(CHANGED, None)
+    direct(control, block, code)
+    if code in CANCEL:
+        control.length_code = 0
+    else:
+        control.length_code = code
+        take_number(control, block)
+        if code in TIP_CONTROL:
+            note_turned(control)
+    lengths.tool_offset(control, block, SAME.get(code, code))
+    if control.offsets.tool[Z] != before and "Z" not in block.values and not settled(control):
+        control.warn(LENGTH_ALONE, ALONE, "state Z in the block, or check what the control does (parameter TOS)")
+
+
+def direct(control: MacroControl, block: Block, code: int) -> None:
+    """G43.5 takes the direction of the tool from I J K; its Q would lean the tool away from them."""
+    control.suspended.pop(INCLINED, None)
+    control.vectors = code == BY_VECTOR
+    if control.vectors:
+        control.places.lose(mask_of(control.turning))
+        if block.get("Q") != 0.0:
+            control.suspended[INCLINED] = INCLINED
+
+
+def settled(control: MacroControl) -> bool:
+    """Whether Z is named, or the program ends, before anything else moves: then nothing rests on where Z stands."""
+    for shape in control.coming():
+        words = {word.address for word in shape.words}
+        if not all(isinstance(item, Word | Comment | Tape) for item in shape.items):
+            return False
+        if "Z" in words:
+            incremental = control.modal.incremental or G91 in shape.g_codes
+            return not incremental or not REFERENCE.isdisjoint(shape.g_codes)
+        if not ENDS.isdisjoint(shape.m_codes):
+            return True
+        if words & MOVING or not CALLS.isdisjoint(shape.m_codes):
+            return False
+    return False
+
+
+def note_turned(control: MacroControl) -> None:
+    """What X Y Z count from if rotary axes stand turned where G43.4 is switched on depends on the control."""
+    if not control.tcp and any(abs(control.position[i]) > NOTHING for i in control.turning):
+        control.warn(TURNED, TURNED_TEXT, "switch G43.4 on with the rotary axes at zero, or check the parameters")
+
+
+def take_number(control: MacroControl, block: Block) -> None:
+    """H of the block, or that in force; a program that has never named one means the tool in the spindle."""
+    if "H" in block.values:
+        control.length_number = whole(block.values["H"], "H")
+    elif control.length_number is not None:
+        block.values["H"] = float(control.length_number)
+    else:
+        control.warn(NO_NUMBER, SPINDLE, "state H in the block of G43")
+
+
+def lone_number(control: MacroControl, block: Block, codes: Codes) -> None:
+    """An H word in a block without G43: another length, at once where one is in force."""
+    if "H" not in block.values or LENGTH in codes.g or codes.call is not None:
+        return
+    if control.length_code:
+        inclined = {key: why for key, why in control.suspended.items() if key == INCLINED}
+        tool_offset(control, block, control.length_code)
+        control.suspended |= inclined
+    else:
+        control.length_number = whole(block.values["H"], "H")

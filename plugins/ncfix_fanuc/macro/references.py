@@ -1,0 +1,66 @@
+"""Reference points of these controls: G28 goes to the first, G27 checks one, G30 Pn goes to a further one.
+
+Sources: Fanuc 30i operator's manual (machining centre), "Reference position": G27 is a rapid to its words; Haas mill
+operator's manual, G28, G49.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.lengths import tool_offset
+from ncfix_iso.rs274.motion import AFTER_REFERENCE, REFERENCE_POINT, go_to_reference
+from ncfix_iso.rs274.targets import destination
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+
+CHECKED = Passing(Pass.REFERENCE_POINT, "reference point check (G27)")
+AFTER_ALL = "where the axis {} stands after G28 that names no axis differs from control to control"
+SECOND = 2
+NO_LENGTH = 490
+
+
+def check(control: Control, block: Block, code: int) -> None:
+    """G27: to the words, which should be a reference point."""
+    if block.axes:
+        target, unknown = destination(control, block)
+        control.make(Motion(Kind.RAPID, block.axes, target, unknown, control.modal.motion, passing=CHECKED))
+
+
+def named(control: Control, block: Block, code: int) -> None:
+    """G28: the axes that are named go; whether all go where none is named, differs."""
+    if block.axes:
+        go_to_reference(control, block, code)
+        return
+    unknown = control.unknown | dict.fromkeys(control.machine, AFTER_ALL)
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format("G28"))
+    control.make(Motion(Kind.RAPID, 0, control.position[:], unknown, control.modal.motion, passing=passing))
+
+
+def cancelling(control: MacroControl, block: Block, code: int) -> None:
+    """G28 of Haas takes the tool length offset away as well."""
+    go_to_reference(control, block, code)
+    if control.length_code:
+        control.length_code = 0
+        tool_offset(control, Block(block.index, {}, frozenset(), 0), NO_LENGTH)
+
+
+def further(control: Control, block: Block, code: int) -> None:
+    """G30 Pn: by way of the words; where the third and fourth reference points are is not given."""
+    number = whole(block.get("P", SECOND), "P of G30")
+    if number == SECOND:
+        go_to_reference(control, block, code)
+        return
+    way, unknown = destination(control, block)
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(f"G30 P{number}"))
+    if way != control.position or (block.axes and not control.modal.incremental):
+        control.make(Motion(Kind.RAPID, block.axes, way, unknown, control.modal.motion, passing=passing))
+    taken = [index for index in control.machine if block.axes >> index & 1 or not block.axes]
+    unknown = control.unknown | dict.fromkeys(taken, AFTER_REFERENCE)
+    control.make(Motion(Kind.RAPID, block.axes, control.position[:], unknown, control.modal.motion, passing=passing))

@@ -1,0 +1,139 @@
+"""Which codes controls of the Fanuc family know, and what they do where they differ from the common core.
+
+Sources: Fanuc 30i operator's manual (machining centre), "G code list"; Haas mill operator's manual, "G codes";
+Mitsubishi M700V programming manual. Codes are in tenths: G68.2 is 682.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ncfix_fanuc.macro import data, dynamic, lengths, mirror, polar, references, scaling, tilt
+from ncfix_fanuc.macro.arithmetic import compiled
+from ncfix_fanuc.macro.cycles import cycle
+from ncfix_fanuc.macro.variables import is_lasting, is_system
+from ncfix_iso.rs274 import groups
+from ncfix_iso.rs274.groups import ISO_G, Rules, grouped
+
+MACRO = "macro call"
+
+FOREIGN = frozenset(
+    {
+        *(171, 181, 191, 281, 301, 591, 592, 593, 901, 911, 921, 922, 923),
+        *(*groups.TURNING_CYCLES, *groups.PROBES, *groups.SPLINES, 331, 760, 431, 432, 411, 421, 890),
+    }
+)
+"""Codes of LinuxCNC that mean nothing, or something else, on these controls."""
+
+FANUC_G = {code: group for code, group in ISO_G.items() if code not in FOREIGN} | {
+    650: MACRO,
+    660: MACRO,
+    661: MACRO,
+    670: MACRO,
+    491: groups.LENGTH,
+    531: groups.NON_MODAL,
+    536: groups.NON_MODAL,
+    542: groups.NON_MODAL,
+    544: groups.NON_MODAL,
+    270: groups.NON_MODAL,
+    290: groups.NON_MODAL,
+    682: groups.ROTATION,
+    683: groups.ROTATION,
+    684: groups.ROTATION,
+    760: groups.MOTION,
+    842: groups.MOTION,
+    843: groups.MOTION,
+    890: groups.MOTION,
+    630: groups.CONTROL,
+}
+
+ALL_CYCLES = frozenset((*groups.CYCLES, 760, 842, 843))
+"""G76 bores here; G84.2 and G84.3 tap."""
+
+FANUC_HARMLESS = (groups.ISO_HARMLESS_G - {630}) | {54, 401, 502, 805}
+"""G5.4 is about the servo drives; G40.1, G50.2 and G80.5 end what is refused where it begins."""
+
+FANUC_M = grouped(
+    STOP=(0, 10, 20, 300),
+    TOOL=(60,),
+    SPINDLE=(30, 40, 50, 190),
+    COOLANT=(70, 80, 90),
+    CALL=(970, 980, 990, 1980),
+)
+
+FANUC = Rules(
+    strict=False,
+    g_groups=FANUC_G,
+    harmless_g=FANUC_HARMLESS,
+    m_groups=FANUC_M,
+    steps={
+        100: data.set_data,
+        150: polar.switch,
+        160: polar.switch,
+        270: references.check,
+        280: references.named,
+        290: data.made,
+        300: references.further,
+        **dict.fromkeys((430, 434, 435, 440, 490, 491), lengths.tool_offset),
+        500: scaling.switch,
+        510: scaling.switch,
+        501: mirror.mirror,
+        511: mirror.mirror,
+        531: tilt.align,
+        536: tilt.align,
+        542: data.setting_error,
+        544: data.setting_error,
+        680: tilt.rotate,
+        682: tilt.tilt,
+        683: tilt.tilt,
+        684: tilt.tilt,
+        690: tilt.rotate,
+        **dict.fromkeys(ALL_CYCLES, cycle),
+    },
+    cycles=ALL_CYCLES,
+    takes=frozenset({40, 100, 270, 290, 531, 536, 650, 660, 661, 670}),
+    system=is_system,
+    lasting=is_lasting,
+    compiled=compiled,
+)
+
+HAAS_OFFSETS = (1540, *range(1100, 1300, 10))
+"""G154 P, and its first twenty by their own names G110 to G129."""
+
+HAAS_MADE = (120, 130, 470, 1500)
+"""Circular pockets, engraving, pockets: G12, G13, G47, G150."""
+
+HAAS = replace(
+    FANUC,
+    g_groups=FANUC_G
+    | dict.fromkeys(HAAS_MADE, groups.NON_MODAL)
+    | dict.fromkeys(HAAS_OFFSETS, groups.SYSTEM)
+    | {lengths.HAAS_TIP: groups.LENGTH, dynamic.ON: groups.ROTATION, dynamic.OFF: groups.ROTATION},
+    steps={
+        **FANUC.steps,
+        **dict.fromkeys(HAAS_MADE, data.made),
+        **dict.fromkeys(HAAS_OFFSETS, data.extended),
+        **dict.fromkeys((dynamic.ON, dynamic.OFF), dynamic.dynamic_offset),
+        lengths.HAAS_TIP: lengths.tool_offset,
+        280: references.cancelling,
+    },
+    takes=FANUC.takes | set(HAAS_MADE),
+    repeats="L",
+    adds_rotations=True,
+)
+"""Haas has its additional work offsets under G154 Pn (G54.1Pn in the setup), mills texts and pockets by itself,
+and pecks by I J K."""
+
+MITSUBISHI_MADE = (120, 130)
+MITSUBISHI = replace(
+    FANUC,
+    g_groups=FANUC_G | dict.fromkeys(MITSUBISHI_MADE, groups.NON_MODAL),
+    steps={**FANUC.steps, **dict.fromkeys(MITSUBISHI_MADE, data.made)},
+    takes=FANUC.takes | set(MITSUBISHI_MADE),
+    scales_named=True,
+    offset_group=12,
+)
+"""Mitsubishi mills circles by itself, too, and counts the groups of modal codes otherwise."""
+
+RULES = {"fanuc": FANUC, "haas": HAAS, "mitsubishi": MITSUBISHI}
+"""By `Dialect.semantics`."""

@@ -1,0 +1,110 @@
+"""System variables: what the control lets a program of Macro B read and set.
+
+Source: Fanuc 30i operator's manual, "Custom macro", "System variables". What is not listed here exists only on the
+machine: reading it marks the value as known at run time only, setting it is refused from there on, unless it is an
+output or a message.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ncfix.control.faults import Fault
+from ncfix_fanuc.macro.data import keep_length
+from ncfix_iso.rs274.systems import activate, before_persistent
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+
+Getter = Callable[[], float]
+
+OFFSETS = range(5221, 5327)
+"""Work offsets G54 (5221) to G59 (5321), twenty numbers each."""
+
+LENGTHS = range(11001, 12000)
+"""Tool lengths (geometry). What #2001 and #10001 are, lengths or their wear, depends on the kind of offset memory."""
+
+SPATIAL = range(3)
+ALARM, ALARM_RAISED = 3000, "NCF216"
+
+HARMLESS = (range(1000, 2000), range(3000, 3030), range(12001, 14000))
+"""Interface signals, alarms and messages, clocks, and tool radii."""
+
+SYSTEM_CODES = {1: 54, 2: 55, 3: 56, 4: 57, 5: 58, 6: 59, 0: 54.1}
+
+
+def getters(control: MacroControl) -> dict[int, Getter]:
+    """Variables that the control computes when they are read."""
+    return positions(control) | modes(control) | offsets(control)
+
+
+def positions(control: MacroControl) -> dict[int, Getter]:
+    """End of the block before (5001), machine position (5021), present position (5041), by axis of the machine."""
+    found: dict[int, Getter] = {}
+    for place, index in enumerate(sorted(control.machine)):
+        found[5001 + place] = found[5041 + place] = partial(control.coordinate, index)
+        found[5021 + place] = partial(machine_position, control, index)
+    return found
+
+
+def machine_position(control: MacroControl, index: int) -> float:
+    """Where an axis stands in machine coordinates, program units."""
+    control.settle((index,))
+    return control.position[index] / control.unit_of(index)
+
+
+def offsets(control: MacroControl) -> dict[int, Getter]:
+    """Work offsets of X, Y and Z in program units; which number a rotary axis has depends on the machine."""
+    return {number: partial(offset, control, number) for number in OFFSETS if (number - OFFSETS.start) % 20 in SPATIAL}
+
+
+def offset(control: MacroControl, number: int) -> float:
+    """A work offset; it has to be given."""
+    before_persistent(control, number)
+    store = control.parameters.numbers
+    control.parameters.touched |= number in store.runtime
+    return store.values.get(number, 0.0) / control.modal.unit
+
+
+def modes(control: MacroControl) -> dict[int, Getter]:
+    """Codes and words in force: those before the block (4001) and of the running block (4201, 4301)."""
+    tools = control.tools
+    state: dict[int, Getter] = {
+        1: lambda: control.modal.motion / 10,
+        2: lambda: control.modal.plane.code / 10,
+        3: lambda: 91.0 if control.modal.incremental else 90.0,
+        5: lambda: float(control.modal.feed_mode),
+        6: lambda: 21.0 if control.modal.unit == 1.0 else 20.0,
+        7: lambda: float(control.modal.compensated or 40),
+        8: lambda: control.modal.tool_code / 10,
+        10: lambda: 99.0 if control.modal.retract_to_r else 98.0,
+        control.rules.offset_group: lambda: float(SYSTEM_CODES.get(control.modal.system, 54)),
+        109: lambda: 0.0 if math.isnan(control.modal.feed) else control.modal.feed / control.modal.unit,
+        111: lambda: float(tools.offset or 0),
+        119: lambda: control.modal.speed,
+        120: lambda: float(tools.selected),
+    }
+    return {base + number: getter for base in (4000, 4200, 4300) for number, getter in state.items()}
+
+
+def was_set(control: MacroControl, number: int, value: float, runtime: bool) -> None:
+    """The program has set a variable of the control."""
+    if number == ALARM:
+        raise Fault(ALARM_RAISED, "the program raises an alarm here (#3000)", "the control stops")
+    system, place = divmod(number - OFFSETS.start, 20)
+    if number in OFFSETS and place in SPATIAL:
+        control.parameters.numbers.assign(number, control.modal.unit * value, runtime)
+        if control.modal.system == 1 + system:
+            activate(control, control.modal.system)
+    elif number in LENGTHS:
+        set_length(control, number, value, runtime)
+    elif not any(number in each for each in HARMLESS):
+        control.refusal = control.refusal or f"the program sets #{number}, which ncfix does not follow"
+
+
+def set_length(control: MacroControl, number: int, value: float, runtime: bool) -> None:
+    """A tool length is set."""
+    keep_length(control, number - LENGTHS.start + 1, control.modal.unit * value, runtime=runtime)

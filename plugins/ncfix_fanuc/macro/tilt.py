@@ -1,0 +1,188 @@
+"""Tilted working planes: G68.2 sets a frame in the workpiece, G53.1 turns the tool square to it, G69 ends it.
+
+X Y Z are then those of the tool tip in a frame that turns with the workpiece, whatever the rotary axes do: the control
+computes the linear axes from the tip as it does under tool-centre-point control.
+Source: Fanuc 30i operator's manual (machining centre), "Tilted working plane indexing".
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ncfix.control import tcp
+from ncfix.control.coordinates import (
+    IDENTITY,
+    LETTERS,
+    Rotation,
+    X,
+    Y,
+    Z,
+    zeros,
+)
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix_fanuc.macro.planes import are_square, by_axes, by_points, euler, in_order
+from ncfix_fanuc.macro.squaring import SQUARED, Squared, turned_square
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.settings import unfollowed
+from ncfix_iso.rs274.shifts import rotate_system
+from ncfix_iso.rs274.systems import turned_back
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+    from ncfix_iso.rs274.control import Block
+
+TILT, CANCEL = 682, 690
+EULER, ROLL_PITCH_YAW, POINTS, VECTORS = range(4)
+ORDER = 123
+"""X, Y, Z: the order of the turns of G68.2 P1, if its Q does not name another."""
+
+LAST = {POINTS: 3, VECTORS: 2}
+"""Q of the last of the blocks that together say how the plane lies."""
+
+DEFINING = "a tilted plane (G68.2) is begun, and the blocks that say how it lies are not all there"
+NOT_SOLVED = "where the axis {} stands after the tool was turned square to the plane is not known"
+TURNED_TO = "NCF243"
+ALIGNMENTS = {
+    code: Passing(Pass.ALIGNMENT, f"tool axis alignment ({name})") for code, name in ((531, "G53.1"), (536, "G53.6"))
+}
+ABOUT_TIP = 536
+
+
+def tilt(control: MacroControl, block: Block, code: int) -> None:
+    """G68.2: the frame at X Y Z, turned as its P says; forms that are not followed are refused."""
+    form = whole(block.get("P", EULER), "P of G68.2")
+    if control.mirrored or code != TILT or not is_followed(block, form):
+        unfollowed(control, block, code)
+        return
+    if block.runtime:
+        control.refusal = control.refusal or "the tilted plane (G68.2) is known only at run time"
+    if form in LAST:
+        define(control, block, form)
+        return
+    angles = block.get("I"), block.get("J"), block.get("K")
+    begin(control, euler(*angles) if form == EULER else in_order(order_of(block), angles), block)
+
+
+def is_followed(block: Block, form: int) -> bool:
+    """Whether a block says how the plane lies in a way that is certain."""
+    number, turned = whole(block.get("Q", -1.0), "Q of G68.2"), bool(block.get("R"))
+    if form == POINTS:
+        shifted = any(block.get(letter) for letter in "XYZ")
+        return not shifted if number == 0 else number in (1, 2, 3) and {"X", "Y", "Z"} <= block.values.keys()
+    if form == VECTORS:
+        return number in (1, 2) and not turned and not block.values.keys().isdisjoint("IJK")
+    in_known_order = form == EULER or (form == ROLL_PITCH_YAW and sorted(order_of(block)) == ["1", "2", "3"])
+    return in_known_order and not turned
+
+
+def order_of(block: Block) -> str:
+    """The order of the turns, "123"."""
+    return str(whole(block.get("Q", ORDER), "Q of G68.2"))
+
+
+def define(control: MacroControl, block: Block, form: int) -> None:
+    """One of the blocks that give three points (Q1 to Q3, turned by R of Q0), or vectors along X and Z (Q1, Q2)."""
+    number = whole(block.get("Q"), "Q of G68.2")
+    if form != control.defining or number == 0 or number in control.definition:
+        control.defining, control.definition = form, {}
+    control.definition[number] = block
+    given = control.definition
+    if not {*range(1, LAST[form] + 1)} <= given.keys():
+        control.suspended[DEFINING] = DEFINING
+        return
+    control.definition = {}
+    control.suspended.pop(DEFINING, None)
+    if form == POINTS:
+        first, second, third = (np.array([given[n].get(letter) for letter in "XYZ"]) for n in (1, 2, 3))
+        turn = given[0].get("R") if 0 in given else 0.0
+        begin(control, by_points(first, second, third, turn), given[1])
+        return
+    x, z = (np.array([given[n].get(letter) for letter in "IJK"]) for n in (1, 2))
+    if are_square(x, z):
+        begin(control, by_axes(x, z), given[1])
+    else:
+        unfollowed(control, block, TILT)
+
+
+def begin(control: MacroControl, rotation: Rotation, origin: Block) -> None:
+    """Into the tilted plane whose origin a block names."""
+    end(control)
+    control.offsets.rotation = rotation
+    feature = zeros()
+    for index in (X, Y, Z):
+        feature[index] = control.modal.unit * origin.get(LETTERS[index])
+    control.offsets.feature = feature
+    control.tilted, control.said = True, None
+    tcp.switch(control, control.offsets.tool, True)
+    control.refresh()
+
+
+def rotate(control: MacroControl, block: Block, code: int) -> None:
+    """G68 and G69; G68 with I J K turns in space and is not followed, nor is any in mirrored coordinates."""
+    if control.mirrored:
+        unfollowed(control, block, CANCEL if code == CANCEL else TILT)
+        return
+    if code == CANCEL:
+        control.definition = {}
+        control.suspended.pop(DEFINING, None)
+        end(control)
+    elif block.values.keys() & {"I", "J", "K"}:
+        unfollowed(control, block, TILT)
+        return
+    rotate_system(control, block, code)
+
+
+def end(control: MacroControl) -> None:
+    """Out of the tilted plane."""
+    if not control.tilted:
+        return
+    control.tilted, control.said = False, None
+    control.offsets.rotation, control.offsets.feature = IDENTITY, zeros()
+    tcp.switch(control, control.offsets.tool, control.setup.tcp or control.tip_control)
+    turned_back(control)
+    control.refresh()
+
+
+# -- G53.1, G53.6 -----------------------------------------------------------------------------------------------------
+
+
+def align(control: MacroControl, block: Block, code: int) -> None:
+    """The rotary axes turn so that the tool stands square to the plane.
+
+    In G53.1 the linear axes stand still; in G53.6 they follow, so that the tip stays where it is on the workpiece.
+    """
+    turning = control.turning
+    control.settle(turning)
+    target, lost = control.position[:], set[int]()
+    found = turned_square(control) if turning else None
+    if found is not None:
+        target = found.about_tip if code == ABOUT_TIP else found.position
+        if found.several:
+            note_choice(control, found, code)
+    elif turning:
+        lost |= {*turning, X, Y, Z}
+    hidden = found is not None and not control.unknown.keys().isdisjoint((X, Y, Z))
+    if hidden or (code == ABOUT_TIP and is_moved_otherwise(control, block)):
+        lost |= {X, Y, Z}
+    unknown = control.unknown | dict.fromkeys(lost.intersection(control.machine), NOT_SOLVED)
+    control.make(Motion(Kind.RAPID, 0, target, unknown, control.modal.motion, passing=ALIGNMENTS[code]))
+
+
+def note_choice(control: MacroControl, squared: Squared, code: int) -> None:
+    """Say to which angles the rotary axes are taken to turn."""
+    angles = " ".join(f"{LETTERS[index]}{squared.degrees[index]:.3f}" for index in control.turning)
+    control.warn(TURNED_TO, f"G{code / 10:g} is taken to turn to {angles}, the nearest of several ways", SQUARED)
+
+
+def is_moved_otherwise(control: MacroControl, block: Block) -> bool:
+    """Whether G53.6 leads the tip elsewhere: along the tool (R), or with no length in force, or with another one."""
+    return bool(block.get("R")) or not control.length_code or is_other_length(control, block)
+
+
+def is_other_length(control: MacroControl, block: Block) -> bool:
+    """Whether H of a block is another length than the one in force."""
+    return "H" in block.values and whole(block.values["H"], "H") != control.tools.offset

@@ -1,0 +1,95 @@
+"""The direction of the tool as a vector, I J K under G43.5: made into rotary positions by the machine's own kinematics.
+
+The vector points from the tip to the spindle, in the coordinates of the program, and may have any length; a component
+that is not written is zero, and a block without any keeps the direction. Which of two ways the rotary axes take is for
+the control's parameters to say: here it is the nearest.
+Source: Fanuc, "Tool center point control for 5-axis machining" (A-79348E), type 2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, dot
+from ncfix.control.faults import Fault
+from ncfix.control.pointing import Pointing, within
+
+if TYPE_CHECKING:
+    from ncfix_fanuc.macro.control import MacroControl
+    from ncfix_iso.rs274.control import Block
+
+COMPONENTS = "IJK"
+STRAIGHT, ARCS = (0, 10), (20, 30)
+BAD_VECTOR = "NCF219"
+TURNED_TO = "NCF243"
+INCLINED = "the tool leans away from its vectors (Q of G43.5), which ncfix does not follow"
+BY_AXES = "a word of a rotary axis while the direction of the tool is given by I J K (G43.5)"
+ON_ARC = "an arc or a cycle while the direction of the tool is given by I J K (G43.5)"
+AT_RUNTIME = "the direction of the tool (I J K) is known only at run time"
+NO_KINEMATICS = "the direction of the tool (I J K) needs the kinematics of a machine with two rotary axes"
+FROM_UNKNOWN = "where the rotary axes stand before the tool is turned (I J K) is not known"
+AFTER_VECTOR = "where the axis {} stands after a direction of the tool that is not followed is not known"
+CHOICE = "state the direction in smaller steps, or use G43.4, if the control turns the other way"
+
+FAR = math.radians(0.1)
+"""rad. Between two vectors a control may turn the tool in their plane, or its rotary axes evenly: parameters say which.
+The tip is not concerned; where the two differ by more, pieces of the motion would point the tool elsewhere."""
+
+
+def directed(control: MacroControl, block: Block, motion: int) -> str:
+    """Give a block the rotary words that its vector amounts to; why its motion is refused, if it is."""
+    axes = control.turning
+    if any(block.axes >> index & 1 for index in axes):
+        return BY_AXES
+    given = block.values.keys() & {*COMPONENTS}
+    if motion in ARCS or (given and motion not in STRAIGHT):
+        return ON_ARC
+    if not given:
+        return ""
+    if block.runtime & set(COMPONENTS):
+        return AT_RUNTIME
+    pointing = control.pointing
+    if pointing is None or control.kinematics is None:
+        return NO_KINEMATICS
+    control.settle(axes)
+    if control.unknown.keys() & set(axes):
+        return FROM_UNKNOWN
+    columns = [control.machine[column] for column in pointing.columns]
+    here = control.position[columns[0]], control.position[columns[1]]
+    travel = [control.kinematics.travel[column] for column in pointing.columns]
+    ways = within(pointing.angles(wanted(control, block), here), travel, here)
+    if not ways:
+        raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction (I J K)")
+    note_choice(control, pointing, here, ways)
+    for index, angle in zip(columns, ways[0], strict=True):
+        block.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
+        block.axes |= 1 << index
+    control.points = True
+    control.whole |= motion != 0 and pointing.stray(here, ways[0]) > FAR
+    return ""
+
+
+def wanted(control: MacroControl, block: Block) -> NDArray[np.float64]:
+    """The vector of a block as a unit vector in the workpiece; raises `Fault` if it has no length."""
+    turned = np.array([dot(row, [block.get(letter) for letter in COMPONENTS]) for row in control.rotation])
+    size = float(np.linalg.norm(turned))
+    if size == 0.0:
+        raise Fault(BAD_VECTOR, "the direction of the tool (I J K) has no length")
+    return turned / size
+
+
+def note_choice(
+    control: MacroControl, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
+) -> None:
+    """Say which way was taken where another would do as well, or where a control may find another one nearer."""
+    if len(ways) < 2 or pointing.at_pole(pointing.at(*ways[0])):
+        return
+    at_pole = pointing.at_pole(pointing.at(*here))
+    by_one_axis = any(abs(ways[1][k] - here[k]) < abs(ways[0][k] - here[k]) for k in (0, 1))
+    if at_pole or by_one_axis:
+        angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
+        control.warn(TURNED_TO, f"G43.5 is taken to turn to {angles}, the nearest of several ways", CHOICE)

@@ -1,0 +1,228 @@
+"""Circular motions: C, CR, CP, CT and CTP.
+
+Source: TNC 640, "Programming: contours". The sense of rotation counts in the program's frame; in a mirrored frame it
+turns round, as on the control.
+"""
+
+import math
+from dataclasses import dataclass
+
+from ncfix.control.arcs import CLOCKWISE, COUNTER, centre_from_radius, check_closure, sweep_angle
+from ncfix.control.builder import Arc
+from ncfix.control.coordinates import IDENTITY, Plane, Vector, dot, rotated
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.step import Step, somewhere, with_increments
+from ncfix_heidenhain.klartext.targets import (
+    BAD_POLE,
+    PLANE_OF,
+    Where,
+    Words,
+    command_of,
+    derived,
+    here,
+    led,
+    polar,
+    polar_axes,
+    pole_frame,
+    starts_unknown,
+)
+
+BAD_ARC = "NCF220"
+
+NO_TANGENT = "a tangential arc (CT), and the element before leaves no direction from which it can turn"
+NO_ANGLE = "CP without an angle (PA, IPA): whether the control makes a full circle of it or stops is not sure"
+AROUND = "an arc about a pole (CC) that was set before the datum was moved: where it lies is not sure"
+FLAT = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Circle:
+    """An arc in its plane: centre and end from its start, mm along the plane's axes; signed sweep, rad."""
+
+    plane: Plane
+    centre: tuple[float, float]
+    sweep: float
+
+
+def circular(control: Control, step: Step) -> None:
+    """C: about the pole to an end point."""
+    pole = known_pole(control)
+    plane, turning = control.path.plane, sense(step)
+    control.use()
+    where = led(control, step.words)
+    if give_up(control, step, where):
+        return
+    if control.path.pole_in != pole_frame(control):
+        do_without(control, step, where, AROUND)
+        return
+    start, end = points(control, where, plane)
+    centre = pole[0] - start[0], pole[1] - start[1]
+    away = end[0] - start[0], end[1] - start[1]
+    try:
+        check_closure(centre, away, control.dialect.closure_mm, control.dialect.closure_relative)
+    except Fault as fault:
+        do_without(control, step, where, fault.text)
+        return
+    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+
+
+def circular_by_radius(control: Control, step: Step) -> None:
+    """CR."""
+    turning = sense(step)
+    control.use()
+    where = led(control, step.words)
+    if "R" not in step.words.values:
+        raise Fault(BAD_ARC, "CR needs R, the radius")
+    if give_up(control, step, where):
+        return
+    plane = plane_of(control, step.words)
+    start, end = points(control, where, plane)
+    away = end[0] - start[0], end[1] - start[1]
+    radius = control.modal.unit * step.words.values["R"]
+    try:
+        centre = centre_from_radius(away, radius, clockwise=turning == CLOCKWISE)
+    except Fault as fault:
+        do_without(control, step, where, fault.text)
+        return
+    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)))
+
+
+def circular_polar(control: Control, step: Step) -> None:
+    """CP: about the pole to a polar angle; several turns, and a height, make a helix."""
+    pole = known_pole(control)
+    plane, turning = control.path.plane, sense(step)
+    control.use()
+    where, angle = polar(
+        control, Words({k: v for k, v in step.words.values.items() if k not in ("PR", "IPR")}, step.words.runtime)
+    )
+    if give_up(control, step, where):
+        return
+    if not step.words.values.keys() & {"PA", "IPA"}:
+        do_without(control, step, where, NO_ANGLE)
+        return
+    start, end = points(control, where, plane)
+    centre = pole[0] - start[0], pole[1] - start[1]
+    if math.hypot(*centre) < FLAT:
+        raise Fault(BAD_ARC, "the arc has no radius: the tool stands at the pole")
+    if angle is None:
+        away = end[0] - start[0], end[1] - start[1]
+        angle = sweep_angle(centre, away, 1, clockwise=turning == CLOCKWISE)
+    elif (angle < 0) != (turning == CLOCKWISE) and angle:
+        raise Fault(BAD_ARC, "the sign of IPA and DR contradict each other")
+    swing(control, step, where, Circle(plane, centre, angle))
+
+
+def tangential(control: Control, step: Step) -> None:
+    """CT and CTP: an arc that goes on in the direction of the element before."""
+    control.use()
+    where = polar(control, step.words)[0] if step.name == "ctp" else led(control, step.words)
+    if give_up(control, step, where):
+        return
+    if control.path.tangent is None:
+        do_without(control, step, where, NO_TANGENT)
+        return
+    plane = control.path.plane if step.name == "ctp" else plane_of(control, step.words)
+    ahead = [dot(row, control.path.tangent) for row in control.inverse] if control.is_rotated else control.path.tangent
+    start, end = points(control, where, plane)
+    away = end[0] - start[0], end[1] - start[1]
+    left = -ahead[plane.second], ahead[plane.first]
+    side = away[0] * left[0] + away[1] * left[1]
+    size = math.hypot(*left)
+    if size < FLAT or math.hypot(*away) < FLAT or abs(side) <= FLAT * math.hypot(*away):
+        do_without(control, step, where, NO_TANGENT)
+        return
+    radius = (away[0] ** 2 + away[1] ** 2) * size / (2 * side)
+    centre = radius * left[0] / size, radius * left[1] / size
+    swing(control, step, where, Circle(plane, centre, sweep_angle(centre, away, 1, clockwise=radius < 0)))
+
+
+def swing(control: Control, step: Step, where: Where, circle: Circle) -> None:
+    """The arc itself."""
+    plane = circle.plane
+    axes = step.words.axes | 1 << plane.first | 1 << plane.second
+    target, unknown = command_of(control, where, axes)
+    local = [0.0, 0.0, 0.0]
+    local[plane.first], local[plane.second] = circle.centre
+    outward = rotated(control.rotation, local) if control.is_rotated else local
+    hand = mirrored(control)
+    centre = tuple(p + o for p, o in zip(control.position[:3], outward, strict=True))
+    normal = tuple(dot(row, IDENTITY[plane.across]) for row in control.rotation)
+    sweep = hand * circle.sweep
+    relative = step.name in ("ct", "ctp", "cp") or step.words.incremental
+    with_increments(control, relative)
+    arc = Arc(centre, normal, sweep, fixed=step.name == "c")  # type: ignore[arg-type]
+    code, why = CLOCKWISE if circle.sweep < 0 else COUNTER, derived(control, step.words, axes)
+    control.make(Motion(Kind.ARC, axes, target, unknown, code, refusal=why, arc=arc))
+    with_increments(control, False)
+    control.path.tangent = direction_at_end(control.position, arc)
+
+
+def direction_at_end(end: Vector, arc: Arc) -> tuple[float, float, float]:
+    """The unit tangent of an arc at its end."""
+    x, y, z = (a - b for a, b in zip(end[:3], arc.centre, strict=True))
+    a, b, c = arc.normal
+    sign = 1.0 if arc.sweep > 0 else -1.0
+    way = sign * (b * z - c * y), sign * (c * x - a * z), sign * (a * y - b * x)
+    length = math.hypot(*way)
+    return way[0] / length, way[1] / length, way[2] / length
+
+
+def mirrored(control: Control) -> float:
+    """-1 where the frame is mirrored: what turns left in the program turns right in the workpiece."""
+    return -1.0 if len(control.transformations.mirror) % 2 else 1.0
+
+
+def sense(step: Step) -> int:
+    """DR+ or DR-."""
+    if "dr-" in step.flags:
+        return CLOCKWISE
+    if "dr+" in step.flags:
+        return COUNTER
+    raise Fault(BAD_ARC, f"{step.name.upper()} needs DR+ or DR-, the sense of rotation")
+
+
+def known_pole(control: Control) -> tuple[float, float]:
+    """The pole."""
+    if control.path.pole is None:
+        raise Fault(BAD_POLE, "an arc about the pole, and no pole (CC) is known")
+    return control.path.pole
+
+
+def plane_of(control: Control, words: Words) -> Plane:
+    """The plane of an arc that has no pole: that of its words, else the working plane."""
+    named = frozenset(i for i in range(3) if words.axes >> i & 1)
+    return PLANE_OF.get(named, PLANE_OF[frozenset((0, 1))])
+
+
+def points(control: Control, where: Where, plane: Plane) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Start and end of a motion along the axes of a plane."""
+    start, end = here(control).inner, where.inner
+    return (start[plane.first], start[plane.second]), (end[plane.first], end[plane.second])
+
+
+def give_up(control: Control, step: Step, where: Where) -> bool:
+    """Refuse an arc of which an end is not known; True if that is so."""
+    if not starts_unknown(control) and not where.unknown and not step.words.runtime:
+        return False
+    reasons = [why.format("XYZABCUVW"[i]) for i, why in {**control.unknown, **where.unknown}.items()]
+    reason = reasons[0] if reasons else "a word of the arc depends on a Q parameter that is known only at run time"
+    if step.words.runtime:
+        axes = step.words.axes or 3
+        where.unknown |= {i: reason for i in control.machine if axes >> i & 1}
+    do_without(control, step, where, reason)
+    return True
+
+
+def do_without(control: Control, step: Step, where: Where, reason: str) -> None:
+    """An arc that is not followed but for its end: one that the control would not accept either, or one not known."""
+    about_pole = step.name in ("cp", "ctp")
+    axes = polar_axes(control, step.words) if about_pole else step.words.axes or 3
+    target, unknown = command_of(control, where, axes)
+    if about_pole or (step.words.runtime and not step.words.incremental):
+        somewhere(control, axes, target, unknown, reason)
+        return
+    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=reason))
+    control.path.tangent = None

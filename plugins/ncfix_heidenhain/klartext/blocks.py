@@ -1,0 +1,276 @@
+"""One block of Klartext by the grammar: from its text to the template of its shape.
+
+A block that is not Klartext is no fault of the file: the control loads it, marks the block as ERROR and stops when it
+gets there. It is kept as opaque text of the kind `UNREAD`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from lark import Token, UnexpectedInput
+
+from ncfix.text.build import MAX_DEPTH, Branch, Builder, Node, Parsed, TooDeepError, edges, kind, tokens_of
+from ncfix.text.dialect import Dialect
+from ncfix.text.grammar import Squeezed, parse
+from ncfix.text.reach import UNREAD
+from ncfix.text.tree import (
+    END,
+    Anchor,
+    Assignment,
+    Binary,
+    Call,
+    Command,
+    Comment,
+    Constant,
+    Expression,
+    Flow,
+    Item,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Skip,
+    Span,
+    Template,
+    Text,
+    Unary,
+    Word,
+)
+from ncfix_heidenhain.klartext.plans import MOVING, owners
+
+NUMBERS = frozenset({"NUMBER", "BLOCK_NUMBER"})
+"""The terminals whose text is a number of the block; every other digit belongs to its shape."""
+
+WHOLE = re.compile(r"(?P<number>[ \t]*(?:/[ \t]*)?\d+)?[ \t]*(?P<text>[;*].*)?\Z", re.DOTALL)
+"""A block that is a comment or a structuring remark, with what `~` continues, or nothing at all."""
+
+BLANKED = re.compile(r'"[^"\n]*"|;[^\n]*|~(?=[ \t\r]*(?:\n|\Z))')
+"""Strings, which are left alone, and what counts as blank: comments, and `~` at the end of a line."""
+
+BLANKS = re.compile(r"\s+")
+VALUES = frozenset({"literal", "parameter", "unary"})
+"""The rules that a value without an address is made by."""
+
+
+def parse_block(dialect: Dialect, text: str) -> Parsed:
+    """One block, by the grammar; what is not Klartext, or nested too deep, is opaque."""
+    remark = WHOLE.match(text)
+    if remark is not None:
+        return remark_block(text, remark)
+    code = BLANKED.sub(lambda found: found[0] if found[0][0] == '"' else " " * len(found[0]), text)
+    try:
+        tree = parse(dialect, code)
+        return built(tree, text)
+    except (UnexpectedInput, TooDeepError):
+        return unread_block()
+
+
+def unread_block() -> Parsed:
+    """A block that is not Klartext."""
+    return Parsed(Template((Opaque(UNREAD, Span(Anchor(-1, 0), Anchor(END, 0))),), 0), (), (), -1)
+
+
+def remark_block(text: str, match: re.Match[str]) -> Parsed:
+    """A block of nothing but a comment, `; ...`, or a structuring remark, `* - ...`."""
+    spans: tuple[tuple[int, int], ...] = ()
+    values: tuple[float, ...] = ()
+    number = re.search(r"\d+", match["number"] or "")
+    if number is not None:
+        spans, values = ((number.span(),), (float(number[0]),))
+    builder = Builder(text, identity(text), {}, tuple(stop for _, stop in spans))
+    items: tuple[Item, ...] = ()
+    comment = -1
+    if match["number"] and "/" in match["number"]:
+        place = match["number"].index("/")
+        items += (Skip(1, builder.between(place, place + 1)),)
+    if number is not None:
+        items += (Word("N", Literal(0), builder.between(*number.span()), builder.between(*number.span())),)
+    if match["text"]:
+        span = Span(builder.anchor(match.start("text")), Anchor(END, 0))
+        note = match["text"].startswith(";")
+        comment = match.start("text") if note else -1
+        items += (Comment(span) if note else Opaque("structure", span),)
+    return Parsed(Template(items, len(spans)), spans, values, comment)
+
+
+def identity(text: str) -> Squeezed:
+    """A block of which nothing was taken out."""
+    return Squeezed(text, list(range(len(text))))
+
+
+def built(tree: Branch, text: str) -> Parsed:
+    """Make the template of a block from its tree."""
+    tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
+    spans = tuple(edges(token) for token in tokens)
+    slots = {span: slot for slot, span in enumerate(spans)}
+    maker = Maker(Builder(text, identity(text), slots, tuple(stop for _, stop in spans)))
+    items = list(maker.items(tree))
+    if is_twice(items):
+        return unread_block()
+    taken = [place_of(item.span.stop, spans) for item in items if isinstance(item, Opaque)]
+    notes = [match.span() for match in BLANKED.finditer(text) if match[0][0] == ";"]
+    notes = [span for span in notes if not any(span[0] < stop for stop in taken)]
+    items += [Comment(maker.note(*span)) for span in notes]
+    items.sort(key=lambda item: place_of(item.span.start, spans))
+    comment = notes[-1][0] if notes and not text[notes[-1][1] :].strip() else -1
+    values = tuple(value_of(token) for token in tokens)
+    return Parsed(Template(tuple(items), len(tokens)), spans, values, comment)
+
+
+def is_twice(items: list[Item]) -> bool:
+    """Whether a block says twice where an axis goes: the control marks it as an error."""
+    owned = owners(items)
+    words = [w.address.removeprefix("I") for k, w in enumerate(items) if isinstance(w, Word) and k not in owned]
+    leading = [address for address in words if address in MOVING]
+    return len(leading) > len(set(leading))
+
+
+def place_of(anchor: Anchor, spans: tuple[tuple[int, int], ...]) -> int:
+    """The place in the block that an anchor stands for."""
+    slot, offset = anchor
+    return offset if slot < 0 else spans[slot][1] + offset
+
+
+def value_of(token: str) -> float:
+    """The value of a number as written: comma or point, sign apart."""
+    return float("".join(token.split()).replace(",", "."))
+
+
+class Maker:
+    """Makes items of the rules of the Klartext grammar."""
+
+    def __init__(self, builder: Builder) -> None:
+        self.builder = builder
+
+    def note(self, start: int, stop: int) -> Span:
+        """The span of a comment; one that ends the block may differ in length from block to block."""
+        if self.builder.text[stop:].strip():
+            return self.builder.between(start, stop)
+        return Span(self.builder.anchor(start), Anchor(END, stop - len(self.builder.text)))
+
+    # -- items --------------------------------------------------------------------------------------------------------
+
+    def items(self, tree: Branch) -> Iterator[Item]:
+        """The items of a block."""
+        nodes = list(tree.children)
+        while nodes:
+            node = nodes.pop(0)
+            if isinstance(node, Token):
+                yield self.terminal(node, nodes)
+            elif kind(node) in ("plane", "datum"):
+                nodes = [*node.children, *nodes]
+            elif kind(node) == "code":
+                code, *named = node.children
+                yield self.code(code)
+                nodes = [*named, *nodes]
+            else:
+                yield self.rule(node)
+
+    def terminal(self, token: Token, following: list[Node]) -> Item:
+        """An item that begins with a terminal."""
+        span = self.builder.span(token)
+        match kind(token):
+            case "SKIP":
+                return Skip(1, span)
+            case "REMARK":
+                return Comment(span)
+            case "HEAD" | "OPAQUE" as name:
+                return self.statement(token, "program" if name == "HEAD" else "statement")
+            case "TEXT":
+                return Opaque("name", span)
+            case "CORNER" if following and kind(following[0]) in VALUES:
+                value = following.pop(0)
+                whole = self.builder.between(edges(token)[0], edges(value)[1])
+                return Word(normal(token).upper(), self.expression(value), whole, self.builder.span(value))
+        return Command(normal(token), (), False, span)
+
+    def statement(self, token: Token, name: str) -> Item:
+        """A statement that is not taken apart, without the blanks at its end."""
+        start = edges(token)[0]
+        return Opaque(name, self.builder.between(start, start + len(str(token).rstrip())))
+
+    def rule(self, tree: Branch) -> Item:
+        """An item of several terminals."""
+        span = self.builder.span(tree)
+        first = tree.children[0]
+        match kind(tree):
+            case "line_number":
+                return Word("N", self.expression(first), span, span)
+            case "word":
+                address, value = tree.children
+                return Word(str(address).upper(), self.expression(value), span, self.builder.span(value))
+            case "assignment":
+                target, value = tree.children
+                return Assignment(NamedParameter(str(target).upper()), self.expression(value), span)
+            case "text_assignment":
+                target, value = tree.children
+                return Assignment(NamedParameter(str(target).upper()), Text(str(value).strip('"')), span)
+            case "tool_name":
+                return Word("TOOL", self.name(first), span, span)
+            case "label" | "call":
+                return Flow(label_of(tree.children[1]), kind(tree), self.times(tree.children[2:]), span)
+            case "condition":
+                _, _, left, relation, right, _, label = tree.children
+                compared = Binary(str(relation).lower(), self.expression(left), self.expression(right))
+                return Flow(label_of(label), "if", (compared,), span)
+        raise AssertionError(f"the grammar has a rule {tree.data!r} that nobody builds")
+
+    def code(self, node: Node) -> Word:
+        """M with its number, which is part of the shape."""
+        start, stop = edges(node)
+        value = Constant(value_of(str(node)[1:]))
+        return Word("M", value, self.builder.between(start, stop), self.builder.between(start + 1, stop))
+
+    def times(self, nodes: list[Node]) -> tuple[Expression, ...]:
+        """The count of `REP 2/2`, if it is there."""
+        return tuple(Constant(float(re.findall(r"\d+", str(node))[0])) for node in nodes[1:])
+
+    def name(self, node: Node) -> Expression:
+        """The number or name of a tool."""
+        if isinstance(node, Token):
+            return Text(str(node).strip('"')) if kind(node) == "STRING" else Constant(value_of(str(node)))
+        return self.expression(node)
+
+    # -- expressions --------------------------------------------------------------------------------------------------
+
+    def expression(self, node: Node, depth: int = 0) -> Expression:
+        """The expression that a tree, or the terminal of a number, stands for."""
+        if depth > MAX_DEPTH:
+            raise TooDeepError(0)
+        if isinstance(node, Token):
+            return Literal(self.builder.slots[edges(node)])
+        parts = node.children
+        match kind(node):
+            case "literal":
+                return self.expression(parts[0], depth)
+            case "bracket":
+                return Unary("+", self.expression(parts[0], depth + 1))
+            case "parameter":
+                return NamedParameter(str(parts[0]).upper())
+            case "unary":
+                return Unary(str(parts[0]).lower(), self.expression(parts[1], depth + 1))
+            case "binary":
+                left, operator, right = parts
+                operands = self.expression(left, depth + 1), self.expression(right, depth + 1)
+                return Binary(str(operator).lower(), *operands)
+            case "pi":
+                return Call("pi", ())
+        raise AssertionError(f"the grammar has an expression {node.data!r} that nobody builds")
+
+
+def label_of(node: Node) -> str:
+    """The name of a label; numbers without leading zeros."""
+    text = str(node)
+    return text.strip('"') if text.startswith('"') else str(int(text))
+
+
+def normal(token: Token) -> str:
+    """A word of the language in lower case with single blanks: `cycl def 200`, `fmax`, `dr+`."""
+    text = BLANKS.sub(" ", str(token).strip()).lower()
+    match kind(token):
+        case "WORD" | "PLANE_WORD":
+            return text.replace(" ", "") if text[0] in "fds" or text.startswith("r") else text
+        case "TOOL_CALL" | "TOOL_DEF" | "CYCL_DEF" | "CYCL_CALL" | "CALL_LBL":
+            return re.sub(r"(tool|cycl|call) ?(call|def|lbl) ?(\w*) ?(\.?) ?(\w*)", r"\1 \2 \3\4\5", text).strip()
+    return text

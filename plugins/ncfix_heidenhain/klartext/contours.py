@@ -1,0 +1,187 @@
+"""Free contours (FK) of a program: their blocks read, worked out (`free`), and written as plain lines and arcs.
+
+A free contour is worked out as a whole where its first element is reached. Its blocks are refused as they stand, since
+one corrected element would contradict the data of the others; written out flat they are blocks of their own.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+from ncfix.control.coordinates import PLANES, X, Y, dot, rotated
+from ncfix_heidenhain.klartext.control import FREELY, Control
+from ncfix_heidenhain.klartext.free import Element, Leg, solved
+from ncfix_heidenhain.klartext.step import IN_PLANE, somewhere
+from ncfix_heidenhain.klartext.targets import command_of, here, pole_frame
+from ncfix_heidenhain.klartext.units import Unit
+
+FREE_CONTOUR = "free contour programming (FK): the control works out the contour from what is known of it"
+WRITTEN_OUT = "a free contour (FK): --flatten writes it as lines and arcs"
+NEAR = 1e-3
+"""mm by which the data of a contour may contradict each other: drawings have three digits."""
+
+FUNCTION = re.compile(r"F(?P<arc>C|L)(?P<tangential>T?)(?=\s|$)", re.IGNORECASE)
+VALUE = r"[+-]?\s*(?:Q[LR]?\d+|\d+[.,]?\d*|[.,]\d+)"
+WORD = re.compile(rf"(?<![A-Z0-9])(X|Y|AN|LEN|CCX|CCY|CCA|R)\s*({VALUE})(?![\w.,])", re.IGNORECASE)
+SENSE = re.compile(r"(DR|CLSD)\s*([+-])(?!\s*[\d.,Q])", re.IGNORECASE)
+REST = re.compile(
+    rf"\b(R0(?![\d.,])|R[LR]\b|F\s*MAX|F\s*AUTO|F\s*{VALUE}|M\s*(?:[0134578]|9|13|14)(?!\d))", re.IGNORECASE
+)
+"""What may stand in a block besides geometry, and is kept when it is written anew: spindle, coolant, a stop."""
+
+LEFT_OUT = re.compile(r";[^\r\n]*|~(?=[ \t\r]*(?:\n|\Z))")
+OF_LINES, OF_ARCS = frozenset({"X", "Y", "AN", "LEN"}), frozenset({"X", "Y", "CCX", "CCY", "CCA", "R"})
+CORNERS = frozenset({"rnd", "chf"})
+
+
+def leg_of(control: Control, unit: Unit, block: int) -> Leg | None:
+    """The element of a block, worked out from where the control stands; None if its contour is not certain."""
+    known = control.path.free
+    if (unit.name, block) not in known:
+        known.clear()
+        known |= worked_out(control, unit, block)
+    return known[unit.name, block]
+
+
+def follow_free(control: Control, unit: Unit, block: int) -> None:
+    """An element of a free contour, which is refused: as for an arc, it matters where the motion before it ends.
+
+    It lies in the working plane: only X and Y of the frame are not known after one that is not certain.
+    """
+    leg = leg_of(control, unit, block)
+    control.path.free.pop((unit.name, block))
+    where = here(control)
+    if leg is None:
+        where.unknown |= {X: FREELY, Y: FREELY}
+        somewhere(control, 0, *command_of(control, where, IN_PLANE), FREE_CONTOUR)
+        return
+    where.inner[X], where.inner[Y] = control.scale[X] * leg.end.real, control.scale[Y] * leg.end.imag
+    somewhere(control, 0, *command_of(control, where, IN_PLANE), WRITTEN_OUT)
+    x, y, z = rotated(control.rotation, [leg.heading.real, leg.heading.imag, 0.0])
+    control.path.tangent = x, y, z
+
+
+# -- from blocks to elements ------------------------------------------------------------------------------------------
+
+
+def worked_out(control: Control, unit: Unit, first: int) -> dict[tuple[str, int], Leg | None]:
+    """The contour that begins with a block."""
+    blocks = list(blocks_of_contour(unit, first))
+    keys = [(unit.name, block) for block in blocks]
+    control.settle((X, Y))
+    lost = X in control.unknown or Y in control.unknown or changes_pole(control)
+    if lost or control.cycle.modal or any(unit.plan(block).skip for block in blocks):
+        return dict.fromkeys(keys)
+    elements = [element_of(control, statement_text(unit, block)) for block in blocks]
+    known = [element for element in elements if element is not None]
+    begin = here(control).inner
+    start = complex(begin[X] / control.scale[X], begin[Y] / control.scale[Y])
+    legs = solved(known, start, heading_of(control), NEAR / control.modal.unit) if len(known) == len(blocks) else None
+    return dict.fromkeys(keys) if legs is None else dict(zip(keys, legs, strict=True))
+
+
+def blocks_of_contour(unit: Unit, first: int) -> Iterator[int]:
+    """The elements of a contour: block after block, with corners between them."""
+    for block in range(first, len(unit)):
+        plan = unit.plan(block)
+        if plan.statement is not None and FUNCTION.match(statement_text(unit, block)):
+            yield block
+        elif not plan.empty and plan.name not in CORNERS:
+            return
+
+
+def statement_text(unit: Unit, block: int) -> str:
+    """What stands in a block without its number and remarks."""
+    statement = unit.plan(block).statement
+    assert statement is not None
+    return LEFT_OUT.sub(" ", unit.program.slice(block, statement[1])).strip()
+
+
+def changes_pole(control: Control) -> bool:
+    """Whether the pole in force could not be put back after arcs that are written about poles of their own."""
+    path = control.path
+    return path.pole is not None and (path.plane != PLANES[170] or path.pole_in != pole_frame(control))
+
+
+def heading_of(control: Control) -> complex | None:
+    """The direction in which the element before ends, in the working plane."""
+    tangent = control.path.tangent
+    if tangent is None:
+        return None
+    ahead = complex(dot(control.inverse[X], tangent), dot(control.inverse[Y], tangent))
+    return ahead / abs(ahead) if abs(ahead) > math.sqrt(0.5) else None
+
+
+def element_of(control: Control, text: str) -> Element | None:
+    """What a block says of its element; None if something in it is not understood, or known only at run time."""
+    found = FUNCTION.match(text)
+    if found is None:
+        return None
+    arc, rest = found["arc"].upper() == "C", text[found.end() :]
+    if SENSE.sub(" ", WORD.sub(" ", REST.sub(" ", rest))).strip():
+        return None
+    control.scope.parameters.touched = False
+    pairs = [(name.upper(), number(control, value)) for name, value in WORD.findall(REST.sub(" ", rest))]
+    signs = {name.upper(): 1 if sign == "+" else -1 for name, sign in SENSE.findall(rest)}
+    values = dict(pairs)
+    fits = values.keys() <= (OF_ARCS if arc else OF_LINES) and len(values) == len(pairs) and (arc or "DR" not in signs)
+    if control.scope.parameters.touched or not fits or ("CCX" in values) != ("CCY" in values):
+        return None
+    return Element(
+        arc,
+        bool(found["tangential"]),
+        x=values.get("X"),
+        y=values.get("Y"),
+        angle=in_radians(values, "AN"),
+        length=values.get("LEN"),
+        centre=complex(values["CCX"], values["CCY"]) if "CCX" in values else None,
+        radius=values.get("R"),
+        sense=signs.get("DR", 0) if arc else 0,
+        turn=in_radians(values, "CCA"),
+        opens=signs.get("CLSD") == 1,
+        closes=signs.get("CLSD") == -1,
+    )
+
+
+def number(control: Control, text: str) -> float:
+    """The value of a number or a Q parameter."""
+    bare = "".join(text.split()).lstrip("+-")
+    value = control.scope.parameters.get(bare.upper()) if bare[0] in "Qq" else float(bare.replace(",", "."))
+    return -value if text.startswith("-") else value
+
+
+def in_radians(values: Mapping[str, float], name: str) -> float | None:
+    """An angle."""
+    return math.radians(values[name]) if name in values else None
+
+
+def others_of(text: str) -> str:
+    """What stands in a block besides geometry."""
+    return " ".join("".join(word.split()) for word in REST.findall(text))
+
+
+# -- written out ------------------------------------------------------------------------------------------------------
+
+
+def written_out(control: Control, unit: Unit, block: int, place: Callable[[complex], str]) -> list[str]:
+    """An element as plain blocks, which leave the pole as it was; none where it is not certain.
+
+    place  a point as words
+    """
+    statement = unit.plan(block).statement
+    if statement is None or not FUNCTION.match(statement_text(unit, block)):
+        return []
+    leg = leg_of(control, unit, block)
+    if leg is None:
+        return []
+    others = others_of(statement_text(unit, block))
+    if leg.circle is None:
+        return [f"L {place(leg.end)} {others}".rstrip()]
+    sense = "DR+" if leg.circle.sense > 0 else "DR-"
+    blocks = [f"CC {place(leg.circle.centre)}", f"C {place(leg.end)} {sense} {others}".rstrip()]
+    pole = control.path.pole
+    if pole is not None:
+        blocks.append(f"CC {place(complex(pole[0] / control.scale[X], pole[1] / control.scale[Y]))}")
+    return blocks

@@ -1,0 +1,249 @@
+"""The TNC while it follows a program: what a block changes and later blocks rely on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+from ncfix.control import control as base
+from ncfix.control import tcp
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Plane, Vector, X, Y, Z, rotated, zeros
+from ncfix.control.knowledge import WORK_OFFSET
+from ncfix.control.motion import AT_START, Motion, Unknown, first_reason
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix.control.places import mask_of
+from ncfix.control.setup import Setup, Tool
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+from ncfix_heidenhain.klartext.calculate import Parameters, Scope
+from ncfix_heidenhain.klartext.free import Leg
+from ncfix_heidenhain.klartext.patterns import Place
+from ncfix_heidenhain.klartext.transformations import Transformations
+
+START = "PRESET"
+"""The name in the setup of the preset that is active when the program starts; G54 is taken for it."""
+
+BY_DEPTH, FROM_START = 2000, 1000
+"""Motion codes of holes: with depths from the datum, and with depths from where the cycle is called."""
+
+TILTED, DOUBTFUL, TOOL, PRESET, TURNED_DATUM = "tilt", "doubt", "tool", "preset", "turned datum"
+"""The keys under which motions are suspended."""
+
+
+WHICH_WAY = (
+    "the axis {} counts from a datum of its own while the tip leads (M128, PLANE): whether X and Y turn with that "
+    "datum is for a parameter of the machine (presetToAlignAxis)"
+)
+
+RETRACTED = "where the axis {} stands after M140 is not followed"
+MOVED_ALONG = "where the axis {} stands after PLANE ... MOVE, or TURN with MB, is not followed"
+DEPARTED = "where the axis {} stands after a departure (DEP) depends on the radius of the tool"
+AFTER_PROBING = "where the axis {} stands after a probing cycle is known only at run time"
+FREELY = "where the axis {} stands after a free contour (FK) the control works out"
+AFTER_CYCLE = "where the axis {} stands after a cycle with a path of its own is not followed"
+SPATIAL = "where the axis {} stands by spatial angles (AXIS SPAT) the control works out"
+LED_BY_CONTROL = frozenset({SPATIAL, RETRACTED, MOVED_ALONG, DEPARTED, AFTER_PROBING, FREELY, AFTER_CYCLE})
+"""Rapids while an axis stands where the control itself has led it are passed: the tool is off the workpiece, and the
+next block that names the axis is corrected."""
+
+
+@dataclass(slots=True)
+class Path:
+    """What the next path function may need of the ones before.
+
+    pole     the pole, mm along the axes of its plane in the program's frame; None where not known
+    pole_in  the frame in which it was set: datum along its axes, rotation, unit
+    plane    the plane of the pole
+    tangent  the direction in which the last path element ended, commands; None where there is none
+    corner   the block before was a corner (RND, CHF)
+    ahead    the block that follows is one
+    spatial  A B C are spatial angles, not positions of axes (FUNCTION TCPM AXIS SPAT)
+    said     what words of a turned frame have said of where the tool stands (`targets.Said`)
+    by_vector  the tool turns in a plane (PATHCTRL VECTOR), not its axes at even speed
+    free     elements of the free contour (FK) that is being made: program and block -> what it is, None: not certain
+    """
+
+    pole: tuple[float, float] | None = None
+    pole_in: object = None
+    plane: Plane = PLANES[170]
+    tangent: tuple[float, float, float] | None = None
+    corner: bool = False
+    ahead: bool = False
+    by_vector: bool = False
+    spatial: bool = False
+    said: object = None
+    free: dict[tuple[str, int], Leg | None] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class CycleInForce:
+    """The cycle that CYCL CALL, M99 and M89 execute.
+
+    number  0: none was defined
+    steps   of the old cycles, what 1.1, 1.2, ... say: address or word -> value
+    modal   M89: every positioning block executes it
+    places  of the last PATTERN DEF; None: there was none, or it is not followed
+    """
+
+    number: int = 0
+    steps: dict[str, float] = field(default_factory=dict)
+    modal: bool = False
+    places: tuple[Place, ...] | None = None
+
+
+class Control(base.Control):
+    """A TNC: its transformations, Q parameters, path functions and cycles."""
+
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect)
+        self.transformations = Transformations()
+        self.functions: frozenset[str] = frozenset()
+        self.scope = Scope(parameters=Parameters(dict(q_parameters(run.setup))))
+        self.path = Path()
+        self.cycle = CycleInForce()
+        self.unit = 1.0
+        self.m128 = run.setup.tcp
+        self.shortest = False
+        self.stood: tuple[Vector, object] | None = None
+        self.auto_feed = math.nan
+        self.preset = ""
+        self.preset_checked = False
+        self.tool_called = False
+        self.defined_tools: dict[int, Tool] = {}
+        self.load_preset(START if START in run.setup.work_offsets else "G54")
+
+    # -- coordinates --------------------------------------------------------------------------------------------------
+
+    def load_preset(self, name: str) -> None:
+        """Make a preset of the setup the active one; what is not given counts as zero, and is asked for when used."""
+        given = self.setup.work_offsets.get(name)
+        self.preset, self.preset_checked = name, given is not None
+        self.places.shift(mask_of(self.machine))
+        self.transformations.preset = zeros()
+        for letter, value in (given or {}).items():
+            index = INDEX[letter]
+            self.transformations.preset[index] = value * (DEGREE if self.rotary[index] else 1.0)
+        self.recompose()
+
+    def recompose(self) -> None:
+        """Make the frame of the transformations; to be called after any of them has changed."""
+        trans = self.transformations
+        self.offsets.origin = trans.preset
+        self.offsets.shift = trans.whole_shift
+        self.offsets.rotation = trans.rotation
+        self.modal.unit = self.unit * trans.scale
+        self.doubt_turned_datum()
+        if trans.doubtful:
+            self.suspended[DOUBTFUL] = trans.doubtful
+        else:
+            self.suspended.pop(DOUBTFUL, None)
+        self.refresh()
+
+    def switch_tip(self) -> None:
+        """Whether X Y Z are tool-tip coordinates may have changed."""
+        on = self.m128 or self.transformations.tilted
+        self.doubt_turned_datum()
+        if on != self.tcp:
+            self.ask_for_tool()
+            why = next(iter(self.unknown.values())) if self.is_led(self.unknown) else tcp.TURNED
+            tcp.switch(self, self.offsets.tool, on)
+            self.unknown = {i: why if reason is tcp.TURNED else reason for i, reason in self.unknown.items()}
+        self.refresh()
+
+    def doubt_turned_datum(self) -> None:
+        """Rotary axes with a datum of their own: it may turn the coordinates in which the tip is led."""
+        self.suspended.pop(TURNED_DATUM, None)
+        datum = [a + b for a, b in zip(self.transformations.preset, self.transformations.shift, strict=True)]
+        turned = next((i for i in self.turning if datum[i]), None)
+        if turned is not None and (self.m128 or self.transformations.tilted):
+            self.suspended[TURNED_DATUM] = WHICH_WAY.format(LETTERS[turned])
+
+    def anchors(self) -> list[Hashable]:
+        """As of every control; shift, rotation, mirror and scale are stated by the program in numbers."""
+        trans, tool = self.transformations, zeros() if self.tcp else self.offsets.tool
+        stated = self.tcp, trans.tilt if trans.tilted else None
+        length = [self.tools.offset if self.tcp or index == Z else None for index in (X, Y, Z)]
+        return [
+            (self.preset, preset, tool[i], (*stated, length[i]) if i in (X, Y, Z) else None)
+            for i, preset in enumerate(trans.preset)
+        ]
+
+    def use(self) -> None:
+        """A motion in workpiece coordinates: preset and tool length matter."""
+        if not self.preset_checked:
+            self.preset_checked = True
+            name = "the active preset" if self.preset in (START, "G54") else f"preset {self.preset[6:]}"
+            option = START if self.preset in (START, "G54") else self.preset
+            self.knowledge.lack(WORK_OFFSET, name, "is used", f"--offset {option}=x,y,z")
+        self.ask_for_tool()
+
+    def ask_for_tool(self) -> None:
+        """Before the first TOOL CALL it matters which tool is in the spindle."""
+        if not self.tool_called:
+            self.tool_called = True
+            self.offsets.tool[Z] = self.knowledge.tool_length(0)
+            self.refresh()
+
+    def inner(self) -> Vector:
+        """Where the control stands along the axes of the program's frame, mm and rad."""
+        return self.program_position()
+
+    def outer(self, inner: Vector) -> Vector:
+        """The command of a position along the axes of the program's frame."""
+        turned = rotated(self.rotation, inner) if self.is_rotated else inner
+        return [a + b for a, b in zip(turned, self.offset, strict=True)]
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def make(self, motion: Motion) -> None:
+        """As of every control.
+
+        What must not be split: elements at a corner that the control makes (RND, CHF), turns of the tool in a plane
+        (PATHCTRL VECTOR), which in pieces would be turns of axes, and increments of an axis whose datum is not known,
+        which further pieces would have to name.
+        """
+        if motion.kind == Kind.RAPID and not motion.refusal and AT_START in motion.unknown.values():
+            motion = motion._replace(passing=motion.passing or Passing(Pass.UNSAID, first_reason(motion.unknown)))
+        whole = self.whole
+        self.tilted = self.transformations.tilted and not self.m128
+        turns = any(motion.axes >> index & 1 for index in self.turning)
+        if self.path.corner or self.path.ahead or (self.path.by_vector and turns):
+            self.whole = True
+        if motion.axes & mask_of(self.shaky):
+            self.whole = True
+        super().make(motion)
+        if self.is_rotated:
+            self.places.settle(self._settles(motion))
+        self.whole = whole
+
+    def _settles(self, motion: Motion) -> int:
+        """As of every control; a cycle with depths from the datum says where the tool axis stands, too."""
+        if motion.settles is not None:
+            return motion.settles
+        own = motion.axes | (1 << Z if motion.code == BY_DEPTH else 0)
+        machine = motion.passing is not None and motion.passing.rule is Pass.MACHINE_COORDINATES
+        return 0 if self.modal.incremental or machine else own
+
+    def is_led(self, unknown: Unknown) -> bool:
+        """What is not known is so because the control itself has led the axes somewhere."""
+        return bool(unknown) and LED_BY_CONTROL.issuperset(unknown.values())
+
+    def refuse_here(self, reason: str) -> None:
+        """A motion that is not followed: none of the axes is known afterwards."""
+        unknown = dict.fromkeys(self.machine, f"where the axis {{}} stands is not known after this: {reason}")
+        super().make(Motion(Kind.FEED, 0, self.position[:], unknown, 10, refusal=reason))
+        self.path.tangent = None
+
+    def pass_here(self, passing: Passing, lost: str, letters: str) -> None:
+        """A motion of the control's own; these axes are not known afterwards."""
+        unknown = dict(self.unknown)
+        unknown |= {INDEX[letter]: lost for letter in letters if INDEX[letter] in self.machine}
+        super().make(Motion(Kind.RAPID, 0, self.position[:], unknown, 0, passing=passing))
+        self.path.tangent = None
+
+
+def q_parameters(setup: Setup) -> dict[str, float]:
+    """The Q parameters that the setup gives."""
+    return {name.upper(): value for name, value in setup.variables.items() if name[:1] in "Qq"}

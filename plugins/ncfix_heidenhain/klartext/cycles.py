@@ -1,0 +1,201 @@
+"""CYCL DEF and what executes cycles: CYCL CALL, M99, M89.
+
+Source: TNC 640, "Cycle programming". A drilling cycle is one motion per hole to its bottom, which is corrected. Of a
+pocket, a stud or a thread, which the control makes about the place of the call, that place and the bottom are; other
+cycles that make a path of their own are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ncfix.control.coordinates import X, Y, Z
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix.control.places import mask_of
+from ncfix_heidenhain.klartext import trans_cycles
+from ncfix_heidenhain.klartext.control import AFTER_CYCLE, BY_DEPTH, FROM_START, Control
+from ncfix_heidenhain.klartext.patterns import ON_CIRCLE, ON_LINES, Place, pattern_of_cycle
+from ncfix_heidenhain.klartext.step import Step, refuse
+from ncfix_heidenhain.klartext.targets import Where, Words, command_of, led, polar, polar_axes
+
+NO_CYCLE = "NCF272"
+DRILLING = frozenset({200, 201, 202, 203, 205, 206, 207, 208, 209, 240, 241})
+"""Cycles whose bottom is Q203 + Q201; back boring (204) counts otherwise."""
+
+MILLING = frozenset({251, 252, 253, 256, 257, 258, 262, 263, 264, 265, 267})
+"""Pockets, slots, studs and threads about the place where they are called, down to Q203 + Q201. A round slot (254) may
+have its place in the cycle."""
+
+MOVED_AS_A_WHOLE = "NCF280"
+AS_A_WHOLE = "cycle {} is corrected where it is called, down to its bottom; what it mills there is moved as a whole"
+
+IN_SPACE = frozenset({*range(20, 26), 204, *range(210, 216), 225, *range(230, 234), 254, *range(270, 278)})
+"""Cycles with a path of their own that move X, Y and Z only; others, on the shell of a cylinder, turn axes, too."""
+
+OLD_DRILLING = frozenset({1, 2, 17, 18})
+GAP_WORDS = frozenset({"SETUP", "AVST", "ABST", "DIST"})
+DEPTH_WORDS = frozenset({"DEPTH", "TIEFE"})
+ADJUSTING = frozenset({291, 800, 801, 880, *range(1000, 1100)})
+ADJUSTED = "cycle {} may change coordinates, for turning or grinding, in a way that is not followed"
+BUILDERS = range(300, 400)
+MEASURING = 238
+OF_BUILDER = "cycle {} is the machine builder's; what it does where it is defined is not known"
+BY_ITSELF = "cycle {} moves the axes by itself where it is defined"
+CALLING = 12
+CALLED = "a program is called by cycle 12, and what it does is not followed"
+HARMLESS = frozenset({9, 13, 32, 239, 392})
+"""Dwell, spindle orientation, tolerance, load, and the like: they move nothing."""
+
+OWN_PATH = "cycle {} makes a path of its own, which is not corrected"
+AFTER_HOLE = "where the axis {} stands after a hole of unknown depth is not followed"
+DEPTH_AT_RUN_TIME = "the depth of the cycle is known only at run time"
+PATTERN = "a pattern of holes ({}): the control works out where they are; --flatten writes them out"
+IN_PLANE = 1 << X | 1 << Y
+FROM_INCREMENT = "an old cycle is called from a height in increments (IZ)"
+
+
+# -- definition -------------------------------------------------------------------------------------------------------
+
+
+def define(control: Control, name: str, words: Words, text: str) -> None:
+    """A CYCL DEF block: `name` is `200`, or `7.1`."""
+    number, _, part = name.partition(".")
+    cycle = int(number)
+    if cycle in trans_cycles.ACTS:
+        trans_cycles.transform(control, cycle, part, words, text)
+        return
+    if cycle in HARMLESS:
+        return
+    if cycle in ADJUSTING:
+        control.refusal = control.refusal or ADJUSTED.format(cycle)
+    if cycle in BUILDERS:
+        control.refuse_here(OF_BUILDER.format(cycle))
+    if cycle == MEASURING:
+        control.refuse_here(BY_ITSELF.format(cycle))
+    if cycle in (ON_CIRCLE, ON_LINES):
+        pattern(control, pattern_of_cycle(cycle, control.scope.parameters), f"cycle {cycle}")
+        return
+    if part in ("", "0"):
+        control.cycle.number, control.cycle.steps = cycle, {}
+    words_of_step = {**words.values}
+    if words.runtime:
+        words_of_step["?"] = 1.0
+    control.cycle.steps |= {f"{part}:{key}": value for key, value in words_of_step.items()}
+
+
+# -- execution --------------------------------------------------------------------------------------------------------
+
+
+def executes(control: Control, step: Step) -> bool:
+    """Whether a positioning block executes the cycle in force: M99, or M89 before or in it. M99 ends M89."""
+    if 89 in step.codes:
+        control.cycle.modal = True
+    once, modal = 99 in step.codes, control.cycle.modal
+    if once:
+        control.cycle.modal = False
+    return once or modal
+
+
+def call(control: Control, step: Step) -> None:
+    """Execute the cycle in force at the position of a block, or where the axes stand."""
+    cycle = control.cycle
+    if cycle.number == 0:
+        raise Fault(NO_CYCLE, "a cycle is called, and none is defined before")
+    control.use()
+    if cycle.number == CALLING:
+        control.refusal = control.refusal or CALLED
+    if cycle.number not in DRILLING | MILLING | OLD_DRILLING:
+        own_path(control, step)
+        return
+    control.settle(tuple(control.unknown))
+    is_polar = step.name == "lp"
+    where = polar(control, step.words)[0] if is_polar else led(control, step.words)
+    axes = polar_axes(control, step.words) if is_polar else step.words.axes
+    height = where.inner[Z]
+    bottom, clear, refusal = levels(control, height)
+    old, by_height = cycle.number in OLD_DRILLING, step.name == "cycl call pos"
+    if (old or by_height) and Z in where.unknown:
+        refusal = refusal or where.unknown[Z].format("Z")
+    if old and "IZ" in step.words.values:
+        refusal = refusal or FROM_INCREMENT
+    if by_height and not old:
+        bottom, clear = bottom + height, clear + height
+    if by_height or step.name == "cycl call":
+        control.builder.rests(mask_of(control.turning))
+    drill(control, where, axes, (bottom, clear, refusal))
+
+
+def pattern(control: Control, places: tuple[Place, ...] | None, name: str) -> None:
+    """The cycle in force at places that the control works out."""
+    control.use()
+    if control.cycle.number == 0:
+        raise Fault(NO_CYCLE, "a pattern of holes, and no cycle is defined before")
+    if places is None or control.cycle.number not in DRILLING | MILLING:
+        reason = PATTERN.format(name) if places is None else OWN_PATH.format(control.cycle.number)
+        control.refuse_here(reason)
+        return
+    control.settle(tuple(control.unknown))
+    control.budget.spend(len(places))
+    for place in places:
+        where = led(control, Words({"X": place.x, "Y": place.y}, frozenset()))
+        bottom, clear, refusal = levels(control, where.inner[Z])
+        height = control.scale[Z] * place.height
+        drill(control, where, IN_PLANE, (bottom + height, clear + height, refusal or PATTERN.format(name)))
+
+
+def drill(control: Control, where: Where, axes: int, heights: tuple[float, float, str]) -> None:
+    """One hole."""
+    bottom, clear, refusal = heights
+    over = Where(where.inner[:], dict(where.unknown))
+    where.inner[Z] = bottom
+    if not refusal:
+        where.unknown.pop(Z, None)
+    target, unknown = command_of(control, where, axes | 1 << Z)
+    programmed = axes & ~(1 << Z)
+    code = FROM_START if control.cycle.number in OLD_DRILLING else BY_DEPTH
+    control.make(Motion(Kind.CYCLE, programmed, target, unknown, code, refusal=refusal))
+    over.inner[Z] = clear
+    over.unknown.pop(Z, None)
+    if refusal == DEPTH_AT_RUN_TIME:
+        over.unknown[Z] = AFTER_HOLE
+    if control.cycle.number in MILLING:
+        over.unknown |= {X: AFTER_CYCLE, Y: AFTER_CYCLE}
+        if not refusal:
+            control.warn(MOVED_AS_A_WHOLE, AS_A_WHOLE.format(control.cycle.number))
+    control.position, control.unknown = command_of(control, over, axes | 1 << Z)
+    control.path.tangent = None
+
+
+def levels(control: Control, height: float) -> tuple[float, float, str]:
+    """Bottom and clearance of the cycle in force along the tool axis of the frame, mm; and why they are not known."""
+    cycle, unit = control.cycle, control.modal.unit
+    if cycle.number in OLD_DRILLING:
+        depth, gap = said(cycle.steps, DEPTH_WORDS), said(cycle.steps, GAP_WORDS)
+        if depth is None or gap is None or any(key.endswith(":?") for key in cycle.steps):
+            return height, height, DEPTH_AT_RUN_TIME
+        sign = -1.0 if depth < 0 else 1.0
+        return height + sign * unit * (abs(gap) + abs(depth)), height, ""
+    parameters = control.scope.parameters
+    parameters.touched = False
+    gap, depth, surface, second = (parameters.get(name) for name in ("Q200", "Q201", "Q203", "Q204"))
+    by_diameter = cycle.number == 240 and parameters.get("Q343") != 0.0
+    if parameters.touched or by_diameter:
+        return height, height, DEPTH_AT_RUN_TIME
+    clear = surface + max(gap, second)
+    return unit * (surface + depth), unit * clear, ""
+
+
+def said(steps: Mapping[str, float], names: frozenset[str]) -> float | None:
+    """What an old cycle says under one of several names."""
+    return next((value for key, value in steps.items() if "".join(key.partition(":")[2].split()) in names), None)
+
+
+def own_path(control: Control, step: Step) -> None:
+    """A cycle that is not followed: after it X, Y and Z stand nowhere known, and of most cycles the other axes do."""
+    position, unknown = control.position[:], dict(control.unknown)
+    refuse(control, OWN_PATH.format(control.cycle.number))
+    if control.cycle.number in IN_SPACE and not step.words.axes >> (Z + 1):
+        control.position, control.unknown = position, unknown
+    control.lose(range(3), AFTER_CYCLE)

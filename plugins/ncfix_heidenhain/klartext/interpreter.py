@@ -1,0 +1,327 @@
+"""The walk through a Klartext program: block after block, as labels and calls lead."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Protocol
+
+from ncfix.control.coordinates import INDEX
+from ncfix.control.faults import Fault
+from ncfix.control.places import mask_of
+from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, Recurrence
+from ncfix.diagnostics import Place, SourceError
+from ncfix.text.language import Resolve
+from ncfix.text.reach import UNREAD
+from ncfix.text.reader import read
+from ncfix.text.tree import Opaque, Program, Span
+from ncfix_heidenhain.klartext import cycles, lines, tilting, trans_cycles
+from ncfix_heidenhain.klartext.calculate import Evaluate
+from ncfix_heidenhain.klartext.codes import after_motion, before_motion
+from ncfix_heidenhain.klartext.control import Control
+from ncfix_heidenhain.klartext.flow import FlowControl
+from ncfix_heidenhain.klartext.lane import run_lane
+from ncfix_heidenhain.klartext.layout import CORNERS
+from ncfix_heidenhain.klartext.paths import PATHS, astray
+from ncfix_heidenhain.klartext.plans import Plan
+from ncfix_heidenhain.klartext.statements import statement
+from ncfix_heidenhain.klartext.step import Step, refuse
+from ncfix_heidenhain.klartext.targets import Words, axis_letters, set_pole
+from ncfix_heidenhain.klartext.tools import call_tool, define_tool
+from ncfix_heidenhain.klartext.units import Unit
+from ncfix_heidenhain.klartext.unread import unread_line
+
+NO_END = "NCF234"
+WRITTEN_AT_RUN_TIME = "NCF237"
+AT_RUN_TIME = "NCF277"
+ENDS_INSIDE = "a called program with M2 or M30, which the manuals do not allow"
+SUFFIX = re.compile(r"\.h\Z", re.IGNORECASE)
+NOT_OF_MOTION = frozenset({"F", "FU", "FZ", "FT", "S", "T", "ANG", "NX", "NY", "NZ"})
+"""Addresses in motion blocks that lead nowhere."""
+
+
+class Recorder(Protocol):
+    """Takes note of blocks that are executed; see `unroll`."""
+
+    def note(self, unit: Unit, block: int, control: Control, row: int) -> None:
+        """A block is about to be executed; `row` is the block of the main program that led to it."""
+
+
+class Interpreter:
+    """Follows one program."""
+
+    def __init__(self, control: Control, program: Program, resolve: Resolve | None, max_blocks: int) -> None:
+        self.control = control
+        self.resolve = resolve
+        control.budget.left = max_blocks
+        self.recurrence = Recurrence()
+        self.files: dict[str, Unit | None] = {}
+        self.program = program
+        self.flow: FlowControl | None = None
+        self.recorder: Recorder | None = None
+        self.span: Span | None = None
+        self.axes = mask_of(control.machine)
+        self.no_lane: tuple[Unit | None, range] = None, range(0)
+        control.locate = self.place
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        if self.flow is None or self.flow.block == 0:
+            return Place(self.program.path, 1)
+        return self.flow.unit.program.place(self.flow.block - 1, self.span)
+
+    def find(self, name: str) -> Unit | None:
+        """The program of a call: beside this one, by its name without folders."""
+        if name not in self.files:
+            base = re.split(r"[\\/:]", name.strip().strip('"'))[-1]
+            tries = (base, SUFFIX.sub("", base), base + ".h", base + ".H", base.lower(), base.upper())
+            found = ((each, self.resolve(each)) for each in tries if self.resolve)
+            programs = ((each, read(text, each, self.program.dialect)) for each, text in found if text)
+            units = (Unit(program, self.axes, each) for each, program in programs)
+            self.files[name] = next(units, None)
+        return self.files[name]
+
+    def run(self) -> None:
+        """Follow the program to its end; raises SourceError where the control would stop."""
+        with self.stopping():
+            self.walk(self.begun())
+
+    @contextmanager
+    def stopping(self) -> Iterator[None]:
+        """What the control stops at is a SourceError with its place."""
+        try:
+            yield
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def begun(self) -> FlowControl:
+        """The program before its first block."""
+        main = Unit(self.program, self.axes)
+        self.flow = FlowControl(main, self.find, self.control.scope.parameters, self.control.budget, main.begin)
+        self.control.unit = main.mm
+        self.control.recompose()
+        return self.flow
+
+    def walk(self, flow: FlowControl) -> None:
+        """Block after block."""
+        control = self.control
+        while flow.block < len(flow.unit):
+            unit, block = flow.unit, flow.block
+            plan = unit.plan(block)
+            if self.takes_stretch(flow):
+                continue
+            flow.block += 1
+            if plan.empty:
+                continue
+            control.budget.spend(1)
+            control.scope.numbers, control.scope.first = unit.numbers, unit.first[block]
+            control.external = unit.name
+            if not unit.name:
+                control.row_block = block
+            if plan.skip is not None and control.is_deleted(plan.skip):
+                continue
+            if self.recorder is not None:
+                self.recorder.note(unit, block, control, control.row_block)
+            if self.execute(plan, flow):
+                return
+            if flow.unit is unit and flow.block <= block:
+                self.look_round(flow, block)
+        self.at_end_of_text()
+
+    def look_round(self, flow: FlowControl, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        jump = id(flow.unit), block, flow.block, *flow.under_way()
+        if self.recurrence.seen(jump, flow.parameters.changes):
+            flow.block = block + 1
+            raise Fault(ENDLESS, NEVER_ENDS)
+
+    def at_end_of_text(self) -> None:
+        """The text is over without END PGM."""
+        self.control.warn(NO_END, "the program does not end with END PGM", "it may be cut off")
+
+    def takes_stretch(self, flow: FlowControl) -> bool:
+        """Take plain motions many at once; whether any were."""
+        unit, closed = self.no_lane
+        if self.recorder is not None or (unit is flow.unit and flow.block in closed):
+            return False
+        done, worth = run_lane(self.control, flow.unit, flow.block)
+        self.no_lane = flow.unit, range(flow.block + done, worth)
+        flow.block += done
+        self.control.budget.spend(done)
+        return done > 0
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan, flow: FlowControl) -> bool:
+        """Execute a block; True if the program ends there."""
+        control = self.control
+        if plan.statement is not None:
+            return self.state(plan, flow)
+        if plan.flow is not None:
+            self.branch(plan, flow)
+            return False
+        self.assign(plan)
+        words = self.evaluated(plan.words)
+        name = plan.name
+        if name.startswith("tool "):
+            (call_tool if name == "tool call" else define_tool)(control, self.tool_of(plan), words, plan.flags)
+        elif name.startswith("cycl def "):
+            cycles.define(control, name.removeprefix("cycl def "), words, self.names(plan, flow))
+        elif name.startswith("plane "):
+            tilting.plane(control, name.removeprefix("plane "), words, plan.flags)
+        elif name.startswith("trans datum"):
+            self.shift_datum(name, words)
+        else:
+            return self.motion(plan, words, flow)
+        return False
+
+    def state(self, plan: Plan, flow: FlowControl) -> bool:
+        """A statement that is not taken apart."""
+        assert plan.statement is not None
+        kind, span = plan.statement
+        text = flow.unit.program.slice(flow.block - 1, span)
+        if kind == UNREAD:
+            unread_line(self.control, flow.unit.program.text_of(flow.block - 1))
+        elif kind == "program":
+            return text.upper().startswith("END") and flow.end_of_program()
+        else:
+            statement(self.control, flow, text)
+        return False
+
+    def branch(self, plan: Plan, flow: FlowControl) -> None:
+        """A label, a call or a condition."""
+        assert plan.flow is not None
+        label = str(plan.flow.label)
+        match plan.flow.keyword:
+            case "label" if label == "0":
+                flow.end_of_subprogram()
+            case "call":
+                times = plan.flow.arguments
+                flow.call(label, int(times[0].value) if times else None)  # type: ignore[union-attr]
+            case "if" if self.holds(plan):
+                flow.jump(label)
+
+    def holds(self, plan: Plan) -> bool:
+        """Whether a condition is met; raises `Fault` if that is known only at run time."""
+        assert plan.test is not None
+        value, at_runtime = self.control.scope.value_of(plan.test)
+        if at_runtime:
+            code = AT_RUN_TIME if self.recorder is None else WRITTEN_AT_RUN_TIME
+            lacking = self.control.scope.parameters.lacking
+            text = f"where the program goes on depends on {lacking}, which is known only at run time"
+            raise Fault(code, text, f'variables."{lacking}" in the setup file gives it a value')
+        return value != 0.0
+
+    def assign(self, plan: Plan) -> None:
+        """Set Q parameters."""
+        scope = self.control.scope
+        for name, value in plan.assignments:
+            scope.parameters.assign(name, *scope.value_of(value))
+
+    def evaluated(self, words: Mapping[str, Evaluate]) -> Words:
+        """The words of a block as numbers."""
+        scope, values, runtime = self.control.scope, {}, []
+        for address, value in words.items():
+            values[address], at_runtime = scope.value_of(value)
+            if at_runtime:
+                runtime.append(address)
+        return Words(values, frozenset(runtime))
+
+    def tool_of(self, plan: Plan) -> str | float | None:
+        """The number or name of a tool; a name for a number that is known only at run time."""
+        if plan.tool is None or isinstance(plan.tool, str):
+            return plan.tool
+        number, at_runtime = self.control.scope.value_of(plan.tool)
+        return self.control.scope.parameters.lacking if at_runtime else number
+
+    def names(self, plan: Plan, flow: FlowControl) -> str:
+        """The words of a cycle definition that have no value."""
+        program, block = flow.unit.program, flow.block - 1
+        items = program.items_of(block)
+        return " ".join(program.slice(block, item.span) for item in items if isinstance(item, Opaque))
+
+    def shift_datum(self, name: str, words: Words) -> None:
+        """TRANS DATUM."""
+        if name.endswith("reset"):
+            self.control.transformations.reset_shift()
+            self.control.shaky.clear()
+        trans_cycles.shift(self.control, words, "")
+        self.control.recompose()
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def motion(self, plan: Plan, words: Words, flow: FlowControl) -> bool:
+        """A block of path words and M codes; True if it ends the program."""
+        control = self.control
+        codes = frozenset(code for code, _ in plan.codes)
+        self.feed(words, plan)
+        values = {address: value for address, value in words.values.items() if address not in NOT_OF_MOTION}
+        step = Step(plan.name, Words(values, words.runtime & values.keys()), plan.flags, codes)
+        self.note_foreign(plan, step)
+        before_motion(control, step)
+        control.path.ahead = self.corner_ahead(flow)
+        self.move(plan, step)
+        for code, own in plan.codes:
+            after_motion(control, code, self.evaluated(own), plan.flags)
+        if codes & {2, 30} and control.external:
+            control.refusal = control.refusal or ENDS_INSIDE
+        return bool(codes & {2, 30}) and not control.external
+
+    def note_foreign(self, plan: Plan, step: Step) -> None:
+        """Note axes that the program moves and the machine lacks."""
+        control = self.control
+        for letter in axis_letters(step.words):
+            if control.path.spatial and letter in "ABC":
+                continue
+            if INDEX[letter] not in control.machine and letter not in control.foreign:
+                self.span = plan.spans.get(letter) or plan.spans.get("I" + letter)
+                control.note_foreign(letter)
+                self.span = None
+
+    def feed(self, words: Words, plan: Plan) -> None:
+        """F, in mm or inches per minute; FU per revolution; FAUTO as TOOL CALL has it."""
+        modal = self.control.modal
+        for address, mode in (("F", 94), ("FU", 95), ("FZ", 95), ("FT", 94)):
+            if address in words.values:
+                known = address not in words.runtime and address in ("F", "FU")
+                modal.feed = words.values[address] * self.control.unit if known else math.nan
+                modal.feed_mode = mode
+        if "fauto" in plan.flags:
+            modal.feed = self.control.auto_feed
+
+    def corner_ahead(self, flow: FlowControl) -> bool:
+        """Whether the next block makes a corner of the end of this one."""
+        following = flow.unit.next_plan(flow.block)
+        return following is not None and following.name in CORNERS
+
+    def move(self, plan: Plan, step: Step) -> None:
+        """What moves in a block, if anything does."""
+        control = self.control
+        if step.name == "cc":
+            set_pole(control, step.words)
+            return
+        if step.name in CORNERS:
+            control.path.corner = True
+            return
+        calls = step.name.startswith("cycl call")
+        called = not calls and cycles.executes(control, step) and (plan.moves or 99 in step.codes)
+        if calls and step.name.endswith("pat"):
+            cycles.pattern(control, control.cycle.places, "CYCL CALL PAT")
+        elif why := astray(control, step, called=called):
+            refuse(control, why)
+        elif plan.moves and step.codes & {91, 92}:
+            lines.at_machine(control, step)
+        elif calls or called:
+            cycles.call(control, step)
+        elif step.name.startswith("appr "):
+            lines.approach(control, step)
+        elif step.name.startswith("dep "):
+            lines.departure(control, step)
+        elif plan.moves:
+            PATHS[step.name](control, step)
+        else:
+            return
+        control.path.corner = False

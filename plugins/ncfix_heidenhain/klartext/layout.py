@@ -1,0 +1,245 @@
+"""Where things stand in a Klartext motion block: what may be rewritten, and where missing words go."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from ncfix.text.layout import AXIS_LETTERS
+from ncfix.text.tree import (
+    Anchor,
+    Command,
+    Comment,
+    Constant,
+    Item,
+    Literal,
+    Opaque,
+    Program,
+    Skip,
+    Span,
+    Template,
+    Word,
+)
+from ncfix_heidenhain.klartext.plans import opens_block, own_words
+from ncfix_heidenhain.klartext.poles import in_lines
+
+CORNERS = frozenset({"rnd", "chf"})
+"""Corners that the control makes of the end of one motion and the beginning of the next."""
+
+POLAR = frozenset({"PR", "PA", "IPR", "IPA"})
+VECTOR = frozenset({"TX", "TY", "TZ"})
+AXIS_WORDS = frozenset({*AXIS_LETTERS, *(f"I{letter}" for letter in AXIS_LETTERS)})
+LATE = frozenset({0, 1, 2, 5, 6, 9, 30, 129})
+"""M codes that act at the end of their block: they belong on its last piece."""
+
+FALLBACK = Word("L", Constant(10.0), Span(Anchor(-1, 0), Anchor(-1, 0)), Span(Anchor(-1, 0), Anchor(-1, 0)))
+"""Every Klartext block says itself how it moves; blocks of words alone are straight."""
+
+RELATIVE_POLE = re.compile(rb"(?im)\n[ \t]*/?[ \t]*\d*[ \t]*CC(?![A-Z])(?:[^\r\n;]*I[XYZ]|[ \t]*(?:;|\r?$))")
+"""A pole that counts from where the tool stands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The writable parts of a motion block.
+
+    name      its path function, as in `Plan.name`
+    function  where that is written, None in a block of words alone
+    axes      axis -> its word, absolute or incremental
+    polar     PR, PA, IPR, IPA words
+    radius    the R word of CR
+    sense     DR+ or DR-
+    vector    TX TY TZ words
+    late      M codes that act at the end of the block
+    words_at  where missing words go: after the last word that leads somewhere
+    starts_at where the function stands, or the first word
+    blank     what separates words in this block
+    comma     numbers have a decimal comma
+    rapid     FMAX
+    corner    the block before or after it is a corner that the control makes (RND, CHF)
+    """
+
+    name: str
+    function: Span | None
+    axes: dict[str, Word]
+    polar: tuple[Word, ...]
+    radius: Word | None
+    sense: Span | None
+    vector: dict[str, Word]
+    late: tuple[Word, ...]
+    words_at: Anchor
+    starts_at: Anchor
+    blank: str
+    comma: bool
+    rapid: bool
+    corner: bool
+
+    @property
+    def motion(self) -> Word | None:
+        """The block says itself which kind of motion it is."""
+        return FALLBACK
+
+    def turn(self, program: Program, block: int) -> float | None:
+        """The angle of a CP in rad, if it is given by IPA."""
+        word = next((word for word in self.polar if word.address == "IPA"), None)
+        if self.name != "cp" or word is None or not isinstance(word.value, Literal):
+            return None
+        return math.radians(float(program.values_of(block)[word.value.slot]))
+
+
+def layout_of(program: Program, block: int) -> Layout | None:
+    """The layout of a block; None for an angle from a Q parameter, or half a direction of the tool."""
+    shape = Shape(program.templates[int(program.template[block])])
+    found = _of_shape(shape)
+    if found is None:
+        return None
+    corner = is_corner(program, block, -1) or is_corner(program, block, 1)
+    return _in_place(shape, separator(program, block, found[1]), uses_comma(program.source), corner)
+
+
+class Shape:
+    """A template as a key: two are the same only if they are one."""
+
+    __slots__ = ("template",)
+
+    def __init__(self, template: Template) -> None:
+        self.template = template
+
+    def __hash__(self) -> int:
+        return id(self.template)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Shape) and other.template is self.template
+
+
+@lru_cache(maxsize=4096)
+def _in_place(shape: Shape, blank: str, comma: bool, corner: bool) -> Layout | None:
+    """The layout of blocks of a shape that have the rest in common, too."""
+    found = _of_shape(shape)
+    return None if found is None else replace(found[0], blank=blank, comma=comma, corner=corner)
+
+
+@lru_cache(maxsize=4096)
+def _of_shape(shape: Shape) -> tuple[Layout, Word | None] | None:
+    """What all blocks of a shape have in common of their layout, and the last word that leads somewhere."""
+    items = shape.template.items
+    words, commands = own_words(items), [item for item in items if isinstance(item, Command)]
+    function = next((command for command in commands if opens_block(command.name)), None)
+    axes = {word.address.removeprefix("I"): word for word in among(words, AXIS_WORDS)}
+    polar, vector = among(words, POLAR), {word.address: word for word in among(words, VECTOR)}
+    if 0 < len(vector) < 3 or has_computed_angle(polar):
+        return None
+    last = max([*axes.values(), *polar], key=lambda word: word.span.stop, default=None)
+    end = last or function
+    layout = Layout(
+        name=function.name if function else "",
+        function=function.span if function else None,
+        axes=axes,
+        polar=polar,
+        radius=next(iter(among(words, {"R"})), None),
+        sense=next((command.span for command in commands if command.name in ("dr+", "dr-")), None),
+        vector=vector,
+        late=tuple(filter(acts_late, words)),
+        words_at=Anchor(-1, 0) if end is None else end.span.stop,
+        starts_at=start_of(items),
+        blank=" ",
+        comma=False,
+        rapid=any(command.name == "fmax" for command in commands),
+        corner=False,
+    )
+    return layout, last
+
+
+def among(words: Sequence[Word], addresses: Collection[str]) -> tuple[Word, ...]:
+    """The words with one of these addresses."""
+    return tuple(word for word in words if word.address in addresses)
+
+
+def has_computed_angle(polar: Sequence[Word]) -> bool:
+    """Whether the angle of a CP is no plain number."""
+    return any(word.address == "IPA" and not isinstance(word.value, Literal) for word in polar)
+
+
+def acts_late(word: Word) -> bool:
+    """Whether a word is an M code that acts at the end of its block."""
+    return word.address == "M" and isinstance(word.value, Constant) and int(word.value.value) in LATE
+
+
+def start_of(items: Sequence[Item]) -> Anchor:
+    """Where the block begins behind its number and block skip."""
+    begins = (item.span.start for item in items if not (isinstance(item, Skip) or is_number(item)))
+    return next(begins, Anchor(-1, 0))
+
+
+def is_corner(program: Program, block: int, way: int) -> bool:
+    """Whether the next element of the path is RND or CHF; `way`: 1 after this block, -1 before it."""
+    block += way
+    while 0 <= block < len(program):
+        between, corner = _in_path(Shape(program.templates[int(program.template[block])]))
+        if not between:
+            return corner
+        block += way
+    return False
+
+
+@lru_cache(maxsize=4096)
+def _in_path(shape: Shape) -> tuple[bool, bool]:
+    """Whether blocks of a shape stand between elements of the path, and whether they are corners."""
+    items = shape.template.items
+    names = (item.name if isinstance(item, Command) else getattr(item, "address", "") for item in items)
+    return is_between(items), any(name.lower() in CORNERS for name in names)
+
+
+def is_between(items: Sequence[Item]) -> bool:
+    """Remarks only, or a pole (CC): elements before and after it follow each other."""
+    return all(map(is_remark, items)) or any(isinstance(item, Command) and item.name == "cc" for item in items)
+
+
+def is_remark(item: Item) -> bool:
+    """A comment, a structuring remark, the block number, block skip."""
+    structure = isinstance(item, Opaque) and item.kind == "structure"
+    return structure or is_number(item) or isinstance(item, (Comment, Skip))
+
+
+def is_number(item: Item) -> bool:
+    """The block number."""
+    return isinstance(item, Word) and item.address == "N"
+
+
+def separator(program: Program, block: int, word: Word | None) -> str:
+    """The blanks before the last word."""
+    if word is None:
+        return " "
+    at = program.position(block, word.span.start)
+    start = int(program.blocks[block, 0])
+    before = program.source[start:at].decode("latin-1")
+    blanks = before[len(before.rstrip(" \t")) :]
+    return blanks or " "
+
+
+def uses_comma(source: bytes) -> bool:
+    """Whether a program writes decimal commas and no points in its motion blocks."""
+    commas, points = axis_numbers(source)
+    return commas > points
+
+
+@lru_cache(maxsize=4)
+def axis_numbers(source: bytes) -> tuple[int, int]:
+    """How many words of axes have a decimal comma, and how many a point; the latter are not counted if none has."""
+    commas = len(re.findall(rb"[XYZABC][+-]?\d*,\d", source)) if b"," in source else 0
+    return commas, len(re.findall(rb"[XYZABC][+-]?\d*\.\d", source)) if commas else 0
+
+
+@lru_cache(maxsize=4)
+def tilts(source: bytes) -> bool:
+    """Whether a program has tilted planes."""
+    return re.search(rb"(?i)\bPLANE[ \t]+(?!RESET)|CYCL[ \t]*DEF[ \t]*19\b", source) is not None
+
+
+@lru_cache(maxsize=4)
+def poles_move(source: bytes) -> bool:
+    """Whether some pole counts from where the tool stands, and so moves with its correction."""
+    return RELATIVE_POLE.search(b"\n" + in_lines(source)) is not None

@@ -1,0 +1,225 @@
+"""Straight motions: L, LN, LP, blocks of words alone, machine coordinates, approach and departure.
+
+Source: TNC 640, "Programming: contours", "Multiple axis machining", "Miscellaneous functions for coordinate data".
+"""
+
+import math
+from collections.abc import Sequence
+
+from ncfix.control import tcp
+from ncfix.control.coordinates import LETTERS, Vector, dot
+from ncfix.control.motion import Motion, Unknown
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix.control.places import mask_of
+from ncfix_heidenhain.klartext.control import DEPARTED, Control
+from ncfix_heidenhain.klartext.posture import angles_for
+from ncfix_heidenhain.klartext.step import Step, refuse, with_increments
+from ncfix_heidenhain.klartext.targets import (
+    Words,
+    command_of,
+    derived,
+    destination,
+    in_machine,
+    led,
+    polar,
+    polar_axes,
+)
+from ncfix_heidenhain.klartext.tilting import check_normal
+from ncfix_heidenhain.klartext.transformations import unit
+
+MACHINE_COORDINATES = "machine coordinates ({})"
+NOT_GIVEN = "where the axis {} stands after M92 depends on a datum of the machine that is not given"
+NOT_STRAIGHT = "where the axis {} stands after a path other than L in machine coordinates is not followed"
+ORIENTED = "the control works out the rotary axes (TX TY TZ), and what it finds is not known"
+TURNS_UNDER_TILT = Passing(
+    Pass.ROTARY_ALONE, "rotary axes are positioned in a tilted plane; the tip is corrected where it moves next"
+)
+MIXED_UNDER_TILT = "linear and rotary axes move together in a tilted plane"
+FAR_INCREMENT = "an increment of more than half a turn under M126: whether it goes the shorter way is not sure"
+OFF = Passing(Pass.LED, "a rapid from where the control itself has led the tool")
+DEPARTURE = Passing(Pass.DEPARTURE, "departure from the contour (DEP)")
+FLAT = 1e-9
+IN_SPACE = 0b111
+"""The bits of X, Y and Z."""
+
+STILL = 1e-9
+"""rad; an axis that is told to go where it stands does not turn."""
+
+
+def straight(control: Control, step: Step) -> None:
+    """L, LN, and blocks of words alone."""
+    control.use()
+    target, unknown = destination(control, step.words)
+    if not {"TX", "TY", "TZ"} & step.words.values.keys():
+        run(control, step, target, unknown, step.words.axes)
+        return
+    way = None if step.words.runtime else pointed(control, step.words)
+    if way is None:
+        refuse(control, ORIENTED)
+        return
+    control.points = True
+    for index, angle in way.items():
+        target[index] = angle
+        unknown.pop(index, None)
+    run(control, step, target, unknown, step.words.axes | sum(1 << index for index in way))
+
+
+def pointed(control: Control, words: Words) -> dict[int, float] | None:
+    """The rotary positions that point the tool along TX TY TZ, the nearest; None if that is not known."""
+    vector = unit((words.values.get("TX", 0.0), words.values.get("TY", 0.0), words.values.get("TZ", 0.0)))
+    if vector is None or not control.m128:
+        return None
+    x, y, z = (dot(row, vector) for row in control.rotation)
+    ways = angles_for(control, (x, y, z))
+    return ways[0] if ways else None
+
+
+def straight_polar(control: Control, step: Step) -> None:
+    """LP."""
+    control.use()
+    where, _ = polar(control, step.words)
+    axes = polar_axes(control, step.words)
+    target, unknown = command_of(control, where, axes)
+    run(control, step, target, unknown, axes, follows=True)
+    name_polar(control, step)
+
+
+def name_polar(control: Control, step: Step) -> None:
+    """PR and PA say where the axes of the plane are as well as their own words."""
+    if {"PR", "PA"} <= step.words.values.keys():
+        control.places.settle(mask_of((control.path.plane.first, control.path.plane.second)))
+
+
+def run(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int, *, follows: bool = False) -> None:
+    """A straight motion to a command."""
+    turned = [index for index in control.turning if axes >> index & 1]
+    positioning = turned and (not axes & IN_SPACE or turns(control, turned, target, unknown))
+    if positioning and control.transformations.tilted and not control.m128:
+        turn_under_tilt(control, step, target, unknown, axes)
+        return
+    way = take_short_way(control, step, target, axes) if control.shortest else ""
+    before = control.position, control.unknown
+    off = step.kind == Kind.RAPID and control.is_led(unknown)
+    with_increments(control, follows or step.words.incremental)
+    code = 0 if step.kind == Kind.RAPID else 10
+    refusal = way or check_normal(control) or derived(control, step.words, axes)
+    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=OFF if off else None))
+    with_increments(control, False)
+    keep_tangent(control, *before)
+
+
+def turns(control: Control, indices: Sequence[int], target: Vector, unknown: Unknown) -> bool:
+    """Whether some of these axes move, or may."""
+    lost = control.unknown.keys() | unknown.keys()
+    return any(index in lost or abs(target[index] - control.position[index]) > STILL for index in indices)
+
+
+def keep_tangent(control: Control, start: Vector, unknown: Unknown) -> None:
+    """Note in which direction a straight motion went; one without a way leaves the direction as it was."""
+    if any(index in unknown or index in control.unknown for index in range(3) if index in control.machine):
+        control.path.tangent = None
+        return
+    way = [b - a for a, b in zip(start[:3], control.position[:3], strict=True)]
+    length = math.hypot(*way)
+    if length > FLAT:
+        control.path.tangent = (way[0] / length, way[1] / length, way[2] / length)
+
+
+def take_short_way(control: Control, step: Step, target: Vector, axes: int) -> str:
+    """M126: rotary axes go the shorter way round; where one stands is said by a number that makes it so.
+
+    Returns why the motion is refused: of increments of more than half a turn the manuals do not say what it makes.
+    """
+    for index in control.machine:
+        if not (control.rotary[index] and axes >> index & 1) or index in control.unknown:
+            continue
+        if "I" + LETTERS[index] in step.words.values and abs(target[index] - control.position[index]) > math.pi:
+            return FAR_INCREMENT
+        turns = round((target[index] - control.position[index]) / (2 * math.pi))
+        control.position[index] += 2 * math.pi * turns
+    return ""
+
+
+def turn_under_tilt(control: Control, step: Step, target: Vector, unknown: Unknown, axes: int) -> None:
+    """Rotary axes that move in a tilted plane without M128: X Y Z of the machine stand still, the tip does not."""
+    linear = any(axes >> index & 1 for index in range(len(target)) if not control.rotary[index])
+    tcp.switch(control, control.offsets.tool, False)
+    control.refresh()
+    control.path.said = None
+    for index in control.machine:
+        if not control.rotary[index]:
+            target[index] = control.position[index]
+            unknown = {**{k: why for k, why in unknown.items() if k != index}, **own(control.unknown, index)}
+    code = 0 if step.kind == Kind.RAPID else 10
+    refusal, passing = (MIXED_UNDER_TILT, None) if linear else ("", TURNS_UNDER_TILT)
+    control.make(Motion(step.kind, axes, target, unknown, code, refusal=refusal, passing=passing))
+    if linear:
+        control.lose(range(3), MIXED_UNDER_TILT + ": where {} stands is not known")
+    control.switch_tip()
+    control.path.tangent = None
+
+
+def own(unknown: Unknown, index: int) -> Unknown:
+    """The entry of one axis."""
+    return {index: unknown[index]} if index in unknown else {}
+
+
+def at_machine(control: Control, step: Step) -> None:
+    """A motion in machine coordinates: M91, or M92."""
+    target, unknown = in_machine(control, step.words)
+    code = "M91" if 91 in step.codes else "M92"
+    if code == "M92":
+        unknown |= {i: NOT_GIVEN for i in control.machine if step.words.axes >> i & 1}
+    was = control.tcp
+    if was:
+        tcp.switch(control, control.offsets.tool, False)
+        control.refresh()
+        target, unknown = in_machine(control, step.words)
+    if step.name not in ("", "l") or {"PA", "PR", "IPA", "IPR"} & step.words.values.keys():
+        unknown |= {i: NOT_STRAIGHT for i in control.machine if not control.rotary[i]}
+    passing = Passing(Pass.MACHINE_COORDINATES, MACHINE_COORDINATES.format(code))
+    control.make(Motion(step.kind, step.words.axes, target, unknown, 0, passing=passing))
+    if was:
+        control.switch_tip()
+    control.path.tangent = None
+
+
+# -- approach and departure -------------------------------------------------------------------------------------------
+
+
+def approach(control: Control, step: Step) -> None:
+    """APPR: to the first point of the contour, which its words give; the control makes the way there."""
+    control.use()
+    where = polar(control, step.words)[0] if " p" in step.name else led(control, step.words)
+    axes = polar_axes(control, step.words) if " p" in step.name else step.words.axes
+    target, unknown = command_of(control, where, axes)
+    control.path.corner = True
+    with_increments(control, step.words.incremental or " p" in step.name)
+    control.make(Motion(Kind.FEED, axes, target, unknown, 10, refusal=derived(control, step.words, axes)))
+    with_increments(control, False)
+    if " p" in step.name:
+        name_polar(control, step)
+    control.path.tangent = None
+
+
+def departure(control: Control, step: Step) -> None:
+    """DEP: with an end point of its own (LCT) it is corrected there; else it is what the contour before makes of it.
+
+    Beside the contour, with RL or RR, the tool may end by its radius beside the element that it follows (LT).
+    """
+    beside, control.modal.compensated = control.modal.compensated, 0
+    if step.name.endswith("lct"):
+        approach(control, step)
+        return
+    tangent, control.path.tangent = control.path.tangent, None
+    plane = control.path.plane
+    lost: Unknown = {i: DEPARTED for i in (plane.first, plane.second) if i in control.machine}
+    target = control.position[:]
+    straight_on = step.name == "dep lt" and "LEN" in step.words.values and not (beside or step.words.runtime)
+    if straight_on and tangent is not None:
+        length = control.modal.unit * step.words.values["LEN"]
+        target[:3] = [a + length * b for a, b in zip(target[:3], tangent, strict=True)]
+        lost = {}
+    axes = 1 << plane.first | 1 << plane.second
+    control.make(Motion(Kind.FEED, axes, target, {**control.unknown, **lost}, 10, passing=DEPARTURE))

@@ -1,0 +1,168 @@
+"""What a block does, worked out once per shape: its words as functions of its numbers, its codes, its flow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ncfix.text.reach import UNREAD, Deletable, deletable
+from ncfix.text.tree import (
+    Assignment,
+    Command,
+    Constant,
+    Flow,
+    Item,
+    NamedParameter,
+    Opaque,
+    Span,
+    Template,
+    Text,
+    Word,
+)
+from ncfix_heidenhain.klartext.calculate import Evaluate, compiled
+
+FUNCTIONS = frozenset({"l", "lp", "ln", "c", "cp", "cr", "ct", "ctp", "cc", "rnd", "chf"})
+OPENING = ("tool ", "cycl ", "plane ", "trans ", "appr ", "dep ")
+"""The words with which a block begins, if it is not words alone."""
+
+LETTERS = frozenset("XYZABCUVW")
+OWN_WORDS = {
+    103: frozenset("F"),
+    112: frozenset("TAE"),
+    118: LETTERS,
+    120: frozenset({"LA"}),
+    124: frozenset("T"),
+    128: frozenset("F"),
+    140: frozenset({"MB", "F"}),
+}
+"""M code -> the addresses of words after it that are its own: limits of the handwheel, a feed, a distance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One shape.
+
+    name         what the block begins with: `l`, `cycl def 200`, `plane spatial`; empty for words alone
+    words        address -> its value, of the words of the motion
+    codes        M codes, each with the words that are its own
+    flags        words without values: `fmax`, `r0`, `dr+`, `stay`
+    assignments  Q parameter -> its value
+    flow         label, call or condition; `test` is the condition's value
+    tool         the name of a tool, or the value of its number
+    statement    the span of a statement that is not taken apart, and its kind
+    spans        address -> where the word stands
+    skip         the switches of block delete that it begins with: `/` is the only one
+    moves        the block leads somewhere: by its words, or by its path function alone
+    empty        the block does nothing
+    """
+
+    name: str = ""
+    words: Mapping[str, Evaluate] = field(default_factory=dict)
+    codes: tuple[tuple[int, Mapping[str, Evaluate]], ...] = ()
+    flags: frozenset[str] = frozenset()
+    assignments: tuple[tuple[str, Evaluate], ...] = ()
+    flow: Flow | None = None
+    test: Evaluate | None = None
+    tool: str | Evaluate | None = None
+    statement: tuple[str, Span] | None = None
+    spans: Mapping[str, Span] = field(default_factory=dict)
+    skip: Deletable | None = None
+    moves: bool = False
+    empty: bool = False
+
+
+CORNERS = frozenset({"RND", "CHF"})
+"""Words that are a path function by themselves."""
+
+STATEMENTS = frozenset({"program", "statement", UNREAD})
+"""Kinds of text that is not taken apart."""
+
+CARTESIAN = frozenset(letter for axis in "XYZABCUVW" for letter in (axis, "I" + axis))
+POLAR = frozenset({"PA", "IPA", "PR", "IPR"})
+VECTOR = frozenset({"TX", "TY", "TZ"})
+MOVING = CARTESIAN | POLAR | VECTOR
+"""The addresses that lead somewhere."""
+
+ALWAYS_MOVING = frozenset({"c", "cp", "cr", "ct", "ctp", "ln"})
+"""Path functions that move even where they name no end: `C DR-` is a full circle."""
+
+
+def owners(items: Sequence[Item]) -> dict[int, int]:
+    """Words that belong to an M code before them (`M118 X1 Y1`), not to the motion: place of the item -> that code."""
+    found: dict[int, int] = {}
+    code = -1
+    for place, item in enumerate(items):
+        match item:
+            case Word("M", Constant(value)):
+                code = int(value)
+            case Word(address) if address in OWN_WORDS.get(code, ()):
+                found[place] = code
+    return found
+
+
+def opens_block(name: str) -> bool:
+    """Whether a block begins with this, so that it is no block of words alone."""
+    return name in FUNCTIONS or name.startswith(OPENING)
+
+
+def own_words(items: Sequence[Item]) -> list[Word]:
+    """The words of the block itself: not its number, and not what belongs to M codes."""
+    owned = owners(items)
+    return [w for place, w in enumerate(items) if isinstance(w, Word) and w.address != "N" and place not in owned]
+
+
+def codes_of(items: Sequence[Item]) -> tuple[tuple[int, Mapping[str, Evaluate]], ...]:
+    """The M codes, each with the words that are its own."""
+    owned = owners(items)
+    codes: list[tuple[int, dict[str, Evaluate]]] = []
+    for place, item in enumerate(items):
+        match item:
+            case Word("M", Constant(value)):
+                codes.append((int(value), {}))
+            case Word(address, value) if place in owned:
+                codes[-1][1][address] = compiled(value)
+    return tuple(codes)
+
+
+def assigned(item: Assignment) -> tuple[str, Evaluate]:
+    """The Q parameter that is set, and its value."""
+    assert isinstance(item.target, NamedParameter), "this family has no arrays"
+    return item.target.name, compiled(item.value)
+
+
+def is_motion_word(word: Word) -> bool:
+    """Whether a word is one of the motion: no M code, and not what TOOL CALL and TOOL DEF name."""
+    return word.address != "TOOL" and not (word.address == "M" and isinstance(word.value, Constant))
+
+
+def tool_of(words: Sequence[Word]) -> str | Evaluate | None:
+    """The name of the tool that the block names, or the value of its number."""
+    value = next((word.value for word in words if word.address == "TOOL"), None)
+    if value is None:
+        return None
+    return value.value if isinstance(value, Text) else compiled(value)
+
+
+def plan_of(template: Template) -> Plan:
+    """Work out what the blocks of one shape do."""
+    items = template.items
+    names = [item.name for item in items if isinstance(item, Command)]
+    opening = next(filter(opens_block, names), "")
+    words = list(filter(is_motion_word, own_words(items)))
+    flow = next((item for item in items if isinstance(item, Flow)), None)
+    opaque = (item for item in items if isinstance(item, Opaque) and item.kind in STATEMENTS)
+    plan = Plan(
+        name=next((word.address.lower() for word in words if word.address in CORNERS), opening),
+        words={word.address: compiled(word.value) for word in words},
+        codes=codes_of(items),
+        flags=frozenset(names) - {opening},
+        assignments=tuple(assigned(item) for item in items if isinstance(item, Assignment)),
+        flow=flow,
+        test=compiled(flow.arguments[0]) if flow is not None and flow.keyword == "if" else None,
+        tool=tool_of(template.words),
+        statement=next(((item.kind, item.span) for item in opaque), None),
+        spans={word.address: word.span for word in reversed(words)},
+        skip=deletable(template, ""),
+        moves=any(word.address in MOVING for word in words) or opening in ALWAYS_MOVING,
+    )
+    return replace(plan, empty=plan == Plan())

@@ -1,0 +1,284 @@
+"""Where the words of a block lead: absolute and incremental words, Cartesian and polar, and what is known of it.
+
+A position along the axes of the program's frame is called inner (mm and rad), a command outer. An axis of the frame is
+known if all axes of the machine that it is made of are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ncfix.control import tcp
+from ncfix.control.control import ADRIFT
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, PLANES, Vector, X, Y, Z
+from ncfix.control.faults import Fault
+from ncfix.control.motion import AT_START, Unknown
+from ncfix.control.places import mask_of
+from ncfix_heidenhain.klartext.control import SPATIAL, Control
+from ncfix_heidenhain.klartext.plans import MOVING
+
+BAD_POLE = "NCF271"
+POLE_MOVED = "where the axis {} goes from a pole (CC) that was set before the datum was moved is not sure"
+COUNTED_FROM = "where the axis {} stands after incremental words with M91 depends on what the control counts from"
+RUNTIME = "where the axis {} stands depends on a Q parameter that is known only at run time"
+PLANE_OF = {frozenset((X, Y)): PLANES[170], frozenset((Z, X)): PLANES[180], frozenset((Y, Z)): PLANES[190]}
+"""Planes by their axes; the angle is counted from the first axis (X, Z, Y) towards the second."""
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """The words of one motion as numbers.
+
+    values   address -> value, in program units
+    runtime  addresses whose value is known only at run time
+    """
+
+    values: Mapping[str, float]
+    runtime: frozenset[str]
+
+    @property
+    def axes(self) -> int:
+        """A bit mask of the axes that have a word; polar words stand for those of the plane (see `polar`)."""
+        return _axes_of(tuple(self.values))
+
+    @property
+    def incremental(self) -> bool:
+        """Some word counts from where the axis stands."""
+        return _counts_on(tuple(self.values))
+
+
+def axis_letters(words: Words) -> tuple[str, ...]:
+    """The axes that have a word."""
+    return _letters_of(tuple(words.values))
+
+
+@lru_cache(maxsize=1024)
+def _axes_of(addresses: tuple[str, ...]) -> int:
+    letters = {address.removeprefix("I") for address in addresses if address not in ("PA", "PR", "IPA", "IPR")}
+    return sum(1 << INDEX[letter] for letter in letters if letter in INDEX)
+
+
+@lru_cache(maxsize=1024)
+def _counts_on(addresses: tuple[str, ...]) -> bool:
+    return any(address[0] == "I" for address in addresses)
+
+
+@lru_cache(maxsize=1024)
+def _letters_of(addresses: tuple[str, ...]) -> tuple[str, ...]:
+    letters = (address.removeprefix("I") for address in addresses)
+    return tuple(letter for letter in letters if letter in INDEX)
+
+
+@dataclass(slots=True)
+class Where:
+    """A position along the axes of the frame, and why some of it is not known."""
+
+    inner: Vector
+    unknown: Unknown
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What words of a turned frame have said of a position, of which the machine's axes alone do not tell as much."""
+
+    where: Where
+    target: Vector
+    frame: tuple[object, ...]
+
+
+def here(control: Control) -> Where:
+    """Where the control stands."""
+    said = control.path.said
+    if isinstance(said, Said) and control.unknown and said.target is control.position and said.frame == frame(control):
+        return Where(said.where.inner[:], dict(said.where.unknown))
+    return Where(control.inner(), inner_unknown(control, control.unknown))
+
+
+def frame(control: Control) -> tuple[object, ...]:
+    """What the words of a program mean."""
+    return control.rotation, tuple(control.offset), control.modal.unit, control.tcp
+
+
+def inner_unknown(control: Control, unknown: Unknown) -> Unknown:
+    """What is not known along the axes of the frame."""
+    return dict(tcp.along_frame(control, unknown))
+
+
+def destination(control: Control, words: Words) -> tuple[Vector, Unknown]:
+    """The command at which the motion of a block ends, and what is not known of it."""
+    return command_of(control, led(control, words), words.axes)
+
+
+def led(control: Control, words: Words) -> Where:
+    """The position to which the words of axes lead."""
+    if words.incremental:
+        settle(control, words)
+    where = here(control)
+    for address, value in words.values.items():
+        letter = address.removeprefix("I")
+        index = INDEX.get(letter)
+        if index is None:
+            continue
+        if address[0] != "I":
+            where.inner[index] = 0.0
+            where.unknown.pop(index, None)
+            if index in control.shaky:
+                where.unknown[index] = control.shaky[index]
+        where.inner[index] += control.scale[index] * value
+        if address in words.runtime:
+            where.unknown[index] = RUNTIME
+    by_spatial_angles(control, words, where)
+    return where
+
+
+def derived(control: Control, words: Words, axes: int) -> str:
+    """Why a motion cannot be said anew by words for all of `axes`: where some stand follows from no word.
+
+    Directions of the tool say where its axes go. Polar words, and arcs of which an end has one word, count from a place
+    that the program may not have said.
+    """
+    if not control.places.adrift:
+        return ""
+    own = words.axes
+    if {"PR", "PA"} <= words.values.keys():
+        own |= polar_axes(control, words)
+    if words.values.keys() & {"TX", "TY", "TZ"}:
+        own |= mask_of(control.turning)
+    index = next((i for i in control.machine if (axes & ~own & control.places.adrift) >> i & 1), None)
+    return "" if index is None else ADRIFT.format(LETTERS[index])
+
+
+def by_spatial_angles(control: Control, words: Words, where: Where) -> None:
+    """A B C as spatial angles (FUNCTION TCPM AXIS SPAT): where the rotary axes go the control works out."""
+    if control.path.spatial and {"A", "B", "C"} & {address.removeprefix("I") for address in words.values}:
+        where.unknown |= dict.fromkeys(control.turning, SPATIAL)
+
+
+def settle(control: Control, words: Words) -> None:
+    """Increments count from where axes stand: start positions that matter are asked for."""
+    wanted = [INDEX[address[1:]] for address in words.values if address[0] == "I" and address[1:] in INDEX]
+    if control.is_rotated:
+        wanted = list(control.machine)
+    control.settle(wanted)
+
+
+def command_of(control: Control, where: Where, axes: int) -> tuple[Vector, Unknown]:
+    """A position as a command; axes without a word stay exactly where they are."""
+    target = control.outer(where.inner)
+    turned = control.is_rotated and axes & 7
+    for index, position in enumerate(control.position):
+        spatial = turned and index < 3 and any(control.rotation[index][k] and axes >> k & 1 for k in range(3))
+        if not spatial and not axes >> index & 1:
+            target[index] = position
+    unknown = where.unknown
+    if control.is_rotated and unknown:
+        unknown = tcp.mixed_into(unknown, control.rotation)
+        control.path.said = Said(Where(where.inner[:], dict(where.unknown)), target, frame(control))
+    found = {index: why for index, why in unknown.items() if index in control.machine}
+    control.saying = found, where.unknown
+    return target, found
+
+
+def in_machine(control: Control, words: Words) -> tuple[Vector, Unknown]:
+    """The command of words in machine coordinates (M91); increments count from the last such position, if any."""
+    target, unknown = control.position[:], dict(control.unknown)
+    for address, value in words.values.items():
+        index = INDEX.get(address.removeprefix("I"))
+        if index is not None and address[0] == "I":
+            unknown[index] = COUNTED_FROM
+        elif index is not None:
+            target[index] = value * (DEGREE if control.rotary[index] else control.unit)
+            unknown.pop(index, None)
+            if address in words.runtime:
+                unknown[index] = RUNTIME
+    return target, unknown
+
+
+# -- poles ------------------------------------------------------------------------------------------------------------
+
+
+def set_pole(control: Control, words: Words) -> None:
+    """CC: the pole, absolute or from where the tool stands; a coordinate that is left out stays, none takes both."""
+    path = control.path
+    named = frozenset(
+        INDEX[address.removeprefix("I")] for address in words.values if address.removeprefix("I") in "XYZ"
+    )
+    plane = PLANE_OF.get(named, path.plane) if len(named) == 2 else path.plane
+    others = words.values.keys() & (MOVING - {f"{sign}{letter}" for sign in ("", "I") for letter in "XYZ"})
+    if others or any(index not in (plane.first, plane.second) for index in named) or len(named) > 2:
+        raise Fault(BAD_POLE, "CC needs the two axes of one plane")
+    where = led(control, words)
+    old = {} if path.pole is None else {path.plane.first: path.pole[0], path.plane.second: path.pole[1]}
+    keep = {} if not named else old
+    values = [keep.get(i, where.inner[i]) if i not in named else where.inner[i] for i in (plane.first, plane.second)]
+    lost = [i for i in (plane.first, plane.second) if i in where.unknown and (i in named or i not in keep)]
+    path.plane, path.pole = plane, None if lost else (values[0], values[1])
+    path.pole_in = pole_frame(control)
+
+
+def pole_frame(control: Control) -> object:
+    """What the numbers of a pole mean: datum along the axes of its plane, rotation, unit."""
+    plane = control.path.plane
+    return control.offset[plane.first], control.offset[plane.second], control.rotation, control.modal.unit
+
+
+def polar(control: Control, words: Words) -> tuple[Where, float | None]:
+    """The position that polar words lead to, and by which angle it was reached from the present one (IPA), rad."""
+    path = control.path
+    if path.pole is None:
+        raise Fault(BAD_POLE, "polar coordinates, and no pole (CC) is known")
+    plane, (first, second) = path.plane, path.pole
+    control.settle((plane.first, plane.second))
+    start = here(control)
+    where = led(control, words)
+    away = start.inner[plane.first] - first, start.inner[plane.second] - second
+    radius, angle = arm(words.values, away, control.modal.unit)
+    where.inner[plane.first] = first + radius * math.cos(angle)
+    where.inner[plane.second] = second + radius * math.sin(angle)
+    why = doubt(control, words, start)
+    for index in (plane.first, plane.second):
+        where.unknown.pop(index, None)
+        if why:
+            where.unknown[index] = why
+    step = words.values.get("IPA")
+    return where, None if step is None else step * DEGREE
+
+
+def arm(values: Mapping[str, float], away: tuple[float, float], unit: float) -> tuple[float, float]:
+    """Distance from the pole, mm, and angle, rad, to which polar words lead axes that stand `away` from it."""
+    radius, angle = math.hypot(*away), math.atan2(away[1], away[0])
+    if "PR" in values:
+        radius = unit * values["PR"]
+    elif "IPR" in values:
+        radius += unit * values["IPR"]
+    if "IPA" in values:
+        angle += values["IPA"] * DEGREE
+    elif "PA" in values:
+        angle = values["PA"] * DEGREE
+    return radius, angle
+
+
+def doubt(control: Control, words: Words, start: Where) -> str:
+    """Why it is not known where polar words lead from a start; empty if it is."""
+    plane = control.path.plane
+    if not {"PR", "PA"} <= words.values.keys():
+        for index in (plane.first, plane.second):
+            if index in start.unknown:
+                return start.unknown[index]
+    if words.runtime & {"PR", "PA", "IPR", "IPA"}:
+        return RUNTIME
+    return "" if control.path.pole_in == pole_frame(control) else POLE_MOVED
+
+
+def polar_axes(control: Control, words: Words) -> int:
+    """The axes that a motion in polar coordinates moves."""
+    return words.axes | 1 << control.path.plane.first | 1 << control.path.plane.second
+
+
+def starts_unknown(control: Control) -> bool:
+    """Where the motion begins is not known in X Y Z."""
+    control.settle([index for index, why in control.unknown.items() if why is AT_START])
+    return any(index in control.unknown for index in (X, Y, Z) if index in control.machine)

@@ -1,0 +1,131 @@
+"""G2 and G3: from the words of a block to an arc in commands."""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.control.builder import Arc
+from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Motion
+from ncfix.control.moves import Kind
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.feeds import check_feed
+from ncfix_iso.rs274.targets import destination
+
+LATHE_PLANE = 180
+"""G18, the plane in which lathes cut: Z, then X."""
+
+SPIRAL = "the arc winds further than its end says (L, P, Q, or a centre word across its plane)"
+
+
+def arc(control: Control, block: Block, code: int) -> None:
+    """An arc, helix or full circle."""
+    check_feed(control, block)
+    control.modal.motion = code
+    plane = control.modal.plane
+    check_words(control, block, plane)
+    control.settle(tuple(control.unknown))
+    target, unknown = destination(control, block)
+    step = control.in_frame([b - a for a, b in zip(control.position, target, strict=True)])
+    end = step[plane.first], step[plane.second]
+    doubtful = bool(unknown or control.unknown or block.runtime or control.shaky)
+    clockwise = code == CLOCKWISE
+    try:
+        centre = centre_of(control, block, plane, end, clockwise=clockwise)
+    except Fault as fault:
+        if not doubtful:
+            raise Fault(fault.code, fault.text, supposed(control, block, plane, end) or fault.hint) from None
+        centre = (1.0, 0.0)
+    turns = turns_of(block) if control.rules.strict else 1
+    sweep = control.handedness * sweep_angle(centre, end, turns, clockwise=clockwise)
+    refusal = refusal_of(block, plane) or ("" if control.rules.strict else spiral(block, plane))
+    control.make(
+        Motion(Kind.ARC, block.axes, target, unknown, code, refusal=refusal, arc=circle(control, plane, centre, sweep))
+    )
+
+
+def turns_of(block: Block) -> int:
+    """The P word: in how many turns the arc reaches its end."""
+    turns = whole(block.get("P", 1.0), "P, the number of turns")
+    if turns < 1:
+        raise Fault(ARC_FAULT, f"P, the number of turns, is {turns}, and must be 1 or more")
+    return turns
+
+
+def refusal_of(block: Block, plane: Plane) -> str:
+    """Why an arc is refused: its centre is known only at run time."""
+    centre_words = {CENTRE_LETTERS[index] for index in (plane.first, plane.second)} | {"R"}
+    if block.runtime & centre_words:
+        return "the centre of the arc is known only at run time"
+    return ""
+
+
+def spiral(block: Block, plane: Plane) -> str:
+    """Why an arc of ISO controls is refused: further words make it wind, on a spiral or a cone, or several times."""
+    winds = block.values.keys() & {"L", "Q"} or block.get(CENTRE_LETTERS[plane.across]) or block.get("P", 1.0) != 1.0
+    return SPIRAL if winds and "R" not in block.values else ""
+
+
+def check_words(control: Control, block: Block, plane: Plane) -> None:
+    """Raise `Fault` unless the block has the words that an arc in its plane needs."""
+    if plane.across > 2:
+        raise Fault(ARC_FAULT, "there are no arcs in the planes G17.1, G18.1 and G19.1")
+    centre = [letter for letter in CENTRE_LETTERS if letter in block.values]
+    if "R" in block.values:
+        if centre:
+            raise Fault(ARC_FAULT, f"the arc has both R and {centre[0]}")
+        if not block.axes & (1 << plane.first | 1 << plane.second):
+            raise Fault(ARC_FAULT, "an arc given by R needs an end point in its plane")
+        return
+    if not centre:
+        raise Fault(ARC_FAULT, "the arc has neither R nor a centre (I J K)")
+    across = CENTRE_LETTERS[plane.across]
+    if control.rules.strict and across in block.values:
+        raise Fault(ARC_FAULT, f"{across} belongs to no arc in the plane G{plane.code // 10}")
+    wanted = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    missing = [letter for letter in wanted if letter not in block.values]
+    if control.modal.arc_absolute and missing:
+        raise Fault(ARC_FAULT, f"with absolute centres (G90.1) the arc needs {missing[0]}")
+
+
+def centre_of(control: Control, block: Block, plane: Plane, end: Point, *, clockwise: bool) -> Point:
+    """The centre relative to the start, mm; raises `Fault` if the control refuses the arc."""
+    unit = control.modal.unit
+    if "R" in block.values:
+        return centre_from_radius(end, unit * block.values["R"], clockwise=clockwise)
+    first, second = (unit * block.get(CENTRE_LETTERS[index]) for index in (plane.first, plane.second))
+    if control.modal.arc_absolute:
+        here = control.program_position()
+        first, second = first - here[plane.first], second - here[plane.second]
+    check_closure((first, second), end, control.closure_mm, control.dialect.closure_relative)
+    return first, second
+
+
+def supposed(control: Control, block: Block, plane: Plane, end: Point) -> str:
+    """What may have been meant by an arc that is none: another plane, or X as a diameter, as on lathes."""
+    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    across = CENTRE_LETTERS[plane.across]
+    if "R" not in block.values and across in block.values and not all(letter in block.values for letter in letters):
+        return f"{across} is a centre in another plane, and G{plane.code // 10} is in force (lathes cut in G18)"
+    if control.modal.diameter or plane.code != LATHE_PLANE or control.modal.arc_absolute:
+        return ""
+    try:
+        centre_of(control, block, plane, (end[0], end[1] / 2), clockwise=True)
+    except Fault:
+        return ""
+    return "with X as a diameter the arc would be one: is the program for a lathe? X is read as a radius"
+
+
+def circle(control: Control, plane: Plane, centre: Point, sweep: float) -> Arc:
+    """The circle in commands."""
+    local = [0.0, 0.0, 0.0]
+    local[plane.first], local[plane.second] = centre
+    normal = IDENTITY[plane.across]
+    if control.is_rotated:
+        local = [dot(row, local) for row in control.rotation]
+        normal = tuple(dot(row, normal) for row in control.rotation)  # type: ignore[assignment]
+    x, y, z = (math.nan if i in control.unknown else control.position[i] + local[i] for i in range(3))
+    return Arc((x, y, z), normal, sweep)

@@ -1,0 +1,115 @@
+"""A control of the RS274 family while it follows a program: its rules and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+
+from ncfix.control import control as shared
+from ncfix.control import rollover
+from ncfix.control.coordinates import INCH, LETTERS, zeros
+from ncfix.control.modal import Saved
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+from ncfix_iso.rs274.expressions import Evaluate
+from ncfix_iso.rs274.groups import ISO, LINUXCNC, Rules
+from ncfix_iso.rs274.parameters import Parameters
+
+RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
+
+
+@dataclass(slots=True)
+class Block:
+    """One block while it is executed.
+
+    index    the block in its program
+    values   the values of its words by address, in program units
+    runtime  addresses whose value is known only at run time
+    axes     bit mask of the axis words, by letter
+    turn     of a cycle: the angle by which each hole lies further round the origin of the plane, degrees
+    """
+
+    index: int
+    values: dict[str, float]
+    runtime: frozenset[str]
+    axes: int
+    turn: float | None = None
+
+    def get(self, letter: str, default: float = 0.0) -> float:
+        """The value of a word."""
+        return self.values.get(letter, default)
+
+
+class Control(shared.Control):
+    """Everything that the steps of a block read and change.
+
+    rules      what the dialect makes of codes
+    parameters numbered and named parameters
+    extended   additional work offsets (G54.1) that the program has set, and the name of that in force
+    tip_control  tool-centre-point control (G43.4) is on, whether the plane is tilted or not
+    unnamed    axes of the plane of which a rotation has gone on or off since the program named them
+    left_out   the block just followed has no place in a flat program
+    unwritten  why a flat program cannot say what the program means; empty if it can
+    saved      the modal states that M70 saved, one place for each call level
+    """
+
+    def __init__(self, run: Run, dialect: Dialect, rules: Rules | None = None) -> None:
+        super().__init__(run, dialect)
+        self.rules: Rules = rules or (LINUXCNC if dialect.semantics == "linuxcnc" else ISO)
+        self.needs_feed = self.modal.retract_to_r = self.rules.strict
+        self.parameters = Parameters()
+        self.saved: list[Saved | None] = [None]
+        self.extended: dict[str, Mapping[str, float]] = {}
+        self.extended_name = ""
+        self.tip_control = False
+        self.unnamed: frozenset[int] = frozenset()
+        self.left_out = False
+        self.unwritten = ""
+        if not self.rules.strict:
+            rollover.watch(self)
+        self.refresh()
+
+    @property
+    def closure_mm(self) -> float:
+        """As of every control; with inches in force it is given in these."""
+        return self.dialect.closure_mm * (1.0 if self.modal.unit == 1.0 else INCH / 10)
+
+    @property
+    def takes_zero_across(self) -> bool:
+        """As of every control, but for LinuxCNC's."""
+        return not self.rules.strict
+
+    @property
+    def probes_nominally(self) -> bool:
+        """Whether what is known at run time only is what probing finds, and the setup says where it ends."""
+        return self.setup.probed is not None and not self.parameters.inputs
+
+    def anchors(self) -> list[Hashable]:
+        """As of every control; the parameters of the work offset and of G92 are not the program's numbers."""
+        offsets, tool = self.offsets, zeros() if self.tcp else self.offsets.tool
+        own = [a + b for a, b in zip(offsets.origin, offsets.shift, strict=True)]
+        system = self.modal.system, self.extended_name
+        return [
+            (system, own[i], tool[i], self.spatial_anchor(i) if i < len(self.rotation) else None)
+            for i in range(len(LETTERS))
+        ]
+
+    def value_of(self, function: Evaluate) -> tuple[float, bool]:
+        """The value of an expression, and whether it is known only at run time; raises `Fault`."""
+        self.parameters.touched = False
+        value = function(self)
+        return value, self.parameters.touched
+
+    def deciding(self, function: Evaluate) -> float:
+        """A value that decides where to go on; where it is known only at run time nothing after it is certain."""
+        value, at_runtime = self.value_of(function)
+        if at_runtime:
+            self.refusal = self.refusal or RUNTIME_BRANCH
+        return value
+
+    def coordinate(self, index: int) -> float:
+        """Where an axis stands in program units, X not as a diameter; marked where it is known only at run time."""
+        self.settle((index,))
+        if index in self.unknown or index in self.shaky:
+            self.parameters.touched = True
+        return self.program_position()[index] / self.unit_of(index)

@@ -1,0 +1,171 @@
+"""Canned cycles G73, G74, G81 to G89: one motion per hole, and where the control stands after it.
+
+Source: LinuxCNC documentation, "Canned cycles"; what it leaves open was tried out on `rs274`: in incremental mode R
+counts from where the series of holes began, and a block without R or Z repeats those of the cycle in force.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.control import tcp
+from ncfix.control.coordinates import LETTERS, Plane, Vector, X, Y, dot
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Motion, Unknown
+from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.places import mask_of
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.systems import check_system
+from ncfix_iso.rs274.targets import by_radius_and_angle, unknown_after, unnamed
+
+BAD_CYCLE = "NCF226"
+NEEDED_WORDS = {730: "Q", 830: "Q", 820: "P", 860: "P", 880: "P", 890: "P", 870: "IJK"}
+"""Words without which LinuxCNC refuses to begin a cycle."""
+
+
+def cycle(control: Control, block: Block, code: int) -> None:
+    """Drill the holes of one block."""
+    modal, plane = control.modal, control.modal.plane
+    check_cycle(control, block, code)
+    if not modal.incremental and not control.offset_checked:
+        check_system(control)
+    control.settle(tuple(control.unknown))
+    take_words(control, block, code, plane)
+    program = control.program_position()
+    initial = program[plane.across] if modal.cycle.initial is None else modal.cycle.initial
+    r, depth = levels(control, initial)
+    modal.cycle.initial, modal.cycle.level, modal.motion = initial, r, code
+    clear = r if modal.retract_to_r else max(initial, r)
+    for _ in range(repeats(control, block)):
+        place_hole(control, block, program)
+        drill(control, block, code, program, depth, r, clear)
+
+
+def check_cycle(control: Control, block: Block, code: int) -> None:
+    """Raise `Fault` where LinuxCNC refuses a cycle."""
+    if not control.rules.strict:
+        return
+    modal = control.modal
+    if not modal.feed_given or modal.feed_mode == FeedMode.INVERSE_TIME:
+        raise Fault("NCF225", "a canned cycle needs a feed (F) per minute or revolution")
+    if modal.compensated:
+        raise Fault(BAD_CYCLE, "canned cycles cannot be used with cutter compensation")
+    turned = [letter for letter in "ABC" if letter in block.values]
+    if turned:
+        raise Fault(BAD_CYCLE, f"{turned[0]} cannot move in a canned cycle")
+    missing = [letter for letter in NEEDED_WORDS.get(code, "") if letter not in block.values]
+    if modal.motion != code and missing:
+        raise Fault(BAD_CYCLE, f"{missing[0]} is missing: G{code // 10} cannot begin without it")
+    if "Q" in NEEDED_WORDS.get(code, "") and block.get("Q", 1.0) <= 0.0:
+        raise Fault(BAD_CYCLE, "Q, the depth of one peck, must be positive")
+
+
+def take_words(control: Control, block: Block, code: int, plane: Plane) -> None:
+    """Take R and the depth from the block, or keep those in force."""
+    sticky = control.modal.cycle
+    in_force = control.modal.motion == code or (not control.rules.strict and sticky.initial is not None)
+    depth_letter = LETTERS[plane.across]
+    for letter in ("R", depth_letter):
+        if letter not in block.values and not in_force:
+            raise Fault(BAD_CYCLE, f"{letter} is missing: a canned cycle cannot begin without it")
+    if not in_force:
+        sticky.runtime = False
+    if "R" in block.values:
+        sticky.r = block.values["R"]
+    if depth_letter in block.values:
+        sticky.depth = block.values[depth_letter]
+    sticky.runtime |= bool(block.runtime & {"R", depth_letter})
+
+
+def levels(control: Control, initial: float) -> tuple[float, float]:
+    """R and the depth in the program's frame."""
+    sticky = control.modal.cycle
+    r, depth = control.modal.unit * sticky.r, control.scale[control.modal.plane.across] * sticky.depth
+    if control.modal.incremental:
+        r += initial
+        depth += r
+    if r < depth:
+        raise Fault(BAD_CYCLE, f"R is below the bottom of the hole ({r:g} and {depth:g} mm)")
+    return r, depth
+
+
+def repeats(control: Control, block: Block) -> int:
+    """How many times the block drills: L, or K of most ISO controls."""
+    letter = next((each for each in control.rules.repeats if each in block.values), "L")
+    count = whole(block.get(letter, 1.0), letter)
+    control.budget.spend(max(count, 0))
+    if count < 1 and control.rules.strict:
+        raise Fault(BAD_CYCLE, "L, the number of repeats, must be 1 or more")
+    return count
+
+
+def place_hole(control: Control, block: Block, program: Vector) -> None:
+    """Move `program` over the next hole."""
+    plane, unit = control.modal.plane, control.modal.unit
+    given = {plane.across}
+    if block.values.keys() & {"@", "^"}:
+        place = by_radius_and_angle(control, block, program[X] / unit, program[Y] / unit)
+        program[X], program[Y] = unit * place[0], unit * place[1]
+    if block.turn is not None:
+        turn = math.radians(block.turn)
+        first, second = program[plane.first], program[plane.second]
+        program[plane.first] = first * math.cos(turn) - second * math.sin(turn)
+        program[plane.second] = first * math.sin(turn) + second * math.cos(turn)
+        given |= {plane.first, plane.second}
+    for index, letter in enumerate(LETTERS):
+        if index not in given and letter in block.values:
+            step = program[index] if control.modal.incremental else 0.0
+            program[index] = step + control.scale[index] * block.values[letter]
+
+
+def drill(control: Control, block: Block, code: int, program: Vector, depth: float, r: float, clear: float) -> None:
+    """One hole: a motion by way of R to its bottom, after which the control stands at `clear` above it."""
+    across = control.modal.plane.across
+    unknown = hole_unknown(control, block)
+    refusal = "a word of the cycle is known only at run time" if control.modal.cycle.runtime else ""
+    height = tcp.lost_in_frame(control).get(across)
+    if not control.modal.incremental and not unknown and not control.modal.diameter:
+        program[across] = r
+        control.builder.approach(command(control, block, program))
+    program[across] = depth
+    bottom, adrift = command(control, block, program), control.places.adrift
+    settles = 0 if control.modal.incremental else block.axes | 1 << across
+    if control.rules.strict:
+        control.builder.rests(mask_of(control.turning))
+    control.make(Motion(Kind.CYCLE, block.axes, bottom, unknown, code, refusal=refusal, settles=settles))
+    if not control.modal.retract_to_r:
+        control.places.lose(adrift & 1 << across)
+    program[across] = clear
+    control.position = command(control, block, program)
+    if height is not None and not control.modal.retract_to_r:
+        control.unknown = tcp.lost_of_axes(control, {**unknown, across: height})
+
+
+def hole_unknown(control: Control, block: Block) -> Unknown:
+    """Which axes are not known at the bottom of a hole."""
+    modal = control.modal
+    unknown = dict(unknown_after(control, block, modal.incremental, tcp.lost_in_frame(control)))
+    if not modal.incremental:
+        unknown.pop(modal.plane.across, None)
+        if modal.plane.across in control.shaky:
+            unknown[modal.plane.across] = control.shaky[modal.plane.across]
+    if control.unnamed:
+        unknown |= unnamed(control, block)
+    if control.is_rotated and unknown.keys() & {0, 1, 2}:
+        reason = unknown[min(unknown)]
+        unknown |= {index: reason for index in (0, 1, 2) if index in control.machine}
+    return unknown
+
+
+def command(control: Control, block: Block, program: Vector) -> Vector:
+    """The command of a point in the program's frame; axes that the cycle does not move stay exactly where they are."""
+    plane = control.modal.plane
+    inner = [dot(row, program) for row in control.rotation] + program[3:] if control.is_rotated else program
+    moved = {plane.across, *(index for index in range(len(LETTERS)) if block.axes >> index & 1)}
+    if control.is_rotated:
+        moved |= {0, 1, 2}
+    return [
+        control.offset[index] + inner[index] if index in moved else value
+        for index, value in enumerate(control.position)
+    ]

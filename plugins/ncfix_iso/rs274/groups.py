@@ -1,0 +1,137 @@
+"""Modal groups: which G and M codes exclude one another, and which codes a dialect knows.
+
+Sources: LinuxCNC documentation, "G-code modal groups"; for ISO controls the lists of G codes in the Fanuc 30i, Haas
+and Okuma programming manuals. Codes are in tenths: G38.2 is 382.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ncfix.text.tree import Expression
+from ncfix_iso.rs274.expressions import Evaluate, compiled
+
+NON_MODAL = "non-modal"
+MOTION = "motion"
+PLANE = "plane"
+DISTANCE = "distance mode"
+ARC_DISTANCE = "arc distance mode"
+FEED_MODE = "feed mode"
+UNITS = "units"
+CUTTER = "cutter compensation"
+LENGTH = "tool length offset"
+RETRACT = "retract mode"
+SYSTEM = "coordinate system"
+CONTROL = "path control mode"
+SPINDLE_MODE = "spindle speed mode"
+DIAMETER = "lathe diameter mode"
+ROTATION = "coordinate rotation"
+UNFOLLOWED = "scaling, mirroring, polar coordinates, tilted planes"
+
+STOP = "stop"
+INPUT_OUTPUT = "input and output"
+TOOL = "tool change"
+SPINDLE = "spindle and state"
+COOLANT = "coolant"
+OVERRIDE = "override"
+USER = "user-defined"
+CALL = "subprogram"
+
+CYCLES = (730, 740, 810, 820, 830, 840, 850, 860, 870, 880, 890)
+PROBES = (382, 383, 384, 385)
+SPLINES = (50, 51, 52)
+THREADS = (330, 331, 760)
+TURNING_CYCLES = (700, 710, 711, 712, 720, 721, 722)
+
+
+def grouped(**codes: tuple[int, ...]) -> dict[int, str]:
+    """Code -> group, from keyword arguments that name the constants above."""
+    return {code: globals()[name] for name, members in codes.items() for code in members}
+
+
+LINUXCNC_G = grouped(
+    NON_MODAL=(40, 53, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923),
+    MOTION=(0, 10, 20, 30, *SPLINES, *THREADS, *PROBES, *TURNING_CYCLES, 800, *CYCLES),
+    PLANE=(170, 180, 190, 171, 181, 191),
+    DISTANCE=(900, 910),
+    ARC_DISTANCE=(901, 911),
+    FEED_MODE=(930, 940, 950),
+    UNITS=(200, 210),
+    CUTTER=(400, 410, 411, 420, 421),
+    LENGTH=(430, 431, 432, 490),
+    RETRACT=(980, 990),
+    SYSTEM=(540, 550, 560, 570, 580, 590, 591, 592, 593),
+    CONTROL=(610, 611, 640),
+    SPINDLE_MODE=(960, 970),
+    DIAMETER=(70, 80),
+)
+
+ISO_G = {code: group for code, group in LINUXCNC_G.items() if code not in (70, 80, *SPLINES, 53)} | grouped(
+    NON_MODAL=(220, 310, 600),
+    LENGTH=(434, 435, 440),
+    SYSTEM=(541,),
+    ROTATION=(680, 690),
+    UNFOLLOWED=(121, 131, 1120, 1130, 150, 160, 500, 501, 510, 511, 682, 683, 684),
+)
+
+ISO_HARMLESS_G = frozenset(code * 10 for code in (5, 8, 9, 11, 23, 25, 26, 62, 63, 103, 187, 332)) | {51, 53}
+"""Codes of ISO controls that move nothing and change no coordinates: exact stop, look-ahead, smoothing, limits.
+
+G5.3 P is how smooth Hurco makes a surface, G332 R how fast or true DMG MORI goes.
+"""
+
+LINUXCNC_M = grouped(
+    STOP=(0, 10, 20, 300, 600),
+    INPUT_OUTPUT=(620, 630, 640, 650, 660, 670, 680),
+    TOOL=(60, 610),
+    SPINDLE=(30, 40, 50, 190, 700, 710, 720, 730),
+    COOLANT=(70, 80, 90),
+    OVERRIDE=(480, 490, 500, 510, 520, 530),
+    USER=tuple(range(1000, 2000, 10)),
+    CALL=(980, 990),
+)
+
+TOOL_CHANGE = 60
+"""M6. Of two tools that Mazak names with it, the first is changed, and the second only brought for the next change."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """What a dialect makes of codes.
+
+    strict      whatever LinuxCNC's interpreter refuses is an error: unknown codes, words that no code uses, no feed
+    g_groups    the group of every G code that is followed
+    harmless_g  G codes that are passed over
+    m_groups    the group of every M code that is followed
+    steps       G code -> what is done for it instead of what `order` says
+    cycles      G codes of canned cycles
+    repeats     addresses that say how often a canned cycle drills
+    takes       G codes that take the axis words of their block for themselves, besides those of `plans`
+    adds_rotations  in G91 the angle of G68 is added to that in force
+    scales_named  scaling (G51) acts on the axes only that its block names
+    offset_group  the group of the work offsets' codes: 14 where #4014 tells which is in force
+    system      whether a numbered parameter is one of the control's own, so that setting it does something
+    lasting     whether a numbered parameter keeps its value when the program is over
+    compiled    (expression, the address it stands behind) -> the function that computes it
+    """
+
+    strict: bool
+    g_groups: dict[int, str]
+    harmless_g: frozenset[int]
+    m_groups: Mapping[int, str] = field(default_factory=lambda: LINUXCNC_M)
+    steps: Mapping[int, Callable[[Any, Any, int], None]] = field(default_factory=dict)
+    cycles: frozenset[int] = frozenset(CYCLES)
+    repeats: str = "LK"
+    takes: frozenset[int] = frozenset()
+    adds_rotations: bool = False
+    scales_named: bool = False
+    offset_group: int = 14
+    system: Callable[[int], bool] = lambda number: 5161 <= number <= 5390
+    lasting: Callable[[int], bool] = lambda number: False
+    compiled: Callable[[Expression, str], Evaluate] = lambda expression, address: compiled(expression)
+
+
+LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
+ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))

@@ -1,0 +1,348 @@
+"""The walk through a program: block after block, as flow control leads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ncfix.control.arc_lane import turned
+from ncfix.control.coordinates import LETTERS, N_LETTERS
+from ncfix.control.faults import Fault
+from ncfix.control.lane import run_lane
+from ncfix.control.recurrence import ENDLESS, NEVER_ENDS, WAITS, Recurrence
+from ncfix.diagnostics import Place, SourceError
+from ncfix.text.dialect import Dialect
+from ncfix.text.reader import read
+from ncfix.text.tree import Constant, Program, Span, Word
+from ncfix_iso.rs274 import predefined, systems
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.choice import motion_of
+from ncfix_iso.rs274.control import RUNTIME_BRANCH, Block, Control
+from ncfix_iso.rs274.course import Course
+from ncfix_iso.rs274.flow import FlowControl
+from ncfix_iso.rs274.motion import BAD_MOTION, in_machine_coordinates
+from ncfix_iso.rs274.order import MACHINE, MOTIONS
+from ncfix_iso.rs274.plans import POLAR, Codes, Plan, grouped_codes, has_words
+from ncfix_iso.rs274.settings import unknown_code
+from ncfix_iso.rs274.unit import Unit
+from ncfix_iso.rs274.wordcheck import check_words
+
+if TYPE_CHECKING:
+    from ncfix_iso.rs274.unroll import Recorder
+
+NO_END = "NCF234"
+CALL, RETURN = 980, 990
+PROGRAM_ENDS = (20, 300)
+LAST_PROGRAM = 9999
+"""Greater P words of M98 on ISO controls hold the number of repeats before the four digits of the program."""
+
+POLAR_WORDS = "polar coordinates (@ ^); --flatten writes them in X and Y"
+MACHINE_MOVED = "where the axis {} stands after a command to the control is not known"
+UNREADABLE = "NCF236"
+INCREMENTS = " If U V W are increments of X Y Z, as on lathes: these are not followed"
+
+
+def may_increment(control: Control, letter: str) -> bool:
+    """Whether a letter is an axis to some controls of a family, and an increment of another axis to others."""
+    return not control.rules.strict and letter in "UVW"
+
+
+class Interpreter:
+    """Follows one program."""
+
+    def __init__(
+        self,
+        control: Control,
+        program: Program,
+        resolve: Callable[[str], bytes | None] | None,
+        max_blocks: int,
+    ) -> None:
+        self.control = control
+        self.resolve = resolve
+        control.budget.left = max_blocks
+        self.recurrence = Recurrence()
+        self.files: dict[str, Unit | None] = {}
+        self.axes = sum(1 << index for index in control.machine)
+        self.main = Unit(program, control.rules, self.axes)
+        self.flow: Course = self.prepared()
+        self.span: Span | None = None
+        self.recorder: Recorder | None = None
+        control.locate = self.place
+        systems.load_setup(control)
+
+    def prepared(self) -> Course:
+        """Give the control its own parameters; where execution begins."""
+        control = self.control
+        flow = FlowControl(control, self.main, self.find)
+        control.parameters.persistent = lambda number: systems.before_persistent(control, number)
+        predefined.install(control, flow)
+        return flow
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        unit, block = self.flow.unit, self.flow.block - 1
+        return unit.program.place(block, self.span) if 0 <= block < len(unit) else Place(unit.program.path)
+
+    def find(self, name: str) -> Unit | None:
+        """The file of a subprogram."""
+        if name not in self.files:
+            names = (name, f"O{name:0>4}", f"O{name}") if name.isdigit() else (name,)
+            found = ((each, self.resolve(each)) for each in names if self.resolve)
+            dialect: Dialect = self.main.program.dialect
+            units = (self.unit_of(read(source, each, dialect), each) for each, source in found if source)
+            self.files[name] = next(units, None)
+        return self.files[name]
+
+    def unit_of(self, program: Program, name: str) -> Unit:
+        """The unit of a subprogram file."""
+        return Unit(program, self.control.rules, self.axes, name)
+
+    def run(self) -> None:
+        """Follow the program to its end; raises SourceError where the control would stop."""
+        try:
+            self.walk()
+        except Fault as fault:
+            self.span = fault.span or self.span
+            raise SourceError.of(fault.code, fault.text, self.place(), fault.hint) from None
+
+    def walk(self) -> None:
+        """Block after block."""
+        flow = self.flow
+        while True:
+            if flow.skipping is not None and not flow.next_flow():
+                self.at_skipped_end()
+            if flow.block >= len(flow.unit):
+                self.at_end_of_text()
+                return
+            plan = flow.unit.plan(flow.block)
+            self.control.external = "" if flow.unit is self.main else flow.unit.name
+            if plan.lane is not None and self.takes_stretches() and self.take_stretch():
+                continue
+            unit, block = flow.unit, flow.block
+            flow.block += 1
+            self.span = None
+            self.control.budget.spend(1)
+            if self.execute(plan):
+                return
+            if flow.unit is unit and flow.block <= block:
+                self.look_round(block)
+
+    def take_stretch(self) -> bool:
+        """Follow the plain motions that begin here many at once; whether there are any."""
+        flow = self.flow
+        circles = partial(turned, self.control, flow.unit)
+        done = run_lane(self.control, flow.unit, flow.block, flow.unit is self.main, circles)
+        if done and self.recorder:
+            self.recorder.stretch(flow.unit, flow.block, done)
+        flow.block += done
+        self.control.budget.spend(done)
+        return done > 0
+
+    def look_round(self, block: int) -> None:
+        """A block has led back: raises `Fault` if the program goes round for ever."""
+        flow = self.flow
+        jump = id(flow.unit), block, flow.block, flow.under_way()
+        if self.recurrence.seen(jump, self.control.parameters.changes):
+            flow.block = block + 1
+            raise Fault(ENDLESS, WAITS if self.control.refusal == RUNTIME_BRANCH else NEVER_ENDS)
+
+    def takes_stretches(self) -> bool:
+        """Whether plain motions may be taken many at once: nothing is done between them."""
+        return not self.control.unnamed
+
+    def at_end_of_text(self) -> None:
+        """The text is over without M2, M30 or `%`."""
+        fault = self.flow.unfinished()
+        if fault is not None:
+            raise fault
+        self.control.warn(NO_END, "the program does not end with M2 or M30", "some controls refuse it")
+
+    def at_skipped_end(self) -> None:
+        """The text is over while something is looked for."""
+        fault = self.flow.missing_end()
+        unit, block = self.flow.skipping_from
+        self.flow.unit, self.flow.block = unit, block + 1
+        raise fault
+
+    # -- one block ----------------------------------------------------------------------------------------------------
+
+    def execute(self, plan: Plan) -> bool:
+        """Execute the block before `flow.block`; True if the program ends there."""
+        control, unit, index = self.control, self.flow.unit, self.flow.block - 1
+        control.numbers, control.first = unit.numbers, unit.first[index]
+        if unit is self.main:
+            control.row_block = index
+        if plan.skip is not None and control.is_deleted(plan.skip):
+            return False
+        if plan.tape:
+            if self.recorder:
+                self.recorder.whole(unit, index)
+            return self.at_tape(index)
+        if plan.flow is not None:
+            self.span = plan.flow.span
+            if self.recorder and not self.flow.calls:
+                self.recorder.head(unit, index, plan.flow.keyword)
+            self.flow.follow(plan.flow)
+            if self.flow.unit is not self.main and unit is self.main:
+                control.row_block = index
+            return self.beside_number(plan, index)
+        return self.execute_words(plan, index)
+
+    def beside_number(self, plan: Plan, index: int) -> bool:
+        """Execute the words that stand beside the number of a program, if it begins there (not in LinuxCNC)."""
+        flow, line = self.flow, plan.flow
+        begins = flow.skipping is None and flow.block == index + 1 and line is not None and line.keyword == "program"
+        if self.control.rules.strict or not begins or not has_words(plan):
+            return False
+        written, self.recorder = self.recorder, None  # the line has been written as it stands
+        ended = self.execute_words(plan, index)
+        self.recorder = written
+        return ended
+
+    def at_tape(self, index: int) -> bool:
+        """`%`: the first line of a tape, or its end."""
+        first = next(b for b in range(len(self.flow.unit)) if self.flow.unit.plan(b).tape)
+        if index == first and self.flow.unit.begins_with_tape():
+            return False
+        fault = self.flow.unfinished()
+        if fault is not None:
+            raise fault
+        return True
+
+    def execute_words(self, plan: Plan, index: int) -> bool:
+        """Execute a block of words and assignments."""
+        control = self.control
+        if plan.unread:
+            raise Fault(UNREADABLE, "this line cannot be read, and the control gets to it")
+        if plan.fault is not None:
+            raise plan.fault
+        block = self.evaluate(plan, index)
+        codes = plan.codes or self.computed_codes(plan)
+        if codes.unknown:
+            self.unknown_codes(plan, codes)
+        motion = self.motion_of(plan, codes)
+        check_words(control, plan, codes, motion)
+        if plan.command is not None:
+            self.command(plan.command)
+        self.note_foreign(plan)
+        self.settings(codes, block)
+        if motion is not None:
+            self.move(block, codes, motion)
+        if self.recorder:
+            self.recorder.words(self.flow.unit, index, plan, codes, block)
+        return self.after(codes, block)
+
+    def motion_of(self, plan: Plan, codes: Codes) -> int | None:
+        """The motion code that a block executes."""
+        return motion_of(self.control, plan, codes)
+
+    def settings(self, codes: Codes, block: Block) -> None:
+        """What a block sets before its motion."""
+        for step, code in codes.steps:
+            step(self.control, block, code)
+
+    def evaluate(self, plan: Plan, index: int) -> Block:
+        """The values of a block; its assignments take effect when all have been read."""
+        control = self.control
+        numbers, first = control.numbers, control.first
+        values = {letter: numbers[first + slot] for letter, slot in plan.literals}
+        runtime = []
+        for letter, function, span in plan.computed:
+            self.span = span
+            values[letter], at_runtime = control.value_of(function)
+            if at_runtime:
+                runtime.append(letter)
+        if plan.assignments:
+            self.assign(plan)
+        self.span = None
+        return Block(index, values, frozenset(runtime), plan.axes)
+
+    def assign(self, plan: Plan) -> None:
+        """Set the parameters that a block sets, all at once."""
+        parameters = self.control.parameters
+        pending = []
+        for target, function, span in plan.assignments:
+            self.span = span
+            parameters.touched = False
+            key = whole(target(self.control), "the number of a parameter") if callable(target) else target
+            parameters.check_writable(key)
+            pending.append((key, function(self.control), parameters.touched))
+        for key, value, runtime in pending:
+            parameters.assign(key, value, runtime)
+
+    def computed_codes(self, plan: Plan) -> Codes:
+        """The codes of a block in which some are computed."""
+        parameters = self.control.parameters
+        parameters.touched = False
+        pairs: list[tuple[Word, int]] = []
+        for word, function in plan.code_words:
+            tenths = 10 * function(self.control)
+            if abs(tenths - round(tenths)) > 0.001:
+                raise Fault(BAD_MOTION, f"{word.address}{tenths / 10:g} is not a code", span=word.span)
+            pairs.append((word, round(tenths)))
+        if parameters.touched:
+            self.control.refusal = self.control.refusal or "a G or M code is known only at run time"
+        return grouped_codes(pairs, plan.letters, self.control.rules)
+
+    def unknown_codes(self, plan: Plan, codes: Codes) -> None:
+        """G codes that are not known."""
+        spans = {
+            w.value.value: w.span for w in plan.template.words if w.address == "G" and isinstance(w.value, Constant)
+        }
+        for code in codes.unknown:
+            self.span = spans.get(code / 10)
+            unknown_code(self.control, code, moving=bool(plan.axes) or "H" in plan.letters)
+        self.span = None
+
+    def note_foreign(self, plan: Plan) -> None:
+        """Note axes that the program moves and the machine lacks."""
+        control = self.control
+        for index in range(N_LETTERS):
+            if plan.axes >> index & 1 and index not in control.machine and LETTERS[index] not in control.foreign:
+                self.span = next(word.span for word in plan.template.words if word.address == LETTERS[index])
+                control.note_foreign(LETTERS[index], INCREMENTS if may_increment(control, LETTERS[index]) else "")
+        self.span = None
+
+    def command(self, span: Span) -> None:
+        """A command to the control itself: homing and jogging move the machine."""
+        text = self.flow.unit.program.slice(self.flow.block - 1, span).upper().replace(" ", "")
+        if text.startswith(("$H", "$J")):
+            self.control.lose(self.control.machine, MACHINE_MOVED)
+
+    @contextmanager
+    def polar_words(self, block: Block) -> Iterator[None]:
+        """Motions with @ or ^ are followed; written they can be in X and Y only."""
+        polar = bool(block.values.keys() & POLAR)
+        if polar:
+            self.control.suspended[POLAR_WORDS] = POLAR_WORDS
+        yield
+        if polar:
+            self.control.suspended.pop(POLAR_WORDS)
+
+    def move(self, block: Block, codes: Codes, motion: int) -> None:
+        """The motion of a block."""
+        if MACHINE in codes.g.values():
+            in_machine_coordinates(self.control, block, motion)
+        else:
+            step = self.control.rules.steps.get(motion) or MOTIONS[motion]
+            with self.polar_words(block):
+                step(self.control, block, motion)
+        if motion not in self.control.rules.cycles:
+            self.control.modal.cycle.initial = None
+
+    def after(self, codes: Codes, block: Block) -> bool:
+        """What a block does last: M2, M30, M98, M99. True if the program ends."""
+        if codes.stop in PROGRAM_ENDS:
+            return True
+        if codes.call == CALL:
+            number, times = whole(block.get("P"), "P of M98"), whole(block.get("L", 1.0), "L of M98")
+            if not self.control.rules.strict and "L" not in block.values and number > LAST_PROGRAM:
+                times, number = divmod(number, LAST_PROGRAM + 1)
+            self.flow.call_by_code(str(number), times)
+        if codes.call == RETURN:
+            if not self.flow.calls:
+                return True
+            self.flow.finish()
+        return False

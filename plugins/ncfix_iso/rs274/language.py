@@ -1,0 +1,85 @@
+"""The RS274 family as a `Language`: LinuxCNC, plain ISO code and their like."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ncfix.control.finish import finished
+from ncfix.control.moves import Trace
+from ncfix.text.language import BulkLayout, Language, Run
+from ncfix.text.layout import AXIS_LETTERS, Layout, arc_layout, bulk_layout, has_free_text, layout_of
+from ncfix.text.reach import tape_end
+from ncfix.text.shapes import scan, split_blocks
+from ncfix.text.tree import Program, Word
+from ncfix.writer.render import BlockRenderer
+from ncfix.writer.target import Rendered, Target
+from ncfix_iso.rs274.blocks import parse_block
+from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.following import RS274Follower
+from ncfix_iso.rs274.interpreter import Interpreter
+
+if TYPE_CHECKING:
+    from ncfix.control.flatten import FlatLine
+
+
+def following(program: Program, run: Run) -> Interpreter:
+    """The control's walk through a program, before its first step."""
+    control = Control(run, program.dialect)
+    return Interpreter(control, program, run.resolve, run.budget(program))
+
+
+def follow(program: Program, run: Run) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    walk = following(program, run)
+    walk.run()
+    return finished(walk.control, program, walk.control.moves())
+
+
+def writable(program: Program, block: int) -> Layout | None:
+    """The layout of a block of words, None for flow control and text that is passed over."""
+    return None if has_free_text(program, block) else layout_of(program, block)
+
+
+def render(program: Program, block: int, layout: Layout, target: Target) -> Rendered:
+    """The text of a corrected motion."""
+    return BlockRenderer(program, block, layout, target).render()
+
+
+def words_of(program: Program, block: int) -> tuple[Word, ...]:
+    """The words of a block."""
+    return program.templates[int(program.template[block])].words
+
+
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    layout = writable(program, block) if any(w.address in AXIS_LETTERS for w in words_of(program, block)) else None
+    found = None if layout is None else bulk_layout(program, block, layout)
+    if layout is None or found is None:
+        return None
+    return replace(found, further=not (layout.after or layout.prefix), arc=arc_layout(program, block, layout))
+
+
+def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
+    """The blocks of a program of this family as they are executed."""
+    from ncfix_iso.rs274.unroll import unrolled
+
+    return unrolled(following(program, run), steps, limit)
+
+
+RS274 = Language(
+    split=split_blocks,
+    end=tape_end,
+    scan=scan,
+    parse=parse_block,
+    follow=follow,
+    layout=writable,
+    alike=True,
+    render=render,
+    lenient=True,
+    unroll=unroll,
+    arc_pieces=True,
+    bulk=in_bulk,
+    follower=RS274Follower,
+)

@@ -1,0 +1,259 @@
+"""Straight motions, reference points, probing, and motions that are followed only as far as their end."""
+
+from __future__ import annotations
+
+from ncfix.control import tcp
+from ncfix.control.coordinates import INDEX, N_LETTERS, Vector, rotated
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Motion, Unknown
+from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix.control.places import mask_of
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.feeds import check_feed
+from ncfix_iso.rs274.systems import REFERENCES, is_given, store, stored
+from ncfix_iso.rs274.targets import destination, machine_destination
+
+BAD_MOTION = "NCF221"
+MACHINE_COORDINATES = Passing(Pass.MACHINE_COORDINATES, "machine coordinates (G53)")
+REFERENCE_POINT = "reference point ({})"
+PROBING = Passing(Pass.PROBING, "probing")
+DWELL = Passing(Pass.DWELL, "dwell")
+AFTER_G53 = "where the axis {} stands after G53 in incremental coordinates (G91) differs from control to control"
+AFTER_PROBING = "where the axis {} stands after probing is known only at run time"
+AFTER_REFERENCE = "where the axis {} stands after the reference point is approached is not given"
+AFTER_CYCLE = "where the axis {} stands after a turning cycle is not followed"
+NO_CODE = -2
+"""Stands for the motion code of blocks with axis words before any is in force."""
+
+ONE_SHOT_PROBE = 310
+"""G31 holds for its block only; the motion code before it stays in force."""
+
+REFUSALS = {
+    50: "spline (G5)",
+    51: "spline (G5.1)",
+    52: "spline (G5.2)",
+    330: "threading (G33)",
+    331: "rigid tapping (G33.1)",
+    760: "threading cycle (G76)",
+}
+
+
+def straight(control: Control, block: Block, code: int) -> None:
+    """G0 and G1; with G53 in machine coordinates."""
+    if code:
+        check_feed(control, block)
+    control.modal.motion = control.modal.straight = code
+    if not block.axes:
+        return
+    kind = Kind.FEED if code else Kind.RAPID
+    computed = block.runtime & INDEX.keys()
+    if computed and control.probes_nominally:
+        measured(control, block, computed, kind, code)
+        return
+    target, unknown = destination(control, block)
+    control.make(Motion(kind, block.axes, target, unknown, code))
+
+
+def measured(control: Control, block: Block, computed: frozenset[str], kind: Kind, code: int) -> None:
+    """A straight motion to a place of which some words are computed from what nominal probing has found.
+
+    The control goes on computing them. A block put in would have to do so too, and so would a word for such an axis in
+    a later block: neither is written.
+    """
+    axes = mask_of(INDEX[letter] for letter in computed)
+    target, unknown = destination(control, Block(block.index, block.values, block.runtime - computed, block.axes))
+    whole, control.whole = control.whole, True
+    control.builder.measures(axes)
+    control.make(Motion(kind, block.axes, target, unknown, code))
+    control.whole = whole
+    control.places.lose(axes)
+
+
+def in_machine_coordinates(control: Control, block: Block, code: int) -> None:
+    """G53 with G0 or G1; where neither is in force, ISO controls go there in rapid."""
+    if code not in (0, 10):
+        if control.rules.strict:
+            raise Fault(BAD_MOTION, "G53 needs G0 or G1 in force")
+        code, modal = 0, code
+    else:
+        modal = code
+    if control.modal.incremental and control.rules.strict:
+        raise Fault(BAD_MOTION, "G53 cannot be used with incremental coordinates (G91)")
+    if code:
+        check_feed(control, block)
+    control.modal.motion = modal
+    if block.axes:
+        target, unknown = machine_destination(control, block)
+        kind = Kind.FEED if code else Kind.RAPID
+        control.make(Motion(kind, block.axes, target, unknown, code, passing=MACHINE_COORDINATES))
+        if control.modal.incremental:
+            control.lose([index for index in range(N_LETTERS) if block.axes >> index & 1], AFTER_G53)
+
+
+def one_way(control: Control, block: Block, code: int) -> None:
+    """G60: a rapid to the words from one side (ISO controls)."""
+    target, unknown = destination(control, block)
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+
+
+# -- reference points -------------------------------------------------------------------------------------------------
+
+
+def go_to_reference(control: Control, block: Block, code: int) -> None:
+    """G28 and G30: by way of the words to the reference point, along the axes named, or along all."""
+    name = f"G{code // 10}"
+    passing = Passing(Pass.REFERENCE_POINT, REFERENCE_POINT.format(name))
+    modal = control.modal.motion
+    checked, control.offset_checked = control.offset_checked, True
+    way, unknown = destination(control, block)
+    control.offset_checked = checked
+    if way != control.position or (block.axes and not control.modal.incremental):
+        control.make(Motion(Kind.RAPID, block.axes, way, unknown, modal, passing=passing))
+    axes = block.axes or sum(1 << index for index in control.machine)
+    target, unknown = reference_target(control, name, axes)
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, modal, passing=passing))
+
+
+def reference_target(control: Control, name: str, axes: int) -> tuple[Vector, Unknown]:
+    """Where the reference point is, along the axes of the bit mask; elsewhere the position."""
+    first = REFERENCES[name]
+    runtime = control.parameters.numbers.runtime
+    target, unknown = along(control, stored(control, first), axes), dict(control.unknown)
+    for index in control.machine:
+        if axes >> index & 1:
+            unknown.pop(index, None)
+            given = is_given(control, first, index) and first + index not in runtime
+            if not given and not assumed(control, name):
+                unknown[index] = AFTER_REFERENCE
+    if control.tcp:
+        tcp.from_machine(control, target, unknown)
+    return target, unknown
+
+
+def along(control: Control, point: Vector, axes: int) -> Vector:
+    """The position moved to a point along some letters of the program's frame, turned as that is (LinuxCNC)."""
+    if not control.is_rotated or axes & 3 in (0, 3):
+        return [point[i] if axes >> i & 1 else value for i, value in enumerate(control.position)]
+    here = control.program_position()
+    there = rotated(control.inverse, [p - o for p, o in zip(point, control.offset, strict=True)])
+    mixed = [there[i] if axes >> i & 1 else value for i, value in enumerate(here)]
+    return [a + b for a, b in zip(rotated(control.rotation, mixed), control.offset, strict=True)]
+
+
+def assumed(control: Control, name: str) -> bool:
+    """Whether a reference point that is not given counts as zero."""
+    if control.setup.assume_zero:
+        control.knowledge.reference_point(name)
+    return control.setup.assume_zero
+
+
+def save_reference(control: Control, block: Block, code: int) -> None:
+    """G28.1 and G30.1: the position becomes the reference point."""
+    control.settle(tuple(control.unknown))
+    first = REFERENCES[f"G{code // 10}"]
+    for index, value in enumerate(control.position):
+        store(control, first, index, value, index in control.unknown)
+
+
+# -- probing ----------------------------------------------------------------------------------------------------------
+
+
+def probe(control: Control, block: Block, code: int) -> None:
+    """G38.2 to G38.5, and G31 of ISO controls: towards the words until the probe switches."""
+    if control.rules.strict:
+        if not control.modal.feed_given:
+            raise Fault("NCF225", "probing, and no feed (F) is set")
+        if control.modal.feed_mode == FeedMode.PER_REVOLUTION:
+            raise Fault(BAD_MOTION, "probing needs a feed per minute (G94)")
+    if code != ONE_SHOT_PROBE:
+        control.modal.motion = code
+    target, unknown = destination(control, block)
+    if control.probes_nominally:
+        probe_nominally(control, block, target, unknown, code)
+        return
+    moved = [index for index in range(N_LETTERS) if target[index] != control.position[index] or index in unknown]
+    if control.rules.strict and code % 2 == 0 and not moved:
+        raise Fault(BAD_MOTION, "the probe starts at the end of its motion")
+    led = 7 if control.is_rotated and block.axes & 7 else 0
+    named = [index for index in moved if (block.axes | led) >> index & 1]
+    ends = unknown | {index: AFTER_PROBING for index in named if index in control.machine}
+    control.make(Motion(Kind.FEED, block.axes, target, ends, code, passing=PROBING))
+    program = control.program_position()
+    for index in range(N_LETTERS):
+        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
+    control.parameters.assign(5070, 1.0, runtime=True)
+
+
+def probe_nominally(control: Control, block: Block, target: Vector, unknown: Unknown, code: int) -> None:
+    """Probing that ends where the setup says; what is computed from it is computed anew at run time."""
+    control.knowledge.probing()
+    touched = {letter: value for letter, value in (control.setup.probed or {}).items() if letter in block.values}
+    if touched:
+        values = {letter: value / control.unit_of(INDEX[letter]) for letter, value in touched.items()}
+        incremental, control.modal.incremental = control.modal.incremental, False
+        target, unknown = destination(control, Block(block.index, values, frozenset(), block.axes))
+        control.modal.incremental = incremental
+    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, passing=PROBING))
+    program = control.program_position()
+    for index in range(N_LETTERS):
+        control.parameters.assign(5061 + index, program[index] / control.unit_of(index), runtime=True)
+    control.parameters.assign(5070, 1.0, runtime=False)
+
+
+# -- followed only as far as their end --------------------------------------------------------------------------------
+
+
+def refused(control: Control, block: Block, code: int) -> None:
+    """Splines and threads: the end is followed, the path is not."""
+    if code in (330, 331, 760):
+        control.modal.motion = code
+        if control.rules.strict and control.modal.spindle == 5:
+            raise Fault(BAD_MOTION, f"the spindle does not turn in {REFUSALS[code]}")
+    elif code in (50, 51):
+        check_feed(control, block)
+    else:
+        control.modal.motion = code
+    target, unknown = destination(control, block)
+    before, known = control.position, control.unknown
+    control.make(Motion(Kind.FEED, block.axes, target, unknown, code, refusal=REFUSALS[code]))
+    if code == 331:
+        control.position, control.unknown, control.said = before, known, None
+
+
+def end_spline(control: Control, block: Block, code: int) -> None:
+    """G5.3: the spline that the G5.2 blocks described is done."""
+    if control.modal.motion != 52:
+        raise Fault(BAD_MOTION, "G5.3 ends a spline, and none was begun with G5.2")
+    control.modal.motion = -1
+
+
+def turning_cycle(control: Control, block: Block, code: int) -> None:
+    """G70 to G72 of turning: where it goes is written elsewhere in the program."""
+    unknown = dict(control.unknown)
+    for letter in "XZ":
+        if INDEX[letter] in control.machine:
+            unknown[INDEX[letter]] = AFTER_CYCLE
+    refusal = f"turning cycle (G{code / 10:g})"
+    control.make(Motion(Kind.FEED, block.axes, control.position[:], unknown, code, refusal=refusal))
+
+
+def at_power_on(control: Control, block: Block, code: int) -> None:
+    """Axis words before the first motion code: a setting of ISO controls says whether G0 or G1 is in force then
+    (Fanuc: parameter 3402). Both end at the same place; a block put in would have to name one, so none may be."""
+    target, unknown = destination(control, block)
+    whole, control.whole = control.whole, True
+    control.make(Motion(Kind.RAPID, block.axes, target, unknown, 0))
+    control.whole = whole
+
+
+def dwell(control: Control, block: Block, code: int) -> None:
+    """G4."""
+    if control.rules.strict and block.get("P", -1.0) == -1.0:
+        raise Fault(BAD_MOTION, "G4 needs P, the time in seconds")
+    control.make(Motion(Kind.DWELL, 0, control.position, control.unknown, control.modal.motion, passing=DWELL))
+
+
+def cancel(control: Control, block: Block, code: int) -> None:
+    """G80: no motion code is in force; on ISO controls the one before the cycle is again."""
+    control.modal.motion = code if control.rules.strict else control.modal.straight

@@ -1,0 +1,137 @@
+"""The order in which a control does what a block says: fixed, not as written.
+
+Source: LinuxCNC documentation, "G-code overview", "Order of execution".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ncfix_iso.rs274 import groups
+from ncfix_iso.rs274.arc_motion import arc
+from ncfix_iso.rs274.control import Block, Control
+from ncfix_iso.rs274.cycles import cycle
+from ncfix_iso.rs274.feeds import feed, feed_mode, speed
+from ncfix_iso.rs274.lengths import change_tool, select_tool, set_data, tool_offset
+from ncfix_iso.rs274.motion import (
+    NO_CODE,
+    at_power_on,
+    cancel,
+    dwell,
+    end_spline,
+    go_to_reference,
+    one_way,
+    probe,
+    refused,
+    save_reference,
+    straight,
+    turning_cycle,
+)
+from ncfix_iso.rs274.settings import (
+    arc_distance,
+    compensation,
+    diameter,
+    distance,
+    plane,
+    retract,
+    select_radius,
+    spindle_or_state,
+    unfollowed,
+    units,
+)
+from ncfix_iso.rs274.shifts import rotate_system, shift_system
+from ncfix_iso.rs274.systems import select_system
+
+Step = Callable[[Control, Block, int], None]
+
+FIRST: tuple[tuple[str, Step], ...] = ((groups.FEED_MODE, feed_mode),)
+"""What comes before the words F, S and T, by G group."""
+
+WORDS: tuple[tuple[str, Step], ...] = (("F", feed), ("S", speed), ("T", select_tool), ("D", select_radius))
+"""F, S, T and D."""
+
+INPUTS = 5399
+"""The parameter in which M66 leaves what it read."""
+
+
+def read_input(control: Control, block: Block, code: int) -> None:
+    """M66 reads an input: the value is known only at run time."""
+    if code == 660:
+        control.parameters.assign(INPUTS, 0.0, runtime=True)
+        control.parameters.inputs = True
+
+
+M_STEPS: tuple[tuple[str, Step], ...] = (
+    (groups.INPUT_OUTPUT, read_input),
+    (groups.TOOL, change_tool),
+    (groups.SPINDLE, spindle_or_state),
+)
+"""M codes, by group; those of other groups change nothing here."""
+
+G_STEPS: tuple[tuple[str, Step], ...] = (
+    (groups.PLANE, plane),
+    (groups.UNITS, units),
+    (groups.DIAMETER, diameter),
+    (groups.CUTTER, compensation),
+    (groups.LENGTH, tool_offset),
+    (groups.SYSTEM, select_system),
+    (groups.DISTANCE, distance),
+    (groups.ARC_DISTANCE, arc_distance),
+    (groups.RETRACT, retract),
+    (groups.UNFOLLOWED, unfollowed),
+    (groups.ROTATION, rotate_system),
+)
+"""G codes other than motions, by group."""
+
+NON_MODAL: Mapping[int, Step] = {
+    53: end_spline,
+    100: set_data,
+    280: go_to_reference,
+    300: go_to_reference,
+    310: probe,
+    281: save_reference,
+    301: save_reference,
+    520: shift_system,
+    600: one_way,
+    **dict.fromkeys((920, 921, 922, 923), shift_system),
+}
+"""Codes of the non-modal group that act after all settings; G4 acts before them, G53 with the motion."""
+
+DWELL = 40
+MACHINE = 530
+
+MOTIONS: Mapping[int, Step] = {
+    0: straight,
+    10: straight,
+    20: arc,
+    30: arc,
+    800: cancel,
+    NO_CODE: at_power_on,
+    **dict.fromkeys(groups.PROBES, probe),
+    **dict.fromkeys((*groups.SPLINES, *groups.THREADS), refused),
+    **dict.fromkeys(groups.TURNING_CYCLES, turning_cycle),
+    **dict.fromkeys(groups.CYCLES, cycle),
+}
+"""Motion codes."""
+
+
+Steps = tuple[tuple[Step, int], ...]
+
+
+def steps_of(
+    g_codes: Mapping[str, int], m_codes: Mapping[str, int], letters: frozenset[str], own: Mapping[int, Step]
+) -> Steps:
+    """What a block does before its motion, in order: steps with their codes.
+
+    `g_codes` and `m_codes` by group; `letters` the addresses of the block's words; `own` the dialect's own steps.
+    """
+    steps = [(step, g_codes[group]) for group, step in FIRST if group in g_codes]
+    steps += [(step, 0) for letter, step in WORDS if letter in letters]
+    steps += [(step, m_codes[group]) for group, step in M_STEPS if group in m_codes]
+    single = g_codes.get(groups.NON_MODAL, -1)
+    if single == DWELL:
+        steps.append((dwell, single))
+    steps += [(own.get(g_codes[group], step), g_codes[group]) for group, step in G_STEPS if group in g_codes]
+    if single in NON_MODAL or (single in own and single != DWELL):
+        steps.append((own.get(single) or NON_MODAL[single], single))
+    return tuple(steps)

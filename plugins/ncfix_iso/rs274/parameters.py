@@ -1,0 +1,146 @@
+"""The parameters of a program: numbered, named in their scopes, and those the control itself keeps up to date.
+
+A value that exists only at run time (a probed position, an input) has a nominal value here, what a dry run would give,
+and is marked: whatever is computed from it is marked too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from ncfix.control.faults import Fault
+
+N_PARAMETERS = 5603
+"""Numbered parameters are 1 up to here."""
+
+LOCAL = range(1, 31)
+"""The numbered parameters that each subprogram has of its own."""
+
+READ_ONLY = frozenset((*range(5400, 5414), *range(5420, 5429), 5601, 5602))
+UNDEFINED = "NCF211"
+READ_ONLY_FAULT = "NCF212"
+OUT_OF_RANGE = "NCF213"
+
+
+Key = int | str
+"""What names a parameter: its number or its name."""
+
+OF_THE_MACHINE = ("_hal[", "_ini[")
+"""How the names of the machine's pins begin, and of the entries of its configuration: known at run time only."""
+
+
+@dataclass(slots=True)
+class Store:
+    """The parameters of one scope that have been set, and which of them are known only at run time."""
+
+    values: dict[Key, float] = field(default_factory=dict)
+    runtime: set[Key] = field(default_factory=set)
+
+    def copy(self) -> Store:
+        """The same parameters in a store of its own."""
+        return Store(dict(self.values), set(self.runtime))
+
+    def assign(self, key: Key, value: float, runtime: bool) -> None:
+        """Set a parameter."""
+        self.values[key] = value
+        if runtime:
+            self.runtime.add(key)
+        else:
+            self.runtime.discard(key)
+
+
+@dataclass(slots=True)
+class Parameters:
+    """All parameters.
+
+    numbers     numbered parameters that have been set; others are 0
+    scopes      named parameters: the program's own and global ones first, then those of each call
+    live        numbered parameters that the control computes when they are read
+    predefined  named parameters of that kind
+    persistent  called with the number before a parameter between 5161 and 5390 is read: it may be lacking
+    returned    value of the last `return`, and whether it gave one
+    touched     a value known only at run time has been read since this was last cleared
+    inputs      a pin of the machine or an input (M66) has been read: what is computed may depend on it
+    changes     how often a parameter has got another value, or one has been read that the control computes
+    """
+
+    numbers: Store = field(default_factory=Store)
+    scopes: list[Store] = field(default_factory=lambda: [Store()])
+    live: Mapping[int, Callable[[], float]] = field(default_factory=dict)
+    predefined: Mapping[str, Callable[[], float]] = field(default_factory=dict)
+    persistent: Callable[[int], None] = lambda index: None
+    returned: tuple[float, bool] = (0.0, False)
+    touched: bool = False
+    inputs: bool = False
+    changes: int = 0
+
+    # -- reading ------------------------------------------------------------------------------------------------------
+
+    def numbered(self, index: int) -> float:
+        """The value of `#index`; raises `Fault`."""
+        if not 1 <= index < N_PARAMETERS:
+            raise Fault(OUT_OF_RANGE, f"there is no parameter #{index}", f"they are #1 to #{N_PARAMETERS - 1}")
+        if index in self.live:
+            self.changes += 1
+            return self.live[index]()
+        if 5161 <= index <= 5390:
+            self.changes += 1
+            self.persistent(index)
+        if index in self.numbers.runtime:
+            self.touched = True
+        return self.numbers.values.get(index, 0.0)
+
+    def named(self, name: str) -> float:
+        """The value of `#<name>`; raises `Fault`."""
+        if name in self.predefined:
+            self.changes += 1
+            return self.predefined[name]()
+        scope = self.scope_of(name)
+        if name not in scope.values and name.startswith(OF_THE_MACHINE):
+            self.touched = self.inputs = True
+            return 0.0
+        if name not in scope.values:
+            hint = f'if the control has it: variables."#<{name}>" in the setup file'
+            raise Fault(UNDEFINED, f"parameter #<{name}> is used and not defined", hint)
+        if name in scope.runtime:
+            self.touched = True
+        return scope.values[name]
+
+    def exists(self, key: Key) -> bool:
+        """Whether the parameter has been defined."""
+        if isinstance(key, int):
+            return 1 <= key < N_PARAMETERS
+        return key in self.predefined or key in self.scope_of(key).values
+
+    def scope_of(self, name: str) -> Store:
+        """Names that begin with `_` are global, others belong to the subprogram."""
+        return self.scopes[0 if name.startswith("_") else -1]
+
+    # -- writing ------------------------------------------------------------------------------------------------------
+
+    def check_writable(self, key: Key) -> None:
+        """Raise `Fault` if the program may not assign to the parameter."""
+        if isinstance(key, int) and not 1 <= key < N_PARAMETERS:
+            raise Fault(OUT_OF_RANGE, f"there is no parameter #{key}", f"they are #1 to #{N_PARAMETERS - 1}")
+        if key in READ_ONLY or key in self.predefined:
+            name = f"#{key}" if isinstance(key, int) else f"#<{key}>"
+            raise Fault(READ_ONLY_FAULT, f"{name} cannot be assigned to: the control sets it itself")
+
+    def assign(self, key: Key, value: float, runtime: bool = False) -> None:
+        """Set a parameter, and whether its value is known only at run time."""
+        store = self.numbers if isinstance(key, int) else self.scope_of(key)
+        self.changes += store.values.get(key) != value
+        store.assign(key, value, runtime)
+
+    # -- subprograms --------------------------------------------------------------------------------------------------
+
+    def locals(self) -> list[tuple[float, bool]]:
+        """#1 to #30, and whether they are known only at run time."""
+        return [(self.numbers.values.get(index, 0.0), index in self.numbers.runtime) for index in LOCAL]
+
+    def set_locals(self, values: list[tuple[float, bool]]) -> None:
+        """Set #1 to #30; those without a value become 0."""
+        padded = values + [(0.0, False)] * (len(LOCAL) - len(values))
+        for index, (value, runtime) in zip(LOCAL, padded, strict=True):
+            self.assign(index, value, runtime)

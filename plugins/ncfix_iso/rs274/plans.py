@@ -1,0 +1,293 @@
+"""A plan for each shape of block: what its words are, which codes it has, and what is done in which order.
+
+Everything that does not depend on numbers is settled once per shape, so that a block costs little when it runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ncfix.control.coordinates import INDEX
+from ncfix.control.faults import Fault
+from ncfix.control.lane_tables import Lane
+from ncfix.control.modal import NO_MOTION
+from ncfix.text.reach import UNREAD, Deletable, deletable
+from ncfix.text.tree import (
+    Assignment,
+    Comment,
+    Constant,
+    Flow,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Parameter,
+    Span,
+    Tape,
+    Template,
+    Word,
+)
+from ncfix_iso.rs274 import groups
+from ncfix_iso.rs274.expressions import Evaluate
+from ncfix_iso.rs274.groups import TOOL_CHANGE, Rules
+from ncfix_iso.rs274.order import Step, steps_of
+
+DWELL_WORDS = "P"
+"""With G4: how long."""
+NO_WORDS = frozenset("GMNO")
+"""Addresses that do not come as values to the steps of a block."""
+
+POLAR = frozenset("@^")
+"""Addresses that together stand for X and Y."""
+
+SMOOTHING = 51
+"""G5.1 Q: axis words, `G5.1 Q2 X0 Y0 Z0`, say for which axes it is, and move nothing."""
+
+LANE_LETTERS = frozenset("FN") | INDEX.keys()
+ARC_LETTERS = frozenset("IJKR")
+PLACES = ARC_LETTERS | INDEX.keys()
+CONFLICT = "NCF208"
+UNKNOWN_M = "NCF229"
+MAX_M_CODES = 4
+
+AXES_TAKEN = frozenset((100, 220, 280, 300, 310, 501, 510, 511, 520, 600, 680, 682, 683, 684, 920))
+"""G codes that take the axis words of their block for themselves, so that it has no motion."""
+
+FIRST_SYSTEM, EXTENDED_SYSTEM = 540, 541
+"""G54, and what ISO controls make of it where the block has a P: G54.1 Pn."""
+
+P_USERS = frozenset((*(40, 100, 300, 650, 660, 661, 682), *groups.CYCLES, *(190, 970, 980, 990, 1980)))
+"""G and M codes that have a use for P."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """The codes of a block, by group.
+
+    steps    what is done before the motion
+    motion   the motion code, if the block has one
+    stop     M0, M1, M2, M30, M60 in tenths
+    call     M98 or M99 in tenths
+    takes    one of the codes takes the axis words
+    unknown  G codes that are not known
+    """
+
+    g: dict[str, int]
+    m: dict[str, int]
+    steps: tuple[tuple[Step, int], ...]
+    motion: int | None
+    stop: int | None
+    call: int | None
+    takes: bool
+    unknown: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FlowLine:
+    """A flow-control line: its label, as text or as a function, its keyword, and the functions of its arguments."""
+
+    label: str | Evaluate
+    keyword: str
+    arguments: tuple[Evaluate, ...]
+    span: Span
+
+
+@dataclass(slots=True)
+class Plan:
+    """What is done with every block of a shape.
+
+    literals     (address, slot) of words with a plain number
+    pointless    addresses of words with a plain number without a decimal point, where the dialect tells them apart
+    computed     words with an expression
+    assignments  parameters that are set
+    code_words   G and M words whose code is computed; else `codes` are the codes
+    flow         the flow-control line that the block is
+    skip         the switches of block delete that it begins with (`/`, `/2`)
+    tape         the block is a `%`
+    unread       the block could not be read
+    command      where a command to the control itself stands (`$H` of Grbl)
+    axes         bit mask of the axis words
+    fault        what is wrong with the codes, raised when the block runs
+    lane         set if the block may go through the fast lane
+    checked      motion codes with which the words have been found to be used
+    """
+
+    template: Template
+    literals: tuple[tuple[str, int], ...] = ()
+    pointless: tuple[str, ...] = ()
+    computed: tuple[tuple[str, Evaluate, Span], ...] = ()
+    assignments: tuple[tuple[int | str | Evaluate, Evaluate, Span], ...] = ()
+    code_words: tuple[tuple[Word, Evaluate], ...] = ()
+    codes: Codes | None = None
+    flow: FlowLine | None = None
+    skip: Deletable | None = None
+    tape: bool = False
+    command: Span | None = None
+    unread: bool = False
+    axes: int = 0
+    letters: frozenset[str] = frozenset()
+    fault: Fault | None = None
+    lane: Lane | None = None
+    checked: set[int | None] = field(default_factory=set)
+
+
+def words_of(words: Sequence[Word], address: str) -> list[Word]:
+    """The words of an address."""
+    return [word for word in words if word.address == address]
+
+
+def plan_of(template: Template, rules: Rules) -> Plan:
+    """The plan for a shape."""
+    plan = Plan(template)
+    take_values(plan, rules)
+    take_statements(plan, rules)
+    take_codes(plan, rules)
+    plan.lane = lane_of(plan)
+    return plan
+
+
+def take_values(plan: Plan, rules: Rules) -> None:
+    """The words that come as values to the steps of the block."""
+    words = plan.template.words
+    standby = words_of(words, "T")[1:] if TOOL_CHANGE in plan.template.m_codes else []
+    values = [word for word in words if word.address not in NO_WORDS and word not in standby]
+    plain = [(word.address, word.value) for word in values if isinstance(word.value, Literal)]
+    computed = [word for word in values if not isinstance(word.value, Literal)]
+    plan.literals = tuple((address, value.slot) for address, value in plain)
+    plan.pointless = tuple(address for address, value in plain if value.pointless)
+    plan.computed = tuple((w.address, rules.compiled(w.value, w.address), w.span) for w in computed)
+    plan.letters = frozenset(word.address for word in values)
+    plan.axes = sum(1 << INDEX[letter] for letter in plan.letters if letter in INDEX)
+    if plan.letters & POLAR:
+        plan.axes |= 1 << INDEX["X"] | 1 << INDEX["Y"]
+
+
+def take_statements(plan: Plan, rules: Rules) -> None:
+    """What the block is besides words."""
+    items = plan.template.items
+    plan.assignments = tuple(assignment(item, rules) for item in items if isinstance(item, Assignment))
+    plan.flow = next((flow_line(item, rules) for item in items if isinstance(item, Flow)), None)
+    plan.skip = deletable(plan.template, DWELL_WORDS)
+    plan.tape = any(isinstance(item, Tape) for item in items)
+    opaque = {item.kind: item.span for item in items if isinstance(item, Opaque)}
+    plan.unread, plan.command = UNREAD in opaque, opaque.get("command")
+
+
+def take_codes(plan: Plan, rules: Rules) -> None:
+    """The codes of the block, by group if they are plain numbers."""
+    words = [word for word in plan.template.words if word.address in "GM"]
+    plain = [(word, round(10 * word.value.value)) for word in words if isinstance(word.value, Constant)]
+    if len(plain) < len(words):
+        plan.code_words = tuple((word, rules.compiled(word.value, word.address)) for word in words)
+        return
+    try:
+        plan.codes = grouped_codes(plain, plan.letters, rules)
+    except Fault as fault:
+        plan.fault = fault
+
+
+def has_words(plan: Plan) -> bool:
+    """Whether words stand beside the statement of a block."""
+    return bool(plan.letters or plan.assignments or plan.template.g_codes or plan.template.m_codes)
+
+
+def flow_line(item: Flow, rules: Rules) -> FlowLine:
+    """A flow-control line with its expressions as functions."""
+    label = item.label if isinstance(item.label, str) else rules.compiled(item.label, "")
+    return FlowLine(label, item.keyword, tuple(rules.compiled(each, "") for each in item.arguments), item.span)
+
+
+def assignment(item: Assignment, rules: Rules) -> tuple[int | str | Evaluate, Evaluate, Span]:
+    """Target and value of an assignment; a name as it is, a number as a function."""
+    assert isinstance(item.target, NamedParameter | Parameter), "this family has no arrays"
+    target = item.target.name if isinstance(item.target, NamedParameter) else rules.compiled(item.target.index, "")
+    return target, rules.compiled(item.value, ""), item.span
+
+
+def grouped_codes(pairs: Sequence[tuple[Word, int]], letters: frozenset[str], rules: Rules) -> Codes:
+    """The codes of a block by group; raises `Fault` where two exclude one another or one is not known."""
+    g: dict[str, int] = {}
+    m: dict[str, int] = {}
+    unknown, named = [], False
+    for word, code in pairs:
+        if word.address == "G":
+            named |= code == SMOOTHING and "Q" in letters
+            if code in rules.harmless_g and not (code in groups.SPLINES and is_spline(letters)):
+                continue
+            if code not in rules.g_groups:
+                unknown.append(code)
+                continue
+            enter(g, rules.g_groups[code], word, code, rules)
+        else:
+            enter_m(m, word, code, rules)
+    if rules.strict and sum(word.address == "M" for word, _ in pairs) > MAX_M_CODES:
+        raise Fault(CONFLICT, f"more than {MAX_M_CODES} M codes in a block", span=pairs[-1][0].span)
+    if not rules.strict and g.get(groups.SYSTEM) == FIRST_SYSTEM and "P" in letters:
+        free = P_USERS.isdisjoint((*g.values(), *m.values()))
+        g[groups.SYSTEM] = EXTENDED_SYSTEM if free else FIRST_SYSTEM
+    return Codes(
+        g,
+        m,
+        steps_of(g, m, letters, rules.steps),
+        g.get(groups.MOTION),
+        m.get(groups.STOP),
+        m.get(groups.CALL),
+        named or bool((AXES_TAKEN | rules.takes) & set(g.values())),
+        tuple(unknown),
+    )
+
+
+def is_spline(letters: frozenset[str]) -> bool:
+    """Whether a block with G5 or G5.1 is a spline, as LinuxCNC and Marlin have them: with points besides its end."""
+    return not letters.isdisjoint("IJ") and not letters.isdisjoint(INDEX)
+
+
+def enter(codes: dict[str, int], group: str, word: Word, code: int, rules: Rules) -> None:
+    """Note a code; raises `Fault` if its group has one already (LinuxCNC: even the same one). G80 gives way."""
+    if group == groups.MOTION and NO_MOTION in (codes.get(group), code):
+        codes[group] = code if codes.get(group, NO_MOTION) == NO_MOTION else codes[group]
+        return
+    if group in codes and (rules.strict or codes[group] != code):
+        first, second = (f"{word.address}{number / 10:g}" for number in (codes[group], code))
+        raise Fault(CONFLICT, f"{first} and {second} exclude one another (both set the {group})", span=word.span)
+    codes[group] = code
+
+
+def enter_m(codes: dict[str, int], word: Word, code: int, rules: Rules) -> None:
+    """Note an M code; one that is not known changes no coordinates, but LinuxCNC refuses it."""
+    group = rules.m_groups.get(code)
+    if group is not None:
+        enter(codes, group, word, code, rules)
+    elif rules.strict:
+        raise Fault(UNKNOWN_M, f"M{code / 10:g} is not a code of LinuxCNC", span=word.span)
+
+
+def lane_of(plan: Plan) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
+    codes, slots = plan.codes, dict(plan.literals)
+    if codes is None or not only_moves(codes) or not is_plain(plan):
+        return None
+    lane = Lane(
+        tuple((INDEX[letter], slot) for letter, slot in plan.literals if letter in INDEX),
+        slots.get("F", -1),
+        -1 if codes.motion is None else codes.motion,
+        (slots.get("I", -1), slots.get("J", -1), slots.get("K", -1)),
+        slots.get("R", -1),
+    )
+    if not lane.turns:
+        return lane if lane.motion in (-1, 0, 10) else None
+    ambiguous = lane.radius >= 0 and max(lane.centre) >= 0
+    return None if ambiguous or lane.motion not in (-1, 20, 30) else lane
+
+
+def is_plain(plan: Plan) -> bool:
+    """Whether a block has words of motions only, with plain numbers, and no place without a point that it needs."""
+    if plan.unread or plan.command or plan.computed or not plan.letters <= LANE_LETTERS | ARC_LETTERS:
+        return False
+    points = PLACES.isdisjoint(plan.pointless)
+    return points and all(isinstance(item, Word | Comment | Opaque) for item in plan.template.items)
+
+
+def only_moves(codes: Codes) -> bool:
+    """Whether the codes of a block are known and say nothing but how it moves."""
+    return not codes.m and not codes.unknown and codes.g.keys() <= {groups.MOTION}

@@ -1,0 +1,247 @@
+"""Coordinate systems: G54 to G59.3, and G10 L2 and L20 that set them. None of it moves the machine.
+
+Source: LinuxCNC documentation, "Coordinate systems", "G10 L2", "G10 L20". Parameters hold offsets in mm and degrees:
+#5221 is X of G54, 20 numbers further that of G55, #5230 its rotation.
+"""
+
+from __future__ import annotations
+
+from ncfix.control.coordinates import (
+    DEGREE,
+    IDENTITY,
+    INDEX,
+    LETTERS,
+    N_LETTERS,
+    PLANES,
+    Rotation,
+    Vector,
+    X,
+    Y,
+    about,
+    rotated,
+    transposed,
+)
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Unknown
+from ncfix.control.places import mask_of
+from ncfix_iso.rs274.arithmetic import whole
+from ncfix_iso.rs274.control import Block, Control
+
+SYSTEM_NAMES = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+SHIFT = 5211
+"""The parameter of the X shift of G92."""
+
+REFERENCES = {"G28": 5161, "G30": 5181}
+"""The parameters of X of the reference points."""
+
+BAD_G10 = "NCF222"
+TURNED_WITH_SHIFT = "where {} stands after a rotation while G92 is active differs from control to control"
+TURNED = "turned"
+MOVED_WHILE_TURNED = "what {} does while coordinates are turned, mirrored or tilted differs from control to control"
+AFTER_TURNED = "where the axis {} stands after an origin that was moved in turned coordinates is not known"
+RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
+
+
+def first_parameter(system: int) -> int:
+    """The parameter that holds X of a coordinate system, 1 for G54."""
+    return 5201 + 20 * system
+
+
+def load_setup(control: Control) -> None:
+    """Fill the parameters with what the setup gives, and switch G54 on."""
+    tables = [(control.setup.work_offsets, name, first_parameter(i)) for i, name in enumerate(SYSTEM_NAMES, 1)]
+    tables += [(control.setup.references, code, first) for code, first in REFERENCES.items()]
+    for table, name, first in tables:
+        for letter, value in table.get(name, {}).items():
+            control.parameters.assign(first + INDEX[letter], value)
+    for name, value in control.setup.variables.items():
+        control.parameters.assign(parameter_key(name), value)
+    control.parameters.assign(5220, 1.0)
+    activate(control, 1)
+
+
+def parameter_key(name: str) -> int | str:
+    """The parameter that a setup names, `#100` or `#<name>`."""
+    bare = name.strip().lstrip("#")
+    return int(bare) if bare.isdigit() else bare.strip("<>").replace(" ", "").lower()
+
+
+def stored(control: Control, first: int) -> Vector:
+    """Nine parameters as a position, mm and rad."""
+    values = control.parameters.numbers.values
+    scales = (DEGREE if turning else 1.0 for turning in control.rotary)
+    return [values.get(first + index, 0.0) * scale for index, scale in enumerate(scales)]
+
+
+def store(control: Control, first: int, index: int, value: float, runtime: bool) -> None:
+    """One number of a position, mm or rad, into its parameter."""
+    degrees = value / DEGREE if control.rotary[index] else value
+    control.parameters.assign(first + index, degrees, runtime)
+
+
+def is_given(control: Control, first: int, index: int) -> bool:
+    """Whether a parameter of a coordinate system or reference point has been given by setup or program."""
+    return first + index in control.parameters.numbers.values
+
+
+def words_of(block: Block) -> list[int]:
+    """The letter indices of the axis words of a block."""
+    return [index for index in range(N_LETTERS) if block.axes >> index & 1]
+
+
+# -- selecting --------------------------------------------------------------------------------------------------------
+
+
+def moved_while_turned(control: Control, what: str) -> None:
+    """The origin is moved while coordinates are turned, mirrored or tilted: refused until they are not.
+
+    LinuxCNC knows only turns of the work offset itself, and what they do.
+    """
+    if not control.rules.strict and (control.offsets.rotation != IDENTITY or control.tilted):
+        control.suspended[TURNED] = MOVED_WHILE_TURNED.format(what)
+
+
+def turned_back(control: Control) -> None:
+    """Coordinates are no longer turned: where the axes stand after an origin that was moved is not known."""
+    if control.offsets.rotation == IDENTITY and not control.tilted and control.suspended.pop(TURNED, ""):
+        control.lose(control.machine, AFTER_TURNED)
+
+
+def select_system(control: Control, block: Block, code: int) -> None:
+    """G54 to G59.3, and G54.1 Pn."""
+    before = control.modal.system, control.extended_name
+    take_system(control, block, code)
+    if (control.modal.system, control.extended_name) != before:
+        moved_while_turned(control, f"G{code / 10:g}")
+
+
+def take_system(control: Control, block: Block, code: int) -> None:
+    """Take another work offset into force, if it is another."""
+    if code == 541:
+        extended_system(control, block)
+        return
+    system = (code - 530) // 10 if code <= 590 else code - 584
+    if system != control.modal.system:
+        control.parameters.assign(5220, float(system))
+        activate(control, system)
+
+
+def activate(control: Control, system: int) -> None:
+    """Take a coordinate system's offset and rotation into force."""
+    control.modal.system = system
+    control.offsets.origin = stored(control, first_parameter(system))
+    turn = turn_of(control, system)
+    if turn != control.offsets.turn and (any(control.offsets.shift[:2]) or any(control.offsets.local[:2])):
+        control.lose((X, Y), TURNED_WITH_SHIFT)
+    control.offsets.turn = turn
+    control.offset_checked = False
+    mark_shaky(control)
+    control.refresh()
+
+
+def turn_of(control: Control, system: int) -> Rotation:
+    """The rotation of a coordinate system (G10 R)."""
+    angle = control.parameters.numbers.values.get(first_parameter(system) + 9, 0.0)
+    return about(PLANES[170], angle) if angle else IDENTITY
+
+
+def mark_shaky(control: Control) -> None:
+    """Note which letters have an offset that is known only at run time."""
+    if control.probes_nominally:
+        return
+    runtime = control.parameters.numbers.runtime
+    first = first_parameter(control.modal.system)
+    marked = {index for index in control.machine if first + index in runtime or SHIFT + index in runtime}
+    marked |= control.offsets.doubtful & set(control.machine)
+    turned = control.offsets.turn is not IDENTITY
+    if turned and (marked & {X, Y} or first + 9 in runtime):
+        marked |= {X, Y} & set(control.machine)
+    control.shaky = dict.fromkeys(sorted(marked), RUNTIME_OFFSET)
+
+
+def extended_system(control: Control, block: Block) -> None:
+    """G54.1 Pn: an additional work offset, `G54.1P1` in the setup."""
+    name = f"G54.1P{whole(block.get('P', 1.0), 'P of G54.1')}"
+    given = control.extended.get(name, control.setup.work_offsets.get(name))
+    control.extended_name = name
+    if given is None:
+        control.knowledge.work_offset(name)
+    for index, letter in enumerate(LETTERS):
+        value = (given or {}).get(letter, 0.0)
+        control.offsets.origin[index] = value * DEGREE if control.rotary[index] else value
+    control.modal.system = 0
+    control.offsets.turn = IDENTITY
+    control.offset_checked = True
+    mark_shaky(control)
+    control.refresh()
+
+
+# -- what has to be given ---------------------------------------------------------------------------------------------
+
+
+def check_system(control: Control) -> None:
+    """The coordinate system in force is used: it is given, or lacking."""
+    control.offset_checked = True
+    name = SYSTEM_NAMES[control.modal.system - 1]
+    first = first_parameter(control.modal.system)
+    if name not in control.setup.work_offsets and not all(is_given(control, first, i) for i in control.machine):
+        control.knowledge.work_offset(name)
+
+
+def before_persistent(control: Control, number: int) -> None:
+    """A parameter between 5161 and 5390 is read: if it is one that the setup should give, it has to be there."""
+    if number in control.parameters.numbers.values:
+        return
+    system, axis = divmod(number - 5221, 20)
+    if 0 <= system < len(SYSTEM_NAMES) and axis < N_LETTERS:
+        if SYSTEM_NAMES[system] not in control.setup.work_offsets:
+            control.knowledge.work_offset(SYSTEM_NAMES[system])
+    elif number < 5190:
+        code = "G28" if number < REFERENCES["G30"] else "G30"
+        if code not in control.setup.references:
+            control.knowledge.reference_point(code)
+
+
+# -- setting ----------------------------------------------------------------------------------------------------------
+
+
+def set_system(control: Control, block: Block, *, at_position: bool) -> None:
+    """G10 L2 and L20: the axis words are the new offset, or what the present position is to be called."""
+    system = whole(block.get("P"), "P of G10") or control.modal.system
+    if not 1 <= system <= len(SYSTEM_NAMES):
+        raise Fault(BAD_G10, f"there is no coordinate system P{system}", f"P is 0 to {len(SYSTEM_NAMES)}")
+    first = first_parameter(system)
+    if "R" in block.values:
+        if at_position:
+            raise Fault(BAD_G10, "R cannot be given with G10 L20")
+        control.parameters.assign(first + 9, block.values["R"], "R" in block.runtime)
+    origin = stored(control, first)
+    if at_position:
+        origin, doubtful = origin_for_position(control, block, system, origin)
+    else:
+        doubtful = {}
+        for index in words_of(block):
+            origin[index] = control.scale[index] * block.values[LETTERS[index]]
+    for index, value in enumerate(origin):
+        if value != stored(control, first)[index] or block.axes >> index & 1:
+            store(control, first, index, value, index in doubtful or LETTERS[index] in block.runtime)
+    if system == control.modal.system:
+        moved_while_turned(control, "G10")
+        activate(control, system)
+        control.places.shift(mask_of(words_of(block)) | (mask_of((X, Y)) if "R" in block.values else 0))
+
+
+def origin_for_position(control: Control, block: Block, system: int, origin: Vector) -> tuple[Vector, Unknown]:
+    """The origin with which the control stands at the words of the block in that system, and where it is doubtful."""
+    turn = turn_of(control, system)
+    involved = {*words_of(block), *((X, Y) if turn is not IDENTITY and block.axes & 3 else ())}
+    control.settle(tuple(involved))
+    outer = [p - o - t for p, o, t in zip(control.position, origin, control.offsets.tool, strict=True)]
+    shifts = zip(control.offsets.shift, control.offsets.local, strict=True)
+    now = [a - s - local for a, (s, local) in zip(rotated(transposed(turn), outer), shifts, strict=True)]
+    wanted = now[:]
+    for index in words_of(block):
+        wanted[index] = control.scale[index] * block.values[LETTERS[index]]
+    moved = rotated(turn, [a - b for a, b in zip(now, wanted, strict=True)])
+    doubtful = {index: why for index, why in control.unknown.items() if index in involved}
+    return [a + b for a, b in zip(origin, moved, strict=True)], doubtful

@@ -1,0 +1,75 @@
+"""Words that no code of their block uses: LinuxCNC refuses them.
+
+Source: LinuxCNC documentation of the single codes; tried out on `rs274`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+
+from ncfix.control.faults import Fault
+from ncfix_iso.rs274.control import Control
+from ncfix_iso.rs274.groups import CYCLES, TURNING_CYCLES
+from ncfix_iso.rs274.plans import Codes, Plan
+
+UNUSED = "NCF209"
+
+ARCS = (20, 30)
+DRILLING = tuple(code for code in CYCLES if code >= 810)
+
+
+@dataclass(frozen=True, slots=True)
+class Uses:
+    """Which codes use an address: motion codes, other G codes of the block, M codes of the block; in tenths."""
+
+    motions: frozenset[int] = frozenset()
+    g_codes: frozenset[int] = frozenset()
+    m_codes: frozenset[int] = frozenset()
+
+
+def uses(motions: tuple[int, ...] = (), g: tuple[int, ...] = (), m: tuple[int, ...] = ()) -> Uses:
+    """`Uses` from tuples; the cycles of turning use every address."""
+    return Uses(frozenset((*motions, *TURNING_CYCLES)), frozenset(g), frozenset(m))
+
+
+USER_M = tuple(range(1000, 2000, 10))
+CUTTER_WORDS = (410, 411, 420, 421)
+
+USED_BY: dict[str, Uses] = {
+    "D": uses(g=(*CUTTER_WORDS, 960)),
+    "E": uses((760,), m=(660, 670, 680)),
+    "H": uses((760,), g=(430, 432)),
+    "I": uses((*ARCS, 50, 51, 331, 760, 870), g=(100,)),
+    "J": uses((*ARCS, 50, 51, 760, 870), g=(100,)),
+    "K": uses((*ARCS, 330, 331, 760, 870)),
+    "L": uses((52, 730, 760, *DRILLING), g=(100, *CUTTER_WORDS), m=(660, 980)),
+    "P": uses(
+        (*ARCS, 50, 52, 740, 760, 820, 840, 860, 880, 890),
+        g=(40, 100, 640),
+        m=(190, 500, 510, 520, 530, 620, 630, 640, 650, 660, 980, *USER_M),
+    ),
+    "Q": uses((50, 730, 760, 830), g=(100, 640), m=(190, 610, 660, 670, 680, *USER_M)),
+    "R": uses((*ARCS, 730, 740, 760, *DRILLING), g=(100, 411, 421), m=(190,)),
+}
+
+
+def unused_word(letters: Set[str], motion: int | None, g_codes: Set[int], m_codes: Set[int]) -> str | None:
+    """The first address that no code of the block uses."""
+    for letter, users in USED_BY.items():
+        used = motion in users.motions or g_codes & users.g_codes or m_codes & users.m_codes
+        if letter in letters and not used:
+            return letter
+    return None
+
+
+def check_words(control: Control, plan: Plan, codes: Codes, motion: int | None) -> None:
+    """Raise `Fault` for a word that no code uses, where the control does."""
+    if not control.rules.strict or motion in plan.checked:
+        return
+    letter = unused_word(plan.letters, motion, frozenset(codes.g.values()), frozenset(codes.m.values()))
+    if letter is not None:
+        span = next(word.span for word in plan.template.words if word.address == letter)
+        raise Fault(UNUSED, f"no code of the block uses the word {letter}", span=span)
+    if plan.codes is not None:
+        plan.checked.add(motion)

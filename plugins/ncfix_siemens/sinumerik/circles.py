@@ -1,0 +1,227 @@
+"""G2, G3 and CIP: from the words of a block to an arc in commands."""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.control.arcs import ARC_FAULT, CLOCKWISE, Point, centre_from_radius, check_closure, sweep_angle
+from ncfix.control.builder import Arc
+from ncfix.control.coordinates import CENTRE_LETTERS, IDENTITY, Plane, dot
+from ncfix.control.faults import Fault
+from ncfix.control.moves import Kind
+from ncfix_siemens.sinumerik.affine import handed
+from ncfix_siemens.sinumerik.destination import NO_POLE, End, Leg, Words, destination, doubtful_polar
+from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE
+
+CENTRE_AT_RUNTIME = "the centre of the arc is known only at run time"
+VIA_AT_RUNTIME = "the intermediate point of the arc is known only at run time"
+POLAR_ARC = "an arc (CT) in polar coordinates"
+POLAR_AND_CENTRE = "an arc about the pole (AP, RP) that has a centre or radius, too"
+DIAMETERS = "an absolute centre or intermediate point of an arc while X is a diameter ({})"
+VIA = ("I1", "J1", "K1")
+OF_ARCS = frozenset({*CENTRE_LETTERS, "CR", "AR", "TURN"})
+OF_CIP = frozenset({*VIA, "TURN"})
+NOT_TAKEN = "{} takes no word {}: the control would stop, or makes a path of it that is not followed"
+TWICE = "{} says by {} and {} where the arc lies: which of them counts is not sure"
+NO_END = "CIP without an end point: no circle is given by two points"
+FLAT = 1e-9
+"""A triangle of a smaller height, relative, has no circle."""
+
+Triple = tuple[float, float, float]
+
+
+def misled(control: Sinumerik, words: Words, name: str, taken: frozenset[str]) -> str:
+    """Why a motion is refused that has words of arcs beyond those that it takes, or more than say an arc; or empty."""
+    named = words.values.keys() & (OF_ARCS | OF_CIP)
+    if not named:
+        return ""
+    stray = sorted(named - taken)
+    if stray:
+        return NOT_TAKEN.format(name, stray[0])
+    plane = control.modal.plane
+    centre = sorted({CENTRE_LETTERS[index] for index in (plane.first, plane.second)} & named)
+    ended = any(words.axes >> index & 1 for index in (plane.first, plane.second))
+    if "CR" in named and (centre or "AR" in named):
+        return TWICE.format(name, "CR", (centre or ["AR"])[0])
+    return TWICE.format(name, "AR", "an end point beside its centre") if "AR" in named and centre and ended else ""
+
+
+def arc(control: Sinumerik, words: Words, code: int) -> None:
+    """An arc, helix or full circle by its centre, radius or opening angle."""
+    control.settle_all()
+    end = destination(control, words)
+    doubtful = bool(end.unknown or control.unknown or words.runtime("I", "J", "K", "CR", "AR", "TURN"))
+    clockwise, plane = code == CLOCKWISE, control.modal.plane
+    refusal = refusal_of(words, plane) or doubtful_diameter(control, words, "I") or doubtful_polar(control, words)
+    try:
+        centre, end = geometry(control, words, end, clockwise=clockwise)
+    except Fault:
+        if not doubtful and not refusal:
+            raise
+        centre = (1.0, 0.0)
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    finish = step[plane.first], step[plane.second]
+    sweep = sweep_angle(centre, finish, 1 + max(round(words.get("TURN")), 0), clockwise=clockwise)
+    circle = circle_of(control, plane, centre, sweep)._replace(fixed=is_fixed(words, plane))
+    control.go(Leg(Kind.ARC, words, end, code, refusal=refusal, arc=circle))
+
+
+def is_fixed(words: Words, plane: Plane) -> bool:
+    """Whether words say where the centre is: by `AC`, or as the pole."""
+    letters = (CENTRE_LETTERS[index] for index in (plane.first, plane.second))
+    return bool({"AP", "RP"} & words.values.keys()) or any(words.forms.get(each) == ABSOLUTE for each in letters)
+
+
+def refusal_of(words: Words, plane: Plane) -> str:
+    """Why an arc is refused: something of it is known only at run time, or not followed."""
+    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    if words.runtime(*letters, "CR", "AR", "TURN"):
+        return CENTRE_AT_RUNTIME
+    doubled = {"AP", "RP"} & words.values.keys() and {*letters, "CR", "AR"} & words.values.keys()
+    return POLAR_AND_CENTRE if doubled else ""
+
+
+def doubtful_diameter(control: Sinumerik, words: Words, address: str) -> str:
+    """Why an arc is refused whose point with this X might be meant as a diameter."""
+    form = words.forms.get(address, "")
+    absolute = form == ABSOLUTE or (address == "I1" and not form and not control.modal.incremental)
+    counts = control.modal.diameter and absolute and address in words.values
+    return DIAMETERS.format(address) if counts else ""
+
+
+def geometry(control: Sinumerik, words: Words, end: End, *, clockwise: bool) -> tuple[Point, End]:
+    """The centre relative to the start in the plane, mm, and the end; raises `Fault` if the control refuses the arc."""
+    plane = control.modal.plane
+    step = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    chord = step[plane.first], step[plane.second]
+    letters = [CENTRE_LETTERS[index] for index in (plane.first, plane.second)]
+    has_centre = any(letter in words.values for letter in letters)
+    if {"AP", "RP"} & words.values.keys():
+        centre = centre_at_pole(control, plane)
+        check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
+        return centre, end
+    if "CR" in words.values:
+        return centre_from_radius(chord, control.stretch * words.get("CR"), clockwise=clockwise), end
+    if "AR" in words.values and not has_centre:
+        return centre_from_angle(chord, words.get("AR"), clockwise=clockwise), end
+    if not has_centre:
+        raise Fault(ARC_FAULT, "the arc has neither a centre (I J K) nor CR= nor AR=")
+    centre = centre_words(control, words, plane)
+    if "AR" in words.values:
+        return centre, ended_by_angle(control, words, end, centre, clockwise=clockwise)
+    check_closure(centre, chord, control.dialect.closure_mm, control.dialect.closure_relative)
+    return centre, end
+
+
+def centre_at_pole(control: Sinumerik, plane: Plane) -> Point:
+    """The centre of an arc in polar coordinates, the pole, relative to the start, mm."""
+    if control.modes.pole is None:
+        raise Fault(ARC_FAULT, NO_POLE)
+    here = control.program_position()
+    return control.modes.pole[0] - here[plane.first], control.modes.pole[1] - here[plane.second]
+
+
+def centre_words(control: Sinumerik, words: Words, plane: Plane) -> Point:
+    """The centre relative to the start, mm: I J K count from the start unless they say `AC`."""
+    here = control.program_position()
+    found = []
+    for index in (plane.first, plane.second):
+        letter = CENTRE_LETTERS[index]
+        value = control.stretch * words.get(letter)
+        found.append(value - here[index] if words.forms.get(letter) == ABSOLUTE else value)
+    return found[0], found[1]
+
+
+def centre_from_angle(chord: Point, degrees: float, *, clockwise: bool) -> Point:
+    """The centre of an arc given by its end and opening angle (AR)."""
+    if not 0.0 < degrees < 360.0:
+        raise Fault(ARC_FAULT, f"AR is {degrees:g}, and must be between 0 and 360 degrees")
+    radius = math.hypot(*chord) / (2 * math.sin(math.radians(degrees) / 2))
+    return centre_from_radius(chord, radius if degrees <= 180.0 else -radius, clockwise=clockwise)
+
+
+def ended_by_angle(control: Sinumerik, words: Words, end: End, centre: Point, *, clockwise: bool) -> End:
+    """The end of an arc given by its centre and opening angle."""
+    plane = control.modal.plane
+    angle = math.radians(words.get("AR")) * (-1.0 if clockwise else 1.0)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    step = [0.0, 0.0, 0.0]
+    step[plane.first] = centre[0] - centre[0] * cosine + centre[1] * sine
+    step[plane.second] = centre[1] - centre[0] * sine - centre[1] * cosine
+    whole = control.in_frame([b - a for a, b in zip(control.position, end.target, strict=True)])
+    step[plane.across] = whole[plane.across]
+    target = end.target[:]
+    target[:3] = [here + dot(row, step) for here, row in zip(control.position, control.rotation, strict=False)]
+    return End(target, end.unknown, end.lost)
+
+
+def circle_of(control: Sinumerik, plane: Plane, centre: Point, sweep: float) -> Arc:
+    """The circle in commands; where an odd number of axes is mirrored it runs the other way about its normal."""
+    local = [0.0, 0.0, 0.0]
+    local[plane.first], local[plane.second] = centre
+    normal = IDENTITY[plane.across]
+    if control.is_rotated:
+        sense = handed(control.rotation)
+        local = [dot(row, local) for row in control.rotation]
+        x, y, z = (sense * dot(row, normal) for row in control.rotation)
+        normal = (x, y, z)
+    a, b, c = (math.nan if i in control.unknown else control.position[i] + local[i] for i in range(3))
+    return Arc((a, b, c), normal, sweep)
+
+
+# -- by way of a point ------------------------------------------------------------------------------------------------
+
+
+def through_point(control: Sinumerik, words: Words, code: int) -> None:
+    """CIP: the circle through the start, the point I1 J1 K1 and the end, in any plane."""
+    control.settle_all()
+    end = destination(control, words)
+    why = VIA_AT_RUNTIME if words.runtime(*VIA, "TURN") else doubtful_diameter(control, words, "I1")
+    if why:
+        control.go(Leg(Kind.FEED, words, end, code, refusal=why))
+        return
+    if end.unknown or control.unknown:
+        control.go(Leg(Kind.FEED, words, end, code, refusal="where the arc (CIP) begins or ends is not known"))
+        return
+    start, finish = tuple(control.position[:3]), tuple(end.target[:3])
+    if not words.axes & 0b111 and not {"AP", "RP"} & words.values.keys():
+        raise Fault(ARC_FAULT, NO_END)
+    circle = circle_through(start, via_point(control, words), finish)  # type: ignore[arg-type]
+    circle = circle._replace(sweep=circle.sweep + 2 * math.pi * max(round(words.get("TURN")), 0))
+    control.go(Leg(Kind.ARC, words, end, code, arc=circle))
+
+
+def via_point(control: Sinumerik, words: Words) -> Triple:
+    """The intermediate point as a command."""
+    program = control.program_position()
+    for index, address in enumerate(VIA):
+        if address not in words.values:
+            continue
+        value, form = control.stretch * words.get(address), words.forms.get(address, "")
+        incremental = form == "ic" or (not form and control.modal.incremental)
+        program[index] = value + (program[index] if incremental else 0.0)
+    x, y, z = (dot(row, program) + control.offset[i] for i, row in enumerate(control.rotation))
+    return x, y, z
+
+
+def circle_through(start: Triple, via: Triple, end: Triple) -> Arc:
+    """The circle through three points, run through in that order; raises `Fault` if they are in line."""
+    u = [b - a for a, b in zip(start, via, strict=True)]
+    v = [b - a for a, b in zip(start, end, strict=True)]
+    normal = cross(u, v)
+    size = math.sqrt(dot(normal, normal))
+    if size <= FLAT * (dot(u, u) + dot(v, v)):
+        raise Fault(ARC_FAULT, "start, intermediate point and end of the arc (CIP) are in line")
+    uu, vv = dot(u, u), dot(v, v)
+    arm = [(uu * b + vv * a) / (2 * size * size) for a, b in zip(cross(normal, u), cross(v, normal), strict=True)]
+    unit = [part / size for part in normal]
+    centre = [a + b for a, b in zip(start, arm, strict=True)]
+    first, last = [-part for part in arm], [b - a for a, b in zip(arm, v, strict=True)]
+    sweep = math.atan2(dot(unit, cross(first, last)), dot(first, last)) % (2 * math.pi)
+    return Arc((centre[0], centre[1], centre[2]), (unit[0], unit[1], unit[2]), sweep)
+
+
+def cross(a: list[float], b: list[float]) -> list[float]:
+    """Vector product."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

@@ -1,0 +1,207 @@
+"""Drilling cycles, called where the axes stand or, with MCALL, after every motion; and cycles that are not followed.
+
+A hole is one motion to its bottom, as in all languages: what leads to it under MCALL ends in a hole, and is no rapid.
+Its place is corrected for the bottom, in the block that leads to it. How deep it is stands in the call, so a hole that
+needs another depth gets a call of its own.
+Source: Siemens, "SINUMERIK, cycles": CYCLE81 to CYCLE89, CYCLE840 (RTP, RFP, SDIS, DP, DPR).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from ncfix.control.coordinates import LETTERS, rotated
+from ncfix.control.moves import CycleCall, Kind
+from ncfix_siemens.sinumerik.destination import End, Leg, Words
+from ncfix_siemens.sinumerik.framing import mind_carried, take_up
+from ncfix_siemens.sinumerik.increments import stand
+from ncfix_siemens.sinumerik.patterns import AFTER_PATTERN, Points, lead_to, points_of
+from ncfix_siemens.sinumerik.plans import Calling
+from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.values import Value, number
+from ncfix_siemens.sinumerik.vocabulary import DRILLING
+
+MADE = "motions that the control makes up ({})"
+MADE_HOLES = "holes whose places the control makes up ({})"
+HEIGHTS = "the heights of the cycle {} are known only at run time"
+TWO_DEPTHS = "the depth of the cycle {} is given twice, DP and DPR, and they are not the same"
+BY_DIAMETER = "the depth of {} follows from a diameter (_GMODE)"
+TO_A_HOLE = "a hole under MCALL to which neither G0 nor G1 leads, or one in machine coordinates"
+WITH_WORDS = "a drilling cycle and axis words in one block"
+ELSEWHERE = "this hole needs a depth of its own, and its cycle is called in another file"
+ALONE = "this hole needs a line of its own, which REPEAT would leave out"
+UNDER_ANOTHER = "this hole needs a line of its own, after which the modal cycle in force would drill"
+UNSTATED = "this hole needs a line of its own, and the motion code in force is not known"
+MEASURING = re.compile(r"cycle9[789]\d")
+
+AFTER_CYCLE = "where the axis {} stands after a cycle is not followed"
+
+DEEP, FIRST_DEPTH = "cycle83", (5, 6)
+"""The cycle that drills in steps, and where the depth of the first one stands: a height (FDEP), a way down (FDPR)."""
+
+CENTRING, GEOMETRY_MODE = "cycle81", 6
+"""The cycle that can go down to a diameter, and which argument says so."""
+
+DP, DPR = 3, 4
+ALIKE = 1e-6
+"""Program units; two depths that differ by less are one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drilling:
+    """A drilling cycle as it was called.
+
+    name    lower case
+    clear   height at which it ends, in program units (RTP); None if known only at run time
+    depth   of the hole, in program units
+    fault   why its holes are refused; empty if they are not
+    values  of its arguments
+    sure    all arguments that are written are known
+    external  the file in which it is called; empty: the program itself
+    """
+
+    name: str
+    clear: float | None
+    depth: float | None
+    fault: str
+    values: tuple[Value, ...]
+    sure: bool
+    external: str
+
+    @classmethod
+    def of(cls, control: Sinumerik, step: Calling) -> Drilling:
+        """From the arguments RTP, RFP, SDIS, DP, DPR."""
+        values = tuple(value(control) for value in step.arguments)
+        given = [(part is not None, number(value)) for part, value in zip(step.written, values, strict=True)]
+        (_, clear), (_, reference), _, (is_deep, deep), (is_way, way) = (given + [(False, None)] * 5)[:5]
+        name, depth, fault = step.name.upper(), deep if is_deep else None, ""
+        if is_way and way and clear is not None and reference is not None:
+            down = reference - way if clear >= reference else reference + way
+            fault = TWO_DEPTHS.format(name) if is_deep and (deep is None or abs(deep - down) > ALIKE) else ""
+            depth = down
+        elif is_way and way is None:
+            depth = None
+        if clear is None or depth is None:
+            fault = fault or HEIGHTS.format(name)
+        mode = given[GEOMETRY_MODE][1] if len(given) > GEOMETRY_MODE else None
+        if step.name == CENTRING and mode:
+            fault = BY_DIAMETER.format(name)
+        sure = all(value is not None for part, value in zip(step.written, values, strict=True) if part is not None)
+        values = tuple(value if part is not None else None for part, value in zip(step.written, values, strict=True))
+        return cls(step.name, clear, depth, fault, values, sure, control.external)
+
+    def call(self, control: Sinumerik, block: int, *, modal: bool) -> CycleCall:
+        """The call for a hole in a block of the program that is executed."""
+        depths = [(place, 1 if place in (DP, FIRST_DEPTH[0]) else -1) for place in self._depths()]
+        fixed = ALONE if block in control.solitary else ""
+        if modal and self.external != control.external:
+            fixed = fixed or ELSEWHERE
+        if not modal:
+            fixed = fixed or (UNDER_ANOTHER if control.modes.modal_cycle is not None else "")
+            fixed = fixed or ("" if control.stated else UNSTATED)
+        across = LETTERS[control.modal.plane.across]
+        return CycleCall(self.name.upper(), self.values, tuple(depths), across, modal, fixed, not self.sure)
+
+    def _depths(self) -> list[int]:
+        """The places of the arguments that say how deep the hole, or the first step to it, is."""
+        places = [DP, DPR, *(FIRST_DEPTH if self.name == DEEP else ())]
+        given = [place for place in places if place < len(self.values) and self.values[place] is not None]
+        return [place for place in given if place not in (DPR, FIRST_DEPTH[1]) or self.values[place] != 0.0]
+
+
+def cycle(control: Sinumerik, words: Words, step: Calling, *, modal: bool) -> None:
+    """A cycle of the control: kept for later (MCALL), or executed here."""
+    name, block = step.name.upper(), words.block
+    if step.name not in DRILLING:
+        if modal:
+            control.suspended["cycle"] = f"the modal cycle {name} is in force, which ncfix does not follow"
+            return
+        if points := points_of(control, step):
+            pattern(control, block, name, points)
+            return
+        holes = step.name.startswith(("holes", "cycle80"))
+        refuse(control, block, (MADE_HOLES if holes else MADE).format(name))
+        if MEASURING.fullmatch(step.name):
+            control.refusal = control.refusal or f"{name} measures, and may set offsets at run time"
+        return
+    drilling = Drilling.of(control, step)
+    if modal:
+        control.modes.modal_cycle = drilling
+        return
+    take_up(control)
+    mind_carried(control)
+    control.settle_all()
+    here = End(control.position[:], dict(control.unknown), dict(control.lost))
+    drill(control, Words(block, {}, {}, 0), here, drilling, refusal=WITH_WORDS if words.axes else "")
+
+
+def pattern(control: Sinumerik, block: int, name: str, points: Points) -> None:
+    """The modal cycle at each place of a pattern; behind it nobody knows for certain at which the axes stand."""
+    drilling, plane = control.modes.modal_cycle, control.modal.plane
+    assert drilling is not None
+    control.pattern = points
+    for point in points:
+        words, over, refusal = lead_to(control, block, point, name)
+        drill(control, words, over, drilling, refusal=refusal, modal=True)
+    control.lost = dict(control.lost) | dict.fromkeys((plane.first, plane.second), AFTER_PATTERN)
+    control.unknown = control.unknown_for(control.lost)
+
+
+def hole_after(control: Sinumerik, words: Words) -> None:
+    """The modal cycle behind a motion that is none to a hole: a hole where that has led."""
+    drilling = control.modes.modal_cycle
+    assert drilling is not None
+    here = End(control.position[:], dict(control.unknown), dict(control.lost))
+    drill(control, Words(words.block, {}, {}, 0), here, drilling, refusal=TO_A_HOLE, modal=True)
+
+
+def drill(
+    control: Sinumerik, words: Words, over: End, drilling: Drilling, *, refusal: str = "", modal: bool = False
+) -> None:
+    """One hole: over its place, which the words say, down to its depth, and up again.
+
+    modal  the words lead to it, the cycle is in force; else the cycle is called where the axes stand
+    """
+    across, stated = control.modal.plane.across, words.axes
+    if drilling.fault:
+        refusal = refusal or drilling.fault
+    depth, clear = drilling.depth, drilling.clear
+    bottom = over if depth is None else at_height(control, over, depth)
+    counted = sum(1 << index for index in control.counted_words(words))
+    settles = (stated & ~counted) | (1 << across if depth is not None else 0)
+    control.builder.called(drilling.call(control, words.block, modal=modal))
+    code = control.modal.motion
+    control.go(Leg(Kind.CYCLE, words, bottom, code if code >= 0 else 10, refusal=refusal, settles=settles))
+    control.heading = None
+    if clear is None or depth is None:
+        up = End(control.position, control.unknown, dict(control.lost) | {across: AFTER_CYCLE})
+        up = End(up.target, control.unknown_for(up.lost), up.lost)
+    else:
+        up = at_height(control, End(control.position, dict(control.unknown), dict(control.lost)), clear)
+        stand(control, 1 << across, by_machine=False)
+    control.position, control.unknown, control.lost = up.target, up.unknown, up.lost
+
+
+def at_height(control: Sinumerik, over: End, height: float) -> End:
+    """The place at a height along the tool, in program units, where the other coordinates are those of `over`."""
+    across = control.modal.plane.across
+    inner = [value - offset for value, offset in zip(over.target, control.offset, strict=True)]
+    program = rotated(control.inverse, inner) if control.is_rotated else inner
+    program[across] = control.scale[across] * height
+    back = rotated(control.rotation, program) if control.is_rotated else program
+    mixed = [index for index in GEOMETRY if index == across or control.rotation[index][across] != 0.0]
+    target = over.target[:]
+    for index in mixed:
+        target[index] = back[index] + control.offset[index]
+    lost = {index: why for index, why in over.lost.items() if index != across}
+    return End(target, control.unknown_for(lost), lost)
+
+
+def refuse(control: Sinumerik, block: int, why: str) -> None:
+    """Motions that are not followed: where the axes stand after them is not known."""
+    gone = [index for index in GEOMETRY if index in control.machine]
+    lost = dict(control.lost) | dict.fromkeys(gone, AFTER_CYCLE)
+    words = Words(block, {}, {}, sum(1 << index for index in gone))
+    end = End(control.position[:], control.unknown_for(lost), lost)
+    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, refusal=why))

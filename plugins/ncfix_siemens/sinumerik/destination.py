@@ -1,0 +1,318 @@
+"""Where the axis words of a block lead: absolute, incremental, word by word otherwise, in polar coordinates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from ncfix.control.builder import Arc
+from ncfix.control.coordinates import INDEX, LETTERS, Vector, rotated
+from ncfix.control.faults import Fault
+from ncfix.control.motion import Unknown
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Passing
+from ncfix.control.places import mask_of
+from ncfix_siemens.sinumerik.increments import unsteady
+from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, INCREMENTAL, TURNING
+
+RUNTIME = "where the axis {} stands is known only at run time"
+RADIUS = "an increment of X as a radius while absolute ones are diameters (DIAM90)"
+POLAR = "NCF223"
+POLAR_DIAMETER = "polar coordinates (AP, RP) while X is a diameter"
+NO_POLE = "polar coordinates (AP, RP) while no pole is known"
+NO_RADIUS = "a polar radius (RP) of zero: the control takes the distance from the pole instead"
+ASIDE = "an angle (AP) that is left out, or an increment of AP or RP, where the axes have left the last polar position"
+TURN = 2 * math.pi
+POLAR_WORDS = frozenset({"AP", "RP"})
+NEAR_POLE = 1e-6
+"""mm"""
+STILL = 1e-9
+"""rad; an axis that is nearer to where it shall be stands there already."""
+
+
+@dataclass(slots=True)
+class Words:
+    """The words of a block while it is executed.
+
+    block    the block in its program
+    values   address -> number, in program units; None where it is known only at run time
+    forms    address -> how the word is meant (`ac`, `ic`, `dc`, ...), where it says so
+    axes     bit mask of the axis words
+    texts    address -> text, as in T="DRILL"
+    refusal  why a motion of the block is refused, if it is
+    whole    the motion must not be split
+    """
+
+    block: int
+    values: dict[str, float | None]
+    forms: dict[str, str]
+    axes: int
+    texts: dict[str, str] = field(default_factory=dict)
+    refusal: str = ""
+    whole: bool = False
+
+    def refuse(self, reason: str, rotary: Sequence[int]) -> None:
+        """Refuse the motion of the block; where these rotary axes go is not known."""
+        self.refusal = reason
+        for index in rotary:
+            self.values[LETTERS[index]] = None
+            self.forms[LETTERS[index]] = ABSOLUTE
+
+    def get(self, address: str, default: float = 0.0) -> float:
+        """The number of a word; the default where it is not there, or not known."""
+        value = self.values.get(address)
+        return default if value is None else value
+
+    def runtime(self, *addresses: str) -> bool:
+        """Whether one of these words is there and known only at run time."""
+        return any(address in self.values and self.values[address] is None for address in addresses)
+
+
+@dataclass(slots=True)
+class End:
+    """Where a motion ends: the command, which axes are not known there, and which coordinates."""
+
+    target: Vector
+    unknown: Unknown
+    lost: Unknown
+
+
+class Leg(NamedTuple):
+    """One motion of a block, as its words say it: what `Sinumerik.go` makes a `Motion` of.
+
+    code        the motion code, in tenths
+    refusal, passing, arc  as in `Motion`
+    settles     as there; None: the axes of its words, but for increments, and none where the motion is passed
+    by_machine  the words are machine coordinates
+    """
+
+    kind: Kind
+    words: Words
+    end: End
+    code: int
+    refusal: str = ""
+    passing: Passing | None = None
+    arc: Arc | None = None
+    settles: int | None = None
+    by_machine: bool = False
+
+
+def destination(control: Sinumerik, words: Words) -> End:
+    """The command at which a motion of this block ends; refused where a word of X that is added would be a radius."""
+    program = control.program_position()
+    lost = dict(control.lost)
+    moved = set()
+    if control.modal.incremental and control.modes.diameter == "DIAM90":
+        words.refusal = words.refusal or RADIUS
+    for letter in LETTERS:
+        if letter in words.values:
+            place(control, words, letter, program, lost)
+            moved.add(INDEX[letter])
+    if POLAR_WORDS & words.values.keys():
+        moved |= polar(control, words, program, lost)
+    return End(command(control, program, moved), control.unknown_for(lost), lost)
+
+
+def place(control: Sinumerik, words: Words, letter: str, program: Vector, lost: Unknown) -> None:
+    """Take one axis word."""
+    index, value = INDEX[letter], words.values[letter]
+    form = words.forms.get(letter, "")
+    incremental = counts_on(control, form)
+    if incremental and (why := unsteady(control, index)):
+        lost[index] = why
+        return
+    if not incremental:
+        control.check_offset()
+        lost.pop(index, None)
+        if index in control.shaky:
+            lost[index] = control.shaky[index]
+    if value is None:
+        lost[index] = RUNTIME
+        return
+    step = control.scale[index] * value
+    if incremental:
+        if index == 0 and control.modes.diameter == "DIAM90":
+            words.refusal, step = words.refusal or RADIUS, 2.0 * step
+        program[index] += step
+    elif form in TURNING:
+        program[index] = turned(form, program[index], step, known=index not in control.lost)
+        control.over += (index,)
+        if index in control.lost:
+            lost.pop(index, None)
+    else:
+        assert form in ("", ABSOLUTE)
+        program[index] = step
+
+
+def counts_on(control: Sinumerik, form: str) -> bool:
+    """Whether a word in this form is an increment."""
+    return form == INCREMENTAL or (not form and control.modal.incremental)
+
+
+def turned(form: str, here: float, angle: float, *, known: bool) -> float:
+    """The angle at which a rotary axis arrives: on the shortest way, or in the positive or negative sense, rad."""
+    if not known:
+        return angle
+    step = (angle - here + STILL) % TURN - STILL
+    if form == "dc":
+        return here + (step if step <= math.pi + STILL else step - TURN)
+    return here + step if form == "acp" or step <= STILL else here + step - TURN
+
+
+def command(control: Sinumerik, program: Vector, moved: set[int]) -> Vector:
+    """The command of a point in the program's frame; axes that are not moved stay exactly where they are."""
+    inner = rotated(control.rotation, program) if control.is_rotated else program
+    result = [a + b for a, b in zip(inner, control.offset, strict=True)]
+    turning = moved & set(GEOMETRY)
+    for index in range(len(LETTERS)):
+        mixed = index in GEOMETRY and any(control.rotation[index][k] != 0.0 for k in turning)
+        if index not in moved and not mixed:
+            result[index] = control.position[index]
+    return result
+
+
+# -- polar coordinates ------------------------------------------------------------------------------------------------
+
+
+def polar(control: Sinumerik, words: Words, program: Vector, lost: Unknown) -> set[int]:
+    """Take AP and RP, about the pole, in the plane; the coordinates that they move."""
+    plane, pole = control.modal.plane, control.modes.pole
+    angle, radius = (polar_word(control, words, address) for address in ("AP", "RP"))
+    why = doubtful_polar_word(control, words, program, radius)
+    control.modes.polar = angle, radius
+    control.check_offset()
+    if pole is None or angle is None or radius is None or why:
+        lost |= dict.fromkeys((plane.first, plane.second), why or (RUNTIME if pole else NO_POLE))
+        return {plane.first, plane.second}
+    program[plane.first] = pole[0] + radius * math.cos(angle)
+    program[plane.second] = pole[1] + radius * math.sin(angle)
+    for index in (plane.first, plane.second):
+        lost.pop(index, None)
+    return {plane.first, plane.second}
+
+
+def doubtful_polar_word(control: Sinumerik, words: Words, here: Vector, radius: float | None) -> str:
+    """Why nobody can say where polar words lead, though they are known.
+
+    A radius of zero means the distance of the start. A radius alone goes with the angle of the start, or with the last
+    one; increments count from either. So the axes must stand where the last polar words have led them.
+    """
+    if radius is not None and abs(radius) < NEAR_POLE:
+        return NO_RADIUS
+    forms = {address: counts_on(control, words.forms.get(address, "")) for address in POLAR_WORDS & words.values.keys()}
+    angle, distance = control.modes.polar
+    first = angle if forms.get("AP", True) else None
+    second = distance if forms.get("RP", False) else None
+    return "" if first is second is None or stands_there(control, here, first, second) else ASIDE
+
+
+def stands_there(control: Sinumerik, here: Vector, angle: float | None, distance: float | None) -> bool:
+    """Whether the axes stand at this angle and distance about the pole, as far as they are given."""
+    plane, pole = control.modal.plane, control.modes.pole
+    if pole is None or control.lost.keys() & {plane.first, plane.second}:
+        return False
+    x, y = here[plane.first] - pole[0], here[plane.second] - pole[1]
+    near = distance is None or abs(math.hypot(x, y) - distance) < NEAR_POLE
+    if angle is None:
+        return near
+    ahead, aside = x * math.cos(angle) + y * math.sin(angle), x * math.sin(angle) - y * math.cos(angle)
+    return near and ahead > NEAR_POLE and abs(aside) < NEAR_POLE
+
+
+def doubtful_polar(control: Sinumerik, words: Words) -> str:
+    """Why a motion with polar coordinates is refused whose radius might be meant as a diameter."""
+    return POLAR_DIAMETER if control.modal.diameter and {"AP", "RP"} & words.values.keys() else ""
+
+
+def polar_word(control: Sinumerik, words: Words, address: str) -> float | None:
+    """AP in rad or RP in mm: as written, added to the last one, or the last one."""
+    before = control.modes.polar[0 if address == "AP" else 1]
+    if address not in words.values:
+        return before
+    value = words.values[address]
+    if value is None:
+        return None
+    value *= math.pi / 180 if address == "AP" else control.stretch
+    form = words.forms.get(address, "")
+    if counts_on(control, form):
+        return None if before is None else before + value
+    return value
+
+
+def set_pole(control: Sinumerik, words: Words, code: int) -> None:
+    """G110 to G112: the pole is given from where the axes stand, in the frame, or from the last pole."""
+    plane = control.modal.plane
+    base: tuple[float, float] | None = (0.0, 0.0)
+    if code == 1100:
+        base = where_it_stands(control)
+    elif code == 1120:
+        base = control.modes.pole or ((0.0, 0.0) if control.modes.in_plane else None)
+    steps = [words.values.get(LETTERS[index], 0.0) for index in (plane.first, plane.second)]
+    if POLAR_WORDS & words.values.keys():
+        angle, radius = math.radians(words.get("AP")), words.get("RP")
+        steps = [radius * math.cos(angle), radius * math.sin(angle)]
+        if words.runtime("AP", "RP"):
+            base = None
+    if base is None or steps[0] is None or steps[1] is None:
+        control.modes.pole = None
+        return
+    control.modes.pole = base[0] + control.stretch * steps[0], base[1] + control.stretch * steps[1]
+    control.modes.polar = (None, None)
+
+
+# -- machine coordinates ----------------------------------------------------------------------------------------------
+
+
+def where_it_stands(control: Sinumerik) -> tuple[float, float] | None:
+    """Where the axes of the plane stand in the frame; None where that is not known."""
+    here, plane = control.program_position(), control.modal.plane
+    control.settle_all()
+    axes = plane.first, plane.second
+    if control.lost.keys() & {*axes} or control.places.adrift & mask_of(axes):
+        return None
+    return None if any(unsteady(control, index) for index in axes) else (here[plane.first], here[plane.second])
+
+
+def machine_destination(control: Sinumerik, words: Words) -> End:
+    """The command at which a motion in machine coordinates (SUPA, G53, G153) ends: frames off, the tool's length on."""
+    target, unknown = control.position[:], dict(control.unknown)
+    for letter in LETTERS:
+        if letter in words.values:
+            place_at_machine(control, words, letter, target, unknown)
+    if POLAR_WORDS & words.values.keys():
+        raise Fault(POLAR, "polar coordinates do not go with machine coordinates")
+    return End(target, unknown, lost_in_frame(control, unknown))
+
+
+def place_at_machine(control: Sinumerik, words: Words, letter: str, target: Vector, unknown: Unknown) -> None:
+    """Take one axis word in machine coordinates."""
+    index, value = INDEX[letter], words.values[letter]
+    if counts_on(control, words.forms.get(letter, "")):
+        target[index] += control.of_setup(letter) * (value or 0.0)
+        if why := unsteady(control, index, by_machine=True):
+            unknown[index] = why
+    else:
+        tool = 0.0 if control.tcp else control.offsets.tool[index]
+        target[index] = tool + control.of_setup(letter) * control_unit(control, index) * (value or 0.0)
+        unknown.pop(index, None)
+    if value is None:
+        unknown[index] = RUNTIME
+
+
+def lost_in_frame(control: Sinumerik, unknown: Unknown) -> Unknown:
+    """Which coordinates of the program are not known where these axes are not: in a turned frame one hides three."""
+    if not control.is_rotated:
+        return dict(unknown)
+    lost = {index: why for index, why in unknown.items() if index not in GEOMETRY}
+    why = next((why for index, why in unknown.items() if index in GEOMETRY), None)
+    return lost if why is None else lost | {index: why for index in GEOMETRY if index in control.machine}
+
+
+def control_unit(control: Sinumerik, index: int) -> float:
+    """mm per program unit of a linear axis in machine coordinates; 1 for rotary axes."""
+    if control.rotary[index]:
+        return 1.0
+    return control.modal.unit / (2.0 if index == 0 and control.modal.diameter else 1.0)

@@ -1,0 +1,280 @@
+"""Frames, planes, diameters, tools: what a block sets before it moves.
+
+Source: Siemens, "SINUMERIK 840D sl, NC programming": frames, CYCLE800, tool offsets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ncfix.control.coordinates import INCH, INDEX, PLANES, Vector, zeros
+from ncfix.control.places import mask_of
+from ncfix_siemens.sinumerik.affine import WORLD, Affine, mirrored, scaled, shifted, turned, turned_in, with_shift
+from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.increments import had_from_the_start
+from ncfix_siemens.sinumerik.state import RESET_OF_DIAMETER, Sinumerik
+
+FRAME_AT_RUNTIME = "a frame ({}) is known only at run time"
+UNEQUAL = "a scale that differs from axis to axis ({})"
+ROTARY_FRAME = "a {} of a rotary axis"
+WHO_CHANGES = (
+    "whether T by itself changes the tool is not certain: a name that ncfix does not know has followed a T before"
+)
+UNSAID = (
+    "whether X is a radius or a diameter is not said in a program that turns (G96): with DIAMOF or DIAMON, or by "
+    f'variables."{RESET_OF_DIAMETER}" = 1 or 2 in the setup file'
+)
+DIAMETER_SHIFT = "a shift of X while X is a diameter ({}) is in force: which of the two it is, machine data say"
+MIXED_SHIFTS = "G{} after a shift (ATRANS) in a turned or scaled frame is in force"
+FINE_STAYS = "{} after G59: whether what G59 has set stays is not certain"
+AFTER_UNFOLLOWED = "where the axis {} stands after coordinates that are not followed is not known"
+CARRIED = "NCF255"
+LENGTH_ACROSS = "$sc_tool_length_const"
+PLANE_LENGTH = (
+    "in this plane the control adds the tool length along another axis, unless $SC_TOOL_LENGTH_CONST is 17: "
+    'variables."$SC_TOOL_LENGTH_CONST" in the setup file'
+)
+
+
+# -- programmable frames ----------------------------------------------------------------------------------------------
+
+
+def programmable(control: Sinumerik, name: str, words: Words) -> None:
+    """TRANS, ROT, SCALE, MIRROR and, with A before them, what is added to what is in force."""
+    kind = name.removeprefix("a") if name.startswith("a") else name
+    if any(value is None for value in words.values.values()):
+        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(name.upper())
+        return
+    frame, fault = FRAMES[kind](control, words)
+    if fault:
+        control.suspended["frame"] = fault
+    elif name == kind:
+        control.suspended.pop("frame", None)
+    frames = control.frames
+    before = frames.program if name != kind else WORLD
+    if name == kind:
+        over_fine(control, name, words)
+    elif name == "atrans":
+        plain = frames.added is not None and before.rotation == WORLD.rotation and before.scale == 1.0
+        frames.added = total(frames.added or WORLD.shift, frame.shift) if plain else None
+    frames.program = before.then(frame)
+    control.refresh()
+
+
+def over_fine(control: Sinumerik, name: str, words: Words) -> None:
+    """A frame is programmed anew; whether what G59 has set goes with the one before is told in two ways."""
+    frames = control.frames
+    if frames.fine and axis_values(words):
+        control.suspended["frame"] = FINE_STAYS.format(name.upper())
+    frames.added, frames.fine = WORLD.shift, False
+
+
+def total(first: tuple[float, ...], second: tuple[float, ...]) -> tuple[float, ...]:
+    """Two shifts as one."""
+    return tuple(a + b for a, b in zip(first, second, strict=True))
+
+
+def translation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """TRANS."""
+    steps = {INDEX[letter]: value for letter, value in axis_values(words).items()}
+    doubtful = DIAMETER_SHIFT.format(control.modes.diameter) if control.modal.diameter and steps.get(0) else ""
+    return shifted({index: value * unit(control, index) for index, value in steps.items()}), doubtful
+
+
+def rotation(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """ROT X Y Z, or ROT RPL in the plane."""
+    if "RPL" in words.values:
+        return turned_in(control.modal.plane, words.get("RPL")), ""
+    return turned(axis_values(words)), ""
+
+
+def scaling(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """SCALE: one factor for all three axes is followed."""
+    factors = axis_values(words)
+    plain = {letter: factor for letter, factor in factors.items() if factor != 1.0}
+    if not plain:
+        return WORLD, ""
+    if set(plain) >= {"X", "Y", "Z"} and len(set(plain.values())) == 1 and len(plain) == 3:
+        return scaled(plain["X"]), ""
+    return WORLD, UNEQUAL.format("SCALE") + " is in force, which ncfix does not follow"
+
+
+def mirroring(control: Sinumerik, words: Words) -> tuple[Affine, str]:
+    """MIRROR: the axes named run the other way."""
+    letters = "".join(axis_values(words))
+    if set(letters) - set("XYZ"):
+        return WORLD, ROTARY_FRAME.format("mirroring (MIRROR)") + " is in force, which ncfix does not follow"
+    return mirrored(letters), ""
+
+
+FRAMES: dict[str, Callable[[Sinumerik, Words], tuple[Affine, str]]] = {
+    "trans": translation,
+    "rot": rotation,
+    "scale": scaling,
+    "mirror": mirroring,
+}
+PROGRAMMABLE = frozenset(FRAMES) | {"a" + name for name in FRAMES}
+
+
+def axis_values(words: Words) -> dict[str, float]:
+    """The axis words of a block."""
+    return {letter: value for letter, value in words.values.items() if letter in INDEX and value is not None}
+
+
+def unit(control: Sinumerik, index: int) -> float:
+    """mm or rad per unit of a shift; a shift of X is no diameter."""
+    return control.of_setup("XYZABCUVW"[index]) * (1.0 if control.rotary[index] else control.modal.unit)
+
+
+def programmed_shift(control: Sinumerik, words: Words, code: int) -> None:
+    """G58 and G59 with axis words replace the absolute and the additive part of the shift."""
+    values = {INDEX[letter]: value * unit(control, INDEX[letter]) for letter, value in axis_values(words).items()}
+    if any(value is None for value in words.values.values()):
+        control.refusal = control.refusal or FRAME_AT_RUNTIME.format(f"G{code // 10}")
+        return
+    frames = control.frames
+    shift, added = frames.program.shift, frames.added
+    if added is None:
+        control.suspended["frame"] = MIXED_SHIFTS.format(code // 10)
+        return
+    if code == 590:
+        frames.added = with_shift(Affine(added), values).shift
+        values = {index: shift[index] - added[index] + value for index, value in values.items()}
+        frames.fine = True
+    else:
+        values = {index: value + added[index] for index, value in values.items()}
+    frames.program = with_shift(frames.program, values)
+    control.refresh()
+
+
+# -- codes ------------------------------------------------------------------------------------------------------------
+
+
+def plane(control: Sinumerik, code: int) -> None:
+    """G17, G18, G19."""
+    if PLANES[code] is not control.modal.plane:
+        control.modes.pole, control.modes.polar, control.modes.in_plane = None, (None, None), False
+    control.modal.plane = PLANES[code]
+    set_length(control)
+
+
+def units(control: Sinumerik, code: int) -> None:
+    """G70, G71, G700, G710."""
+    control.modal.unit = INCH if code in (700, 7000) else 1.0
+    control.refresh()
+
+
+def settable(control: Sinumerik, code: int) -> None:
+    """G54 to G57, G505 to G599; G500 switches them off."""
+    control.modes.carried = ""
+    control.select(f"G{code // 10}")
+
+
+def mind_carried(control: Sinumerik) -> None:
+    """The first motion after TRAORI or TRAFOOF: say it if the work offset has not been programmed anew."""
+    frames, name = control.frames, control.modes.carried
+    control.modes.carried = ""
+    if name and any(frames.settable.shift):
+        text = f"{frames.name} is taken to stay in force over {name}: where machine data take it out, nothing is right"
+        control.warn(CARRIED, text, f"program {frames.name} anew after {name}")
+
+
+def feed_mode(control: Sinumerik, code: int) -> None:
+    """G93, G94, G95, and G96, G961, G97, G971, which go with feeds per turn or minute; G962 goes with either."""
+    now = control.modal.feed_mode
+    mode = {960: 95, 970: 95, 9610: 94, 9620: now, 9710: 94}.get(code, code // 10)
+    if mode != now:
+        control.modal.feed, control.modal.feed_given = float("nan"), False
+    control.modal.feed_mode = mode
+    if code in (960, 9610, 9620) and not control.modes.said:
+        control.suspended["diameter"] = UNSAID
+
+
+def compensation(control: Sinumerik, code: int) -> None:
+    """G40, G41, G42."""
+    if code == 400:
+        control.end_compensation()
+    else:
+        control.modal.compensated = code // 10
+
+
+# -- tools ------------------------------------------------------------------------------------------------------------
+
+
+def tool(control: Sinumerik, words: Words, change: bool, at_once: bool) -> None:
+    """T, D and M6: `at_once` where the program has no M6, so that T itself changes the tool."""
+    called, edge = "T" in words.values or "T" in words.texts, "D" in words.values
+    if called and not call_tool(control, words):
+        return
+    if at_once and control.changed_by_cycle and not change and not edge:
+        control.suspended["tool"] = WHO_CHANGES
+        return
+    if change or (at_once and called):
+        into_spindle(control)
+    if edge and not choose_edge(control, words):
+        return
+    if change or at_once or edge:
+        control.at_start = False
+        set_length(control)
+
+
+def call_tool(control: Sinumerik, words: Words) -> bool:
+    """T: the tool that is changed next; False where that is not known."""
+    control.fresh_tool = True
+    name, value = words.texts.get("T"), words.values.get("T")
+    if name is None and value is None:
+        control.refusal = control.refusal or "the tool (T) is known only at run time"
+        return False
+    control.tools.selected = control.named.number(name) if name is not None else round(value or 0.0)
+    return True
+
+
+def choose_edge(control: Sinumerik, words: Words) -> bool:
+    """D: the cutting edge in force; False where that is not known."""
+    value = words.values["D"]
+    if value is None:
+        control.refusal = control.refusal or "the cutting edge (D) is known only at run time"
+        return False
+    control.edge = round(value)
+    return True
+
+
+def into_spindle(control: Sinumerik) -> None:
+    """The tool that is selected comes into the spindle, with its edge D1."""
+    control.suspended.pop("tool", None)
+    control.tools.spindle = control.tools.selected
+    control.edge = 1
+    control.places.lose(mask_of(control.machine))
+
+
+def take_up(control: Sinumerik) -> None:
+    """The program moves before it has called a tool or an edge: that in the spindle is in force, with its edge D1."""
+    if not control.at_start:
+        return
+    control.at_start = False
+    vector: Vector = zeros()
+    vector[2] = control.knowledge.tool_length(0)
+    control.tools.offset = 0
+    before = control.footing
+    control.switch_tcp(vector)
+    had_from_the_start(control, before)
+
+
+def set_length(control: Sinumerik) -> None:
+    """The length of the tool in force, across the plane: the position stays, its name changes."""
+    if control.at_start:
+        return
+    number, edge = control.tools.spindle, control.edge
+    length = control.length_of(number, edge) if edge and number else 0.0
+    vector: Vector = zeros()
+    across = control.modal.plane.across
+    constant = control.variables.value(LENGTH_ACROSS)
+    control.suspended.pop("length", None)
+    if across == 2 or constant == 17.0:
+        vector[2] = length
+    elif length and constant is None:
+        control.suspended["length"] = PLANE_LENGTH
+    else:
+        vector[across] = length
+    control.tools.offset = number if edge and number else None
+    control.switch_tcp(vector)

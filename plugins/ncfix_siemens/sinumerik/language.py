@@ -1,0 +1,109 @@
+"""SINUMERIK as a `Language`."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.finish import finished
+from ncfix.control.flat_lines import FlatLines
+from ncfix.control.flatten import FlatLine
+from ncfix.control.moves import Moves, Trace
+from ncfix.text.language import ArcLayout, BulkLayout, Language, Run
+from ncfix.text.layout import arc_layout, bulk_layout
+from ncfix.text.reach import whole_text
+from ncfix.text.shapes import split_blocks
+from ncfix.text.tree import Program, Word
+from ncfix.writer.pieces import Pieces
+from ncfix_siemens.sinumerik.blocks import parse_block
+from ncfix_siemens.sinumerik.following import SinumerikFollower, runs_straight_on
+from ncfix_siemens.sinumerik.hole_text import render
+from ncfix_siemens.sinumerik.interpreter import Interpreter
+from ncfix_siemens.sinumerik.layout import SinumerikLayout, layout_of
+from ncfix_siemens.sinumerik.numbering import renumbered
+from ncfix_siemens.sinumerik.orientation import VECTOR
+from ncfix_siemens.sinumerik.plans import fixed_centre
+from ncfix_siemens.sinumerik.scanning import scan
+from ncfix_siemens.sinumerik.state import Sinumerik
+from ncfix_siemens.sinumerik.unroll import Recorder
+
+SPATIAL = frozenset("XYZ")
+
+
+def following(program: Program, run: Run) -> Interpreter:
+    """The control's walk through a program, before its first step."""
+    control = Sinumerik(run, program.dialect)
+    return Interpreter(control, program, run.resolve, run.budget(program))
+
+
+def follow(program: Program, run: Run) -> Trace:
+    """The motions of a program of this family; raises what `trace` does."""
+    walk = following(program, run)
+    return finished(walk.control, program, walk.run())
+
+
+def unroll(program: Program, run: Run, steps: Mapping[str, float], limit: int) -> Sequence[FlatLine]:
+    """The blocks of a program of this family as they are executed."""
+    return following(program, run).unrolled(Recorder(steps, FlatLines(limit)))
+
+
+def in_bulk(program: Program, block: int) -> BulkLayout | None:
+    """What is needed to write motions like that of a block many at a time; None if they need the renderer."""
+    layout = layout_of(program, block)
+    if layout is None or not layout.axes or layout.polar or layout.angles:
+        return None
+    if layout.points and not layout.axes.keys() <= SPATIAL:
+        return None
+    found = bulk_layout(program, block, layout)
+    further = not (layout.after or layout.prefix or layout.points)
+    return found and replace(found, further=further, led=layout.points, arc=arc_in_bulk(program, block, layout))
+
+
+def arc_in_bulk(program: Program, block: int, layout: SinumerikLayout) -> ArcLayout | None:
+    """The same of the words of an arc."""
+    fixed = fixed_centre(program.templates[int(program.template[block])])
+    if layout.via or layout.angle is not None:
+        return None
+    found = arc_layout(program, block, replace(layout, centre=without(layout.centre, fixed)))
+    return found and replace(found, centre={**found.centre, **fixed}, fixed=frozenset(fixed))
+
+
+def without(words: Mapping[str, Word], addresses: Container[str]) -> dict[str, Word]:
+    """Words but for those with some addresses."""
+    return {address: word for address, word in words.items() if address not in addresses}
+
+
+def one_by_one(program: Program, moves: Moves, pieces: Pieces, first_piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) motions that the renderer has to look at: a direction of the tool that changes, or that further pieces have.
+
+    One that is the same, and in one piece, leads the rotary axes to where the program has them.
+    """
+    shapes = [any(word.address in VECTOR for word in template.words) for template in program.templates]
+    pointed: NDArray[np.bool_] = np.array(shapes, dtype=np.bool_)[program.template[moves.block]]
+    if not pointed.any():
+        return pointed
+    last = first_piece[1:] - 1
+    turned = (pieces.end[last] != moves.end)[:, moves.rotary].any(axis=1)
+    found: NDArray[np.bool_] = pointed & (turned | (np.diff(first_piece) > 1))
+    return found
+
+
+SINUMERIK = Language(
+    split=split_blocks,
+    end=whole_text,
+    scan=scan,
+    parse=parse_block,
+    follow=follow,
+    layout=layout_of,
+    render=render,
+    arc_pieces=True,
+    unroll=unroll,
+    bulk=in_bulk,
+    one_by_one=one_by_one,
+    renumber=renumbered,
+    follower=SinumerikFollower,
+    straight=runs_straight_on,
+)

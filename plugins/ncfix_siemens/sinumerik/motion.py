@@ -1,0 +1,172 @@
+"""What one block moves: straight lines, arcs, machine coordinates, reference points, and what is not followed."""
+
+from __future__ import annotations
+
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
+from ncfix.control.moves import Kind
+from ncfix.control.passing import Pass, Passing
+from ncfix_siemens.sinumerik.circles import OF_ARCS, OF_CIP, arc, misled, through_point
+from ncfix_siemens.sinumerik.cycles import TO_A_HOLE, drill, hole_after
+from ncfix_siemens.sinumerik.destination import End, Leg, Words, destination, doubtful_polar, machine_destination
+from ncfix_siemens.sinumerik.framing import mind_carried, take_up
+from ncfix_siemens.sinumerik.orientation import oriented
+from ncfix_siemens.sinumerik.state import GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.tangents import tangential
+from ncfix_siemens.sinumerik.vocabulary import MOTIONS, UNFOLLOWED_MOTIONS
+
+MACHINE = "machine coordinates ({})"
+MEASURING = Passing(Pass.PROBING, "measuring (MEAS)")
+DWELL = Passing(Pass.DWELL, "dwell")
+AFTER_MEASURING = "where the axis {} stands after measuring is known only at run time"
+REFERENCE = {
+    code: Passing(Pass.REFERENCE_POINT, words)
+    for code, words in ((740, "reference point (G74)"), (750, "fixed point (G75)"))
+}
+AFTER_REFERENCE = "where the axis {} stands after a reference or fixed point is not given"
+SOFT_APPROACH = frozenset({1470, 1480, 2470, 2480, 3470, 3480})
+AFTER_APPROACH = "where the axis {} stands after a soft approach or retraction is not followed"
+CORNERS = frozenset({"RND", "CHF", "CHR"})
+"""Words with which the control rounds or breaks the corner at the end of the block."""
+
+CIP, CT = MOTIONS["cip"], MOTIONS["ct"]
+OTHER_WAYS = UNFOLLOWED_MOTIONS.keys() | {20, 30, CIP, CT}
+"""Motion codes with which an axis word is no straight motion."""
+
+
+TAKING = {20: ("G2", OF_ARCS), 30: ("G3", OF_ARCS), CIP: ("CIP", OF_CIP), CT: ("CT", frozenset({"TURN"}))}
+"""Motions that take words of arcs; centre words beside a straight motion lead nowhere."""
+
+WHERE_IT_ENDS = "where the axis {{}} stands is not known after this: {}"
+
+
+def moved(control: Sinumerik, words: Words, special: frozenset[str]) -> None:
+    """The motion of a block; `special` says what applies to this block only (`supa`, `meas`, ...)."""
+    code = control.modal.motion
+    if code in (0, 10):
+        control.modal.straight = code
+    take_up(control)
+    machine = next((name for name in ("supa", "g53", "g153") if name in special), "")
+    if not machine:
+        mind_carried(control)
+    corner = control.modes.rounds or not CORNERS.isdisjoint(words.values)
+    control.at_corner = not machine and (corner or control.cornered)
+    words.whole = control.at_corner or is_one_piece(control, words)
+    oriented(control, words)
+    drilling = control.modes.modal_cycle
+    if drilling is not None and not special and code not in OTHER_WAYS:
+        control.settle_all()
+        drill(control, words, destination(control, words), drilling, refusal=refusal_of(control, words), modal=True)
+    else:
+        words.refusal = words.refusal or (TO_A_HOLE if drilling is not None else "")
+        by_itself(control, words, special, machine)
+        if drilling is not None:
+            hole_after(control, words)
+    control.wrap()
+    control.cornered, control.at_corner = corner, False
+
+
+def by_itself(control: Sinumerik, words: Words, special: frozenset[str], machine: str) -> None:
+    """A motion with which nothing is drilled; `machine` says by which name it is in machine coordinates."""
+    if machine:
+        to_machine_position(control, words, machine.upper())
+    elif "meas" in special:
+        measure(control, words)
+    elif "soft" in special:
+        soft_approach(control, words)
+    else:
+        as_coded(control, words, control.modal.motion)
+
+
+def straight(control: Sinumerik, words: Words, code: int) -> None:
+    """G0 and G1."""
+    end = destination(control, words)
+    control.go(Leg(Kind.FEED if code else Kind.RAPID, words, end, code, refusal=refusal_of(control, words)))
+
+
+def is_one_piece(control: Sinumerik, words: Words) -> bool:
+    """Whether a motion must not be split: its time is another block's, or REPEAT would miss lines."""
+    timed = control.modal.feed_mode == 93 and control.modal.motion != 0 and "F" not in words.values
+    return timed or words.block in control.solitary
+
+
+def as_coded(control: Sinumerik, words: Words, code: int) -> None:
+    """The motion that the code in force makes of the words."""
+    name, taken = TAKING.get(code, (f"G{code // 10}", frozenset(CENTRE_LETTERS)))
+    why = "" if code in UNFOLLOWED_MOTIONS else misled(control, words, name, taken)
+    if why:
+        refused(control, words, code, why)
+        control.lose_axes(GEOMETRY, WHERE_IT_ENDS.format(why))
+    elif code in (20, 30):
+        arc(control, words, code)
+    elif code == CIP:
+        through_point(control, words, code)
+    elif code == CT:
+        tangential(control, words)
+    elif code in UNFOLLOWED_MOTIONS:
+        refused(control, words, code, UNFOLLOWED_MOTIONS[code])
+    else:
+        straight(control, words, 10 if code not in (0, 10) else code)
+
+
+def refusal_of(control: Sinumerik, words: Words) -> str:
+    """Why a straight motion is refused, though its end is known."""
+    if words.values.keys() & {"RND", "RNDM", "CHF", "CHR", "ANG"} and words.runtime("RND", "RNDM", "CHF", "CHR"):
+        return "a rounding or chamfer is known only at run time"
+    if "ANG" in words.values:
+        return "a contour that is given by an angle (ANG)"
+    return doubtful_polar(control, words)
+
+
+def refused(control: Sinumerik, words: Words, code: int, why: str) -> None:
+    """A motion that is followed only as far as its end."""
+    control.settle_all()
+    control.go(Leg(Kind.FEED, words, destination(control, words), code, refusal=why))
+
+
+def to_machine_position(control: Sinumerik, words: Words, name: str) -> None:
+    """SUPA, G53 and G153."""
+    end = machine_destination(control, words)
+    code = control.modal.motion if control.modal.motion in (0, 10) else control.modal.straight
+    kind = Kind.RAPID if code == 0 else Kind.FEED
+    control.go(
+        Leg(kind, words, end, code, passing=Passing(Pass.MACHINE_COORDINATES, MACHINE.format(name)), by_machine=True)
+    )
+
+
+def measure(control: Sinumerik, words: Words) -> None:
+    """MEAS: towards the words until the probe switches."""
+    end = destination(control, words)
+    gone = {i: AFTER_MEASURING for i in control.machine if end.target[i] != control.position[i] or i in end.unknown}
+    lost = end.lost | dict.fromkeys(spread(control, gone), AFTER_MEASURING)
+    ends = End(end.target, end.unknown | gone, lost)
+    control.go(Leg(Kind.FEED, words, ends, control.modal.motion, passing=MEASURING))
+
+
+def spread(control: Sinumerik, gone: dict[int, str]) -> list[int]:
+    """The coordinates of the program that are not known where these axes are not."""
+    hidden = control.is_rotated and any(index in GEOMETRY for index in gone)
+    return sorted(set(gone) | ({index for index in GEOMETRY if index in control.machine} if hidden else set()))
+
+
+def soft_approach(control: Sinumerik, words: Words) -> None:
+    """G147, G148 and their like: the control adds motions of its own."""
+    refused(control, words, control.modal.motion, "a soft approach or retraction (G147, G148, ...)")
+    control.lose_axes(GEOMETRY, AFTER_APPROACH)
+
+
+def to_reference(control: Sinumerik, words: Words, code: int) -> None:
+    """G74 and G75: the axes named, `X1=0` among them, go to a point that the machine knows."""
+    named = [INDEX[address[0]] for address in words.values if address[:1] in INDEX]
+    gone = tuple(index for index in dict.fromkeys(named) if index in control.machine)
+    unknown = dict(control.unknown) | dict.fromkeys(gone, AFTER_REFERENCE)
+    lost = dict(control.lost) | dict.fromkeys(spread(control, dict.fromkeys(gone, "")), AFTER_REFERENCE)
+    words = Words(words.block, {}, {}, sum(1 << index for index in gone))
+    end = End(control.position[:], unknown, lost)
+    control.go(Leg(Kind.RAPID, words, end, control.modal.motion, passing=REFERENCE[code], by_machine=True))
+
+
+def dwell(control: Sinumerik, words: Words) -> None:
+    """G4: F is seconds, S turns of the spindle."""
+    still = Words(words.block, {}, {}, 0)
+    end = End(control.position, control.unknown, control.lost)
+    control.go(Leg(Kind.DWELL, still, end, control.modal.motion, passing=DWELL))

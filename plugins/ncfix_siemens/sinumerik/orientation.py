@@ -1,0 +1,167 @@
+"""The direction of the tool as programs give it under TRAORI, and the plane of CYCLE800: made into rotary positions.
+
+A3 B3 C3 are a vector in the coordinates of the program, of any length; a component that is not written is zero. A2 B2
+C2 are angles by which a vector along Z is turned, in the sense that ORIEULER, ORIRPY or ORIRPY2 says, or machine data
+where none of them does. Which of two ways the rotary axes take is for the machine data, too: here it is the nearest.
+Source: Siemens, "SINUMERIK 840D sl, NC programming, job planning": orientation programming (TRAORI).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.coordinates import DEGREE, LETTERS, angles_in_words, product
+from ncfix.control.faults import Fault
+from ncfix.control.pointing import Pointing
+from ncfix.control.pointing_angles import Triple, dot
+from ncfix_siemens.sinumerik.affine import turned
+from ncfix_siemens.sinumerik.destination import Words
+from ncfix_siemens.sinumerik.directions import NO_LENGTH
+from ncfix_siemens.sinumerik.state import Sinumerik
+
+FloatArray = NDArray[np.float64]
+
+VECTOR = ("A3", "B3", "C3")
+ANGLES = ("A2", "B2", "C2")
+NORMALS = frozenset(["A4", "B4", "C4", "A5", "B5", "C5"])
+"""Normals of the surface: with them the control offsets the contour, and leads the tool along it with ORIPATH."""
+
+OTHERS = frozenset(["A6", "B6", "C6", "A7", "B7", "C7", "LEAD", "TILT", "THETA", "PSI", "PHI", "NUT"])
+"""Other ways to say how the tool stands, which are not followed."""
+
+BAD_VECTOR = "NCF254"
+WAY = "NCF253"
+AT_RUNTIME = "the direction of the tool is known only at run time"
+NO_KINEMATICS = "the direction of the tool needs the kinematics of a machine with two rotary axes"
+NOT_ON = "a direction of the tool is given while TRAORI is not on"
+NOT_FOLLOWED = "the tool is oriented in another way than by rotary axes or a vector ({})"
+MIXED = "the direction of the tool is given in more than one way"
+MEANT = '"$MC_ORIENTATION_IS_EULER"'
+WHICH_ANGLES = (
+    "whether A2 B2 C2 are Euler or roll-pitch-yaw angles is for ORIEULER or ORIRPY to say, or machine data: "
+    f"`variables.{MEANT} = 1` (or 0) in the setup file"
+)
+IN_MACHINE = "a direction of the tool in machine coordinates (ORIMKS) while the program's are turned"
+ALONG_PATH = "the tool turns with the path ({})"
+BY_AXES = "oriaxes"
+BY_PATH = "oripath"
+ON_CURVES = ("oricon", "oricurve", "oripath")
+BY_CURVE = "the tool turns on a cone, or after a curve ({})"
+
+FAR = math.radians(0.1)
+"""rad. The tool that turns in a plane (ORIVECT) strays from where rotary axes of even speed would point it. The tip is
+not concerned, but pieces of a motion that strays by more would point it elsewhere than the whole: it is not split."""
+
+
+def oriented(control: Sinumerik, words: Words) -> None:
+    """Give the block the rotary words that its direction of the tool amounts to, or the reason why it is refused."""
+    if leads_along(control):
+        words.refuse(ALONG_PATH.format(control.modes.orientation.upper()), control.turning)
+        return
+    words.whole |= bool(NORMALS & words.values.keys())
+    others = sorted(OTHERS & words.values.keys())
+    ways = [way for way in (VECTOR, ANGLES) if any(address in words.values for address in way)]
+    if not others and not ways:
+        return
+    reason = NOT_FOLLOWED.format(others[0]) if others else MIXED if len(ways) > 1 else by_direction(control, words)
+    if reason:
+        words.refuse(reason, control.turning)
+
+
+def leads_along(control: Sinumerik) -> bool:
+    """Whether each motion turns the tool, as the path turns."""
+    return control.modes.transformed and control.modes.orientation.startswith(BY_PATH)
+
+
+def by_direction(control: Sinumerik, words: Words) -> str:
+    """Take A3 B3 C3 or A2 B2 C2; why the motion is refused, if it is."""
+    if not control.modes.transformed:
+        return NOT_ON
+    if words.runtime(*VECTOR, *ANGLES):
+        return AT_RUNTIME
+    if control.modes.orientation_in_machine and control.is_rotated:
+        return IN_MACHINE
+    if control.modes.orientation.startswith(ON_CURVES):
+        return BY_CURVE.format(control.modes.orientation.upper())
+    pointing = control.pointing
+    if pointing is None:
+        return NO_KINEMATICS
+    wanted = by_angles(control, words) if any(address in words.values for address in ANGLES) else by_vector(words)
+    if wanted is None:
+        return WHICH_ANGLES
+    control.settle_all()
+    columns = [control.machine[column] for column in pointing.columns]
+    if any(index in control.unknown for index in columns):
+        return f"where the axis {LETTERS[columns[0]]} stands before the tool is turned is not known"
+    here = control.position[columns[0]], control.position[columns[1]]
+    ways = pointing.angles(direction_of(control, wanted), here)
+    if not ways:
+        raise Fault(BAD_VECTOR, "the rotary axes cannot point the tool in this direction")
+    note_choice(control, pointing, here, ways)
+    for index, angle in zip(columns, ways[0], strict=True):
+        words.values[LETTERS[index]] = (angle - control.offset[index]) / DEGREE
+        words.forms[LETTERS[index]] = "ac"
+        words.axes |= 1 << index
+    control.points = True
+    control.builder.says_the_way(sum(1 << index for index in columns))
+    even = control.modes.orientation == BY_AXES or control.modal.motion == 0
+    words.whole |= not even and pointing.stray(here, ways[0]) > FAR
+    return ""
+
+
+def by_vector(words: Words) -> Triple:
+    """A3 B3 C3."""
+    a, b, c = (words.get(address) for address in VECTOR)
+    return a, b, c
+
+
+def by_angles(control: Sinumerik, words: Words) -> Triple | None:
+    """The direction that A2 B2 C2 say, as a vector; None where nobody says how they are meant."""
+    euler = control.variables.value(MEANT.strip('"').lower())
+    default = "" if euler is None else "orieuler" if euler else "orirpy"
+    meant = control.modes.angles or default
+    if meant not in TURNS:
+        return None
+    turns = (turned({axis: words.get(address)}, axis).rotation for axis, address in TURNS[meant])
+    x, y, z = (row[2] for row in reduce(product, turns))
+    return x, y, z
+
+
+TURNS = {
+    "orieuler": (("Z", "A2"), ("X", "B2"), ("Z", "C2")),
+    "orirpy": (("Z", "C2"), ("Y", "B2"), ("X", "A2")),
+    "orirpy2": (("X", "A2"), ("Y", "B2"), ("Z", "C2")),
+}
+"""About which axis, as the turns before have left it, and by which word."""
+
+
+def direction_of(control: Sinumerik, vector: Triple) -> FloatArray:
+    """A vector of the program as a unit vector in the workpiece."""
+    size = math.hypot(*vector)
+    if size < NO_LENGTH:
+        raise Fault(BAD_VECTOR, "the direction of the tool (A3 B3 C3) has no length")
+    return np.array([dot(row, vector) / size for row in control.rotation])
+
+
+def is_choice(pointing: Pointing, here: tuple[float, float], ways: Sequence[tuple[float, float]]) -> bool:
+    """Whether the tool stands along the outer axis and is to leave it, so that either way would be as near."""
+    return len({*ways}) > 1 and pointing.at_pole(pointing.at(*here)) and not pointing.at_pole(pointing.at(*ways[0]))
+
+
+def note_choice(
+    control: Sinumerik, pointing: Pointing, here: tuple[float, float], ways: list[tuple[float, float]]
+) -> None:
+    """Say which way was taken where either would have been as near."""
+    if not is_choice(pointing, here, ways):
+        return
+    angles = angles_in_words([control.machine[column] for column in pointing.columns], ways[0])
+    control.warn(
+        WAY,
+        f"the tool is taken to turn to {angles}, the nearest of several ways",
+        "state the rotary axes in the program if the control turns them otherwise",
+    )

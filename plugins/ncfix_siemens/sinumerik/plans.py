@@ -1,0 +1,276 @@
+"""A plan for each shape of block: what its words, names and jumps are, as functions that give their values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+from ncfix.control.coordinates import CENTRE_LETTERS, INDEX
+from ncfix.control.lane_tables import Lane
+from ncfix.text.reach import Deletable, deletable
+from ncfix.text.tree import (
+    Assignment,
+    Binary,
+    Call,
+    Command,
+    Comment,
+    Constant,
+    Expression,
+    Flow,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Parameter,
+    Span,
+    Template,
+    Text,
+    Unary,
+    Word,
+)
+from ncfix_siemens.sinumerik.blocks import STATEMENT
+from ncfix_siemens.sinumerik.build import BRACKET
+from ncfix_siemens.sinumerik.values import Evaluate, compiled, nothing
+from ncfix_siemens.sinumerik.vocabulary import ABSOLUTE, FORMS
+
+DWELL_WORDS = "FS"
+"""With G4: how long."""
+LISTS = frozenset({BRACKET, "set", "rep"})
+"""What gives several elements their values."""
+
+ANY_PARAMETER = "r[]"
+LANE_LETTERS = INDEX.keys() | {"F", "N"}
+RADIUS = "CR"
+ARC_LETTERS = frozenset({*CENTRE_LETTERS, RADIUS})
+DIRECTION = ("A3", "B3", "C3")
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A word: its address, its value, and how it is meant (`ac`, `ic`, `dc`, ... or nothing)."""
+
+    address: str
+    value: Evaluate
+    form: str
+    span: Span
+
+    def unsure(self) -> Setting:
+        """The word with a value that nobody knows: its block sets a variable of it, before it reads it or after."""
+        return replace(self, value=nothing)
+
+
+@dataclass(frozen=True, slots=True)
+class Letting:
+    """A variable that gets a value: its name, the index if it is an element, and the value (None: a list).
+
+    listed    the values of a list, `SET(..)` or `REP(..)`
+    repeated  it is `REP`
+    """
+
+    name: str
+    index: tuple[Evaluate, ...]
+    value: Evaluate | None
+    span: Span
+    listed: tuple[Evaluate, ...] = ()
+    repeated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Calling:
+    """A name with the values of its arguments, and these as written."""
+
+    name: str
+    arguments: tuple[Evaluate, ...]
+    written: tuple[Expression | None, ...]
+    called: bool
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Branching:
+    """A control structure or jump."""
+
+    keyword: str
+    label: str
+    values: tuple[Evaluate, ...]
+    written: tuple[Expression, ...]
+    span: Span
+
+
+Step = Letting | Calling | Branching
+
+
+@dataclass(slots=True)
+class Plan:
+    """What is done with every block of a shape.
+
+    settings   words but G and M with plain codes, and N
+    steps      assignments, names, jumps, in the order written
+    g, m       codes in tenths
+    axes       bit mask of the axis words
+    skip       the switches of block delete that it begins with (`/` is `/0`)
+    opaque     kinds of text that is passed over or not understood
+    lane       set if the block may go through the fast lane
+    vector     the slots of A3 B3 C3, -1 for none, if a block for the fast lane has any of them
+    """
+
+    template: Template
+    settings: tuple[Setting, ...] = ()
+    steps: tuple[Step, ...] = ()
+    g: tuple[int, ...] = ()
+    m: tuple[int, ...] = ()
+    axes: int = 0
+    skip: Deletable | None = None
+    opaque: frozenset[str] = frozenset()
+    lane: Lane | None = None
+    vector: tuple[int, ...] | None = None
+    names: frozenset[str] = field(default=frozenset())
+
+
+def plan_of(template: Template) -> Plan:
+    """The plan for a shape."""
+    items = template.items
+    plan = Plan(template)
+    plan.settings = settings_of(template)
+    makers: dict[type, Callable[..., Step]] = {Assignment: letting, Command: calling, Flow: branching}
+    plan.steps = tuple(makers[type(item)](item) for item in items if type(item) in makers)
+    plan.g, plan.m = template.g_codes, template.m_codes
+    plan.axes = sum({1 << INDEX[each.address] for each in plan.settings if each.address in INDEX})
+    plan.skip = deletable(template, DWELL_WORDS)
+    plan.opaque = frozenset(item.kind for item in items if isinstance(item, Opaque))
+    plan.names = frozenset(step.name for step in plan.steps if isinstance(step, Calling))
+    plan.lane = lane_of(plan)
+    if plan.lane is not None and not template.slots.keys().isdisjoint(DIRECTION):
+        plan.vector = tuple(template.slots.get(address, -1) for address in DIRECTION)
+    return plan
+
+
+def settings_of(template: Template) -> tuple[Setting, ...]:
+    """The words of a block but N and plain codes; unsure where the block itself sets a variable that they name."""
+    words = [word for word in template.words if word.address not in ("N", ":") and not is_code(word)]
+    let = {name for item in template.items if isinstance(item, Assignment) for name in names_in(item.target)}
+    return tuple(setting(word).unsure() if names_one(let, word.value) else setting(word) for word in words)
+
+
+def is_code(word: Word) -> bool:
+    """Whether a word is G or M with a plain number."""
+    return word.address in ("G", "M") and isinstance(word.value, Constant)
+
+
+def setting(word: Word) -> Setting:
+    """A word with its value as a function."""
+    value = word.value
+    if isinstance(value, Call) and value.name in FORMS and not value.indexed:
+        inner = value.arguments[0] if value.arguments else None
+        return Setting(word.address, nothing if inner is None else compiled(inner), value.name, word.span)
+    return Setting(word.address, compiled(value), "", word.span)
+
+
+def names_one(names: set[str], expression: Expression) -> bool:
+    """Whether an expression may name one of these variables."""
+    named = set(names_in(expression))
+    if named & names:
+        return True
+    mine, theirs = (set(filter(is_parameter, each)) for each in (named, names))
+    return bool(mine and theirs) and ANY_PARAMETER in mine | theirs
+
+
+def is_parameter(name: str) -> bool:
+    """Whether it is an R parameter."""
+    return name == ANY_PARAMETER or (name[0] == "r" and name[1:].isdigit())
+
+
+def names_in(expression: Expression) -> Iterator[str]:
+    """The variables that an expression names; an R parameter with a computed number may be any."""
+    match expression:
+        case Parameter(Constant(number)):
+            yield f"r{number:g}"
+        case Parameter(index):
+            yield from (ANY_PARAMETER, *names_in(index))
+        case NamedParameter(name):
+            yield name
+        case Unary(_, operand):
+            yield from names_in(operand)
+        case Binary(_, left, right):
+            yield from (*names_in(left), *names_in(right))
+        case Call(name, arguments):
+            yield name
+            yield from (each for part in arguments if part is not None for each in names_in(part))
+
+
+def letting(item: Assignment) -> Letting:
+    """An assignment with its value as a function."""
+    name, index = target_of(item)
+    if isinstance(item.value, Call) and item.value.name in LISTS:
+        return Letting(name, index, None, item.span, evaluates(item.value.arguments), item.value.name == "rep")
+    return Letting(name, index, compiled(item.value), item.span)
+
+
+def target_of(item: Assignment) -> tuple[str, tuple[Evaluate, ...]]:
+    """The variable that gets a value, and the index if it is an element."""
+    match item.target:
+        case Parameter(number):
+            return "r", (compiled(number),)
+        case NamedParameter(name):
+            return name, ()
+        case Call(name, arguments):
+            return name, evaluates(arguments)
+    raise AssertionError("there are no other targets")
+
+
+def evaluates(arguments: tuple[Expression | None, ...]) -> tuple[Evaluate, ...]:
+    """Arguments as functions; those that are left out are known only at run time."""
+    return tuple(nothing if part is None else compiled(part) for part in arguments)
+
+
+def calling(item: Command) -> Calling:
+    """A name with its arguments as functions."""
+    return Calling(item.name, evaluates(item.arguments), item.arguments, item.called, item.span)
+
+
+def branching(item: Flow) -> Branching:
+    """A control structure with its values as functions."""
+    label = item.label if isinstance(item.label, str) else ""
+    return Branching(item.keyword, label, tuple(map(compiled, item.arguments)), item.arguments, item.span)
+
+
+def lane_of(plan: Plan) -> Lane | None:
+    """The fast lane's view of a plan, if the block is nothing but a straight motion or an arc with plain numbers."""
+    template, fixed = plan.template, fixed_centre(plan.template)
+    words, slots = [word for word in template.words if not is_code(word)], {**template.slots, **fixed}
+    if len(slots) < len(words) or not all(isinstance(item, Word | Comment) for item in template.items):
+        return None
+    pointed = not slots.keys().isdisjoint(DIRECTION)
+    round_ = not slots.keys().isdisjoint(ARC_LETTERS)
+    allowed = (LANE_LETTERS - set("ABC")) | set(DIRECTION) if pointed else LANE_LETTERS | ARC_LETTERS
+    if plan.m or plan.g not in (((), (20,), (30,)) if round_ else ((), (0,), (10,))) or not slots.keys() <= allowed:
+        return None
+    axes = tuple((INDEX[letter], slot) for letter, slot in slots.items() if letter in INDEX)
+    i, j, k = (slots.get(letter, -1) for letter in CENTRE_LETTERS)
+    motion, radius = plan.g[0] if plan.g else -1, slots.get(RADIUS, -1)
+    if radius >= 0 and max(i, j, k) >= 0:
+        return None
+    return Lane(axes, slots.get("F", -1), motion, (i, j, k), radius, ("I" in fixed, "J" in fixed, "K" in fixed))
+
+
+def fixed_centre(template: Template) -> dict[str, int]:
+    """The words of a centre that count from the origin, `I=AC(5)`: the slots of their numbers."""
+    found = {}
+    for word in template.words:
+        value = word.value
+        if word.address in CENTRE_LETTERS and isinstance(value, Call) and value.name == ABSOLUTE and not value.indexed:
+            match value.arguments:
+                case (Literal(slot),):
+                    found[word.address] = slot
+    return found
+
+
+def plain_text(expression: Expression | None) -> str | None:
+    """The text that an argument is, if it is one."""
+    while isinstance(expression, Unary):
+        expression = expression.operand
+    return expression.value if isinstance(expression, Text) else None
+
+
+def is_statement(plan: Plan) -> bool:
+    """Whether the block could not be understood."""
+    return STATEMENT in plan.opaque

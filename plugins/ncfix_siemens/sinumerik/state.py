@@ -1,0 +1,362 @@
+"""The control while it follows a program: frames, modes, tool, variables, and where the axes stand.
+
+Positions, motions, what is known and what is asked of the setup are those of all controls. SINUMERIK has of its own a
+chain of frames, and a book of what is not known that is kept in the coordinates of the program, since in a turned frame
+one unknown coordinate would hide three axes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ncfix.control import rollover, tcp
+from ncfix.control.control import Control
+from ncfix.control.coordinates import DEGREE, INDEX, LETTERS, Vector, X, Y, Z, transposed, zeros
+from ncfix.control.modal import Modal
+from ncfix.control.motion import AT_START, Motion, Unknown
+from ncfix.control.moves import Kind, Rule
+from ncfix.control.passing import Pass
+from ncfix.control.places import mask_of
+from ncfix.control.setup import Tool
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+from ncfix_siemens.sinumerik import heading
+from ncfix_siemens.sinumerik.affine import WORLD, shifted
+from ncfix_siemens.sinumerik.increments import Footing, footings, stand
+from ncfix_siemens.sinumerik.modes import Frames, Modes, Named
+from ncfix_siemens.sinumerik.values import Value
+from ncfix_siemens.sinumerik.variables import Variables, key_of
+from ncfix_siemens.sinumerik.vocabulary import TURNING
+
+if TYPE_CHECKING:
+    from ncfix_siemens.sinumerik.destination import Leg, Words
+
+GEOMETRY = (X, Y, Z)
+TURNED = "where the axis {} stands in the turned coordinates is not known"
+RUNTIME_OFFSET = "the offset of the axis {} is known only at run time"
+
+RESET_OF_DIAMETER = "$MC_GCODE_RESET_VALUES[28]"
+"""Machine data: which of `DIAMETERS` is in force at the start."""
+
+DIAMETERS: Mapping[Value, str] = {1.0: "diamof", 2.0: "diamon", 3.0: "diam90"}
+
+
+class Sinumerik(Control):
+    """Everything that the steps of a block read and change.
+
+    lost        letter index -> why that coordinate of the program's frame is not known
+    over        rotary axes that the last motion took past a full turn
+    edge        cutting edge in force (D), 0 for none
+    allowance   what contours are offset by besides the radius of the tool (OFFN), mm; NaN where that is not known
+    at_start    the tool is still that with which the program began, with its edge D1
+    whole       the motion must not be split
+    cornered    the last motion ended at a corner that the control rounds or breaks
+    pattern     the places to which the last pattern of holes has led
+    solitary    blocks after which no line may be put, since REPEAT would leave it out
+    fresh_tool  a tool has been called since the last motion
+    changed_by_cycle  a name that is not known has followed a call of a tool at once, or a number (L6) one at any time:
+                it may be what changes the tool
+    counted     for each letter what its numbers counted from when the axis was last brought somewhere
+    footing     the same of the frames that are in force now
+    stated      the motion code is what the program itself has said, not what something that is not followed may leave
+    heading     in which direction of the program's frame the last motion ended (X Y Z); None where that is not known
+    """
+
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect)
+        self.frames = Frames()
+        self.modes = Modes()
+        self.lost: Unknown = {}
+        self.over: tuple[int, ...] = ()
+        self.edge = 0
+        self.allowance = 0.0
+        self.at_start = True
+        self.fresh_tool = self.changed_by_cycle = False
+        self.pattern: tuple[tuple[float, float], ...] = ()
+        self.heading: Sequence[float] | None = None
+        self.whole = self.cornered = False
+        self.stated = True
+        self.solitary: frozenset[int] = frozenset()
+        self.variables = Variables.given(run.setup.variables)
+        self.named = Named()
+        self.refresh()
+        self.lost = dict(self.unknown)
+        self.counted: list[Footing] = list(self.footing)
+        rollover.watch(self)
+        self.builder.winding = rollover.Winding(np.zeros(len(run.axes), dtype=np.bool_))
+        at_start = DIAMETERS.get(self.variables.value(key_of(RESET_OF_DIAMETER)))
+        if at_start:
+            self.count_in(at_start)
+
+    def count_in(self, name: str) -> None:
+        """DIAMON, DIAM90 or DIAMOF, in lower case: X counts in diameters or not."""
+        self.modes.diameter = "" if name == "diamof" else name.upper()
+        self.modes.said, self.modal.diameter = True, name != "diamof"
+        self.suspended.pop("diameter", None)
+        self.refresh()
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Compose the frames; to be called after any of them, the unit, the tool or the diameter mode has changed."""
+        whole = self.frames.whole
+        before = self.rotation
+        tool = zeros() if self.tcp else self.offsets.tool
+        self.offset: Vector = [a + b for a, b in zip(whole.shift, tool, strict=True)]
+        self.rotation = whole.rotation
+        self.is_rotated = self.rotation != WORLD.rotation
+        self.inverse = transposed(self.rotation)
+        self.stretch = self.modal.unit * whole.scale
+        self.scale = [DEGREE if turning else self.stretch for turning in self.rotary]
+        if self.modal.diameter:
+            self.scale[0] /= 2
+        self._frame = -1
+        self.footing = footings(self, whole)
+        if self.rotation != before:
+            self.hide_in_turned_frame()
+        self.places.watch(self.anchors(), self.rotation)
+
+    def anchors(self) -> list[Hashable]:
+        """As for all controls, but shifts of the programmable frame (TRANS) are stated by the program."""
+        frames, tool = self.frames, zeros() if self.tcp else self.offsets.tool
+        return [
+            (frames.name, frames.settable.shift[i], frames.swivel.shift[i], tool[i], self.spatial_anchor(i))
+            for i in range(len(LETTERS))
+        ]
+
+    def spatial_anchor(self, index: int) -> Hashable:
+        """Whether these are coordinates of the tip, and the edge that is in force across the plane."""
+        if index not in GEOMETRY:
+            return None
+        return self.tcp, (self.tools.offset, self.edge) if self.tcp or index == Z else None
+
+    def hide_in_turned_frame(self) -> None:
+        """Coordinates of a frame that has just been turned are known if all of them are."""
+        mine = {index: why for index, why in self.lost.items() if index not in GEOMETRY}
+        hidden = [index for index in GEOMETRY if index in self.unknown]
+        if hidden and self.is_rotated:
+            self.lost = mine | {index: TURNED for index in GEOMETRY if index in self.machine}
+        else:
+            self.lost = mine | {index: self.unknown[index] for index in hidden}
+
+    @property
+    def frame(self) -> int:
+        """The index of the frame that is in force."""
+        if self._frame < 0:
+            self._frame = self.builder.frame(self.offset, self.rotation, self.stretch, self.modal.diameter)
+        return self._frame
+
+    def unit_of(self, index: int) -> float:
+        """mm or rad per program unit of an axis, X not as a diameter."""
+        return DEGREE if self.rotary[index] else self.stretch
+
+    def select(self, name: str) -> None:
+        """A settable frame comes into force."""
+        self.frames.name = name
+        given = self.setup.work_offsets.get(name, {})
+        stored = {INDEX[letter]: value * self.of_setup(letter) for letter, value in given.items()}
+        self.frames.settable = shifted(stored)
+        for index, letter in enumerate(LETTERS):
+            key = f"$p_uifr_{name.lower()}", (float(index),)
+            value = self.variables.shared.get(key, 0.0)
+            if key in self.variables.shared:
+                self.places.shift(1 << index)
+            if value is None and index in self.machine:
+                self.shaky[index] = RUNTIME_OFFSET
+            elif letter in given:
+                self.shaky.pop(index, None)
+        self.offset_checked = False
+        self.refresh()
+
+    def of_setup(self, letter: str) -> float:
+        """mm or rad per unit of the setup."""
+        return DEGREE if self.rotary[INDEX[letter]] else 1.0
+
+    def check_offset(self) -> None:
+        """The settable frame is used: it is given, or lacking."""
+        if self.offset_checked:
+            return
+        self.offset_checked = True
+        if self.frames.name not in self.setup.work_offsets:
+            self.knowledge.work_offset(self.frames.name)
+
+    def restore(self, modal: Modal, modes: Modes, frames: Frames) -> None:
+        """Bring back what was in force before a subprogram that says SAVE."""
+        motion, straight, feed = self.modal.motion, self.modal.straight, self.modal.feed
+        self.modal, self.frames = modal, frames
+        self.modal.motion, self.modal.straight, self.modal.feed = motion, straight, feed
+        transformed, swivelled = self.modes.transformed, self.modes.swivelled
+        self.modes = modes
+        self.modes.transformed, self.modes.swivelled = transformed, swivelled
+        self.refresh()
+
+    # -- tool-centre-point control ------------------------------------------------------------------------------------
+
+    def switch_tcp(self, tool: Vector | None = None) -> None:
+        """Take TRAORI, a swivelled plane or another tool into force: the machine stands still, its tip may not."""
+        on = self.setup.tcp or self.modes.transformed or self.modes.swivelled
+        new = self.offsets.tool if tool is None else tool
+        if on or self.tcp:
+            known = dict(self.unknown)
+            tcp.switch(self, new, on)
+            self.lost |= {index: why for index, why in self.unknown.items() if index not in known}
+        self.tcp = on
+        self.offsets.tool = new
+        self.refresh()
+
+    # -- what is known ------------------------------------------------------------------------------------------------
+
+    def lose_all(self, reason: str) -> None:
+        """No axis stands where it is known to from here on; `reason` has a `{}` for the axis letter.
+
+        Nor is the motion code known to be what it was.
+        """
+        self.stated = False
+        self.lose_axes(self.machine, reason)
+
+    def lose_axes(self, indices: tuple[int, ...], reason: str) -> None:
+        """These axes stand somewhere that is not known from here on."""
+        self.lose(indices, reason)
+        gone = {index for index in indices if index in self.machine}
+        if self.is_rotated and gone & set(GEOMETRY):
+            gone |= {index for index in GEOMETRY if index in self.machine}
+        self.lost |= dict.fromkeys(sorted(gone), reason)
+
+    def settle_all(self) -> None:
+        """All start positions matter: they are given, or lacking and taken as zero."""
+        self.settle(tuple(self.unknown))
+        self.forget_settled()
+
+    def forget_settled(self) -> None:
+        """Coordinates whose start position has been asked for are known."""
+        self.lost = {index: why for index, why in self.lost.items() if why is not AT_START or index in self.unknown}
+
+    def unknown_for(self, lost: Unknown) -> Unknown:
+        """Which axes are not known where these coordinates of the program's frame are not."""
+        if not lost:
+            return {}
+        unknown = {index: why for index, why in lost.items() if index not in GEOMETRY}
+        for index in GEOMETRY:
+            mixed = [k for k in GEOMETRY if self.rotation[index][k] != 0.0 and k in lost]
+            if mixed and index in self.machine:
+                unknown[index] = lost[mixed[0]]
+        return unknown
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def go(self, leg: Leg) -> None:
+        """Make a motion of a block, and keep where it leads in coordinates of the program."""
+        words, end = leg.words, leg.end
+        axes, settles = self._axes_of(words), leg.settles
+        if settles is None:
+            settles = 0 if leg.passing else axes & ~mask_of(self.counted_words(words))
+        self.lost, self.fresh_tool = end.lost, False
+        refusal, self.whole = leg.refusal or words.refusal, words.whole or self._passes_zero(words, end.target)
+        sure = (letter for letter, form in words.forms.items() if form in TURNING and letter in INDEX)
+        self.builder.says_the_way(mask_of(INDEX[letter] for letter in sure))
+        follows = not leg.passing and not refusal
+        if follows:
+            self.ask_for_length()
+        heading.note(self, leg, follows=follows)
+        self.make(Motion(leg.kind, axes, end.target, end.unknown, leg.code, refusal, leg.passing, leg.arc, settles))
+        self.whole = False
+        stand(self, axes, by_machine=leg.by_machine)
+        self.forget_settled()
+
+    def _axes_of(self, words: Words) -> int:
+        """The axes that a block names, as bits: polar coordinates name both axes of the plane."""
+        plane = self.modal.plane
+        return words.axes | (1 << plane.first | 1 << plane.second if words.values.keys() & {"AP", "RP"} else 0)
+
+    def _lost_at_end(self, motion: Motion) -> Unknown:
+        """As for all controls; the book of turned coordinates is `lost`."""
+        return self.lost if self.is_rotated else motion.unknown
+
+    def _leaves_unknown(self, rapid: Motion) -> bool:
+        """As for all controls; whether it is a rapid, the program has to have said."""
+        return self.stated and super()._leaves_unknown(rapid)
+
+    def counted_words(self, words: Words) -> list[int]:
+        """The axes whose words count from where they stand."""
+        forms = {index: words.forms.get(letter, "") for letter, index in INDEX.items() if letter in words.values}
+        return [index for index, form in forms.items() if form == "ic" or (not form and self.modal.incremental)]
+
+    def ends_in_hole(self, motion: Motion) -> bool:
+        """As of every control; a modal cycle (MCALL) drills where motions end."""
+        return super().ends_in_hole(motion) or self.modes.modal_cycle is not None
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
+        index = super()._style(kind, rule, reason, code, passing)
+        held = self.modes.swivelled and not self.modes.transformed
+        if not held and not self.whole:
+            return index
+        style = self.builder.styles[index]
+        return self.builder.style(style._replace(held=held, compensated=style.compensated or self.whole))
+
+    def _passes_zero(self, words: Words, target: Vector) -> bool:
+        """Whether DC, ACP, ACN or IC leads an axis past a full turn: then pieces of the way would count otherwise."""
+        turn, endless = 2 * math.pi, self.builder.endless
+        steps = [] if self.modal.incremental else [index for index in self.counted_words(words) if endless >> index & 1]
+        places = ((self.position[index], target[index]) for index in (*self.over, *steps))
+        return any(not 0 <= place < turn for pair in places for place in pair)
+
+    def wrap(self) -> None:
+        """A rotary axis that went past a full turn with DC, ACP or ACN counts from 0 to 360 degrees again."""
+        if self.over:
+            self.position = [
+                value % (2 * math.pi) if index in self.over else value for index, value in enumerate(self.position)
+            ]
+            self.over = ()
+
+    # -- tools --------------------------------------------------------------------------------------------------------
+
+    def length_of(self, number: int, edge: int) -> float:
+        """The length of a tool for its cutting edge, mm; zero if it is lacking."""
+        if number == 0:
+            return 0.0
+        name = self.named.name(number) if edge == 1 else f"{self.named.name(number)} D{edge}"
+        known = self.given_length(number, edge)
+        if known is None:
+            self.knowledge.lack("NCF202", f"length of tool {name}", "is used", f'--tool "{name}"=LENGTH')
+            return 0.0
+        return known
+
+    def ask_for_length(self) -> None:
+        """A tool called by name that moves without its length offset: the machine's errors may depend on its length."""
+        number = self.tools.spindle
+        if self.tools.offset is None and self.named.name(number) != str(number) and self.given_length(number) is None:
+            self.length_of(number, 1)
+
+    def given_length(self, number: int, edge: int = 1) -> float | None:
+        """The length of a tool, mm, if the setup gives it."""
+        tool = self._given(number, edge)
+        return None if tool is None else tool.length
+
+    def tool_radius(self) -> float:
+        """As of every control; of the cutting edge in force, and with the allowance of the contour (OFFN)."""
+        tool = self._given(self.tools.spindle, self.edge)
+        return math.nan if tool is None or tool.radius is None else tool.radius + self.allowance
+
+    def _given(self, number: int, edge: int) -> Tool | None:
+        """A tool with one of its edges, if the setup has it."""
+        tools = self.setup.named_tools
+        name = self.named.name(number)
+        if edge != 1:
+            return tools.get(f"{name} D{edge}".upper())
+        return tools.get(name.upper()) if name in self.named.numbers else self.setup.tools.get(number)
+
+    def tool_length(self) -> tuple[int, float]:
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown.
+
+        With D0 a transformation leads the point where a tool of no length has its tip.
+        """
+        if self.tools.offset is not None:
+            return self.tools.offset, self.offsets.tool[2]
+        if self.tcp:
+            return self.tools.spindle, 0.0
+        known = self.given_length(self.tools.spindle)
+        return self.tools.spindle, math.nan if known is None else known

@@ -1,0 +1,357 @@
+"""What the codes and names of a block do, and in which order: settings first, then frames, tools, and the motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from ncfix.control.coordinates import INDEX
+from ncfix.control.faults import Fault
+from ncfix.text.tree import Call, Expression, NamedParameter
+from ncfix_siemens.sinumerik import framing, motion
+from ncfix_siemens.sinumerik.affine import WORLD
+from ncfix_siemens.sinumerik.calling import CALLED_BY_TEXT, Find, call_by_text, subprogram
+from ncfix_siemens.sinumerik.circles import VIA
+from ncfix_siemens.sinumerik.cycles import AFTER_CYCLE, cycle
+from ncfix_siemens.sinumerik.destination import Words, set_pole
+from ncfix_siemens.sinumerik.orientation import ANGLES, NORMALS, OTHERS, VECTOR
+from ncfix_siemens.sinumerik.plans import LISTS, Calling, Plan, evaluates
+from ncfix_siemens.sinumerik.state import DIAMETERS, GEOMETRY, Sinumerik
+from ncfix_siemens.sinumerik.swivel import swivel
+from ncfix_siemens.sinumerik.unit import Unit
+from ncfix_siemens.sinumerik.values import Evaluate, number
+from ncfix_siemens.sinumerik.vocabulary import (
+    DRILLING,
+    ENDED_BY,
+    HARMLESS,
+    MADE_BY_THE_CONTROL,
+    MOTIONS,
+    POLAR,
+    TURNS_OF_THE_TOOL,
+    UNFOLLOWED,
+    UNFOLLOWED_MOTIONS,
+)
+
+CONFLICT = "NCF208"
+FRAMES_STAY = "$mn_frame_geoax_change_mode"
+FRAME_OVER = (
+    "a programmed frame (TRANS, ROT, ...) was in force at {}, and whether it stays is for machine data: "
+    'program it anew, or variables."$MN_FRAME_GEOAX_CHANGE_MODE" = 1 in the setup file'
+)
+OTHER_TRANSFORMATION = "NCF257"
+SWITCHED_ON = (
+    "whether CYCLE832 switches TRAORI on depends on the version of the control: "
+    "older ones take that from its second argument"
+)
+AFTER_RESET = "where the axis {} stands after ORIRESET is for machine data"
+_PASSED = """
+    G9 G60 G64 G140 G141 G142 G143 G340 G341 G450 G451 G460 G461 G462 G601 G602 G603 G621 G641 G642 G643 G644 G645
+    G972 G973 G290 G471 G472
+"""
+PASSED = frozenset(10 * int(code[1:]) for code in _PASSED.split())
+"""G codes that change nothing of where axes go."""
+
+Handler = Callable[[Sinumerik, int], None]
+SETTINGS: dict[int, Handler] = {
+    **dict.fromkeys((170, 180, 190), framing.plane),
+    **dict.fromkeys((700, 710, 7000, 7100), framing.units),
+    **dict.fromkeys((930, 940, 950, 960, 9610, 9620, 970, 9710), framing.feed_mode),
+    **dict.fromkeys((400, 410, 420), framing.compensation),
+    **dict.fromkeys((540, 550, 560, 570, 5000, *range(5050, 6000, 10)), framing.settable),
+}
+MOVING = frozenset({"AP", "RP", "ANG", *VECTOR, *ANGLES}) | NORMALS | OTHERS
+"""Words that make a block move even where no axis is named."""
+
+ANGLE_KINDS = frozenset({"orieuler", "orirpy", "orirpy2", "orivirt1", "orivirt2"})
+"""What A2 B2 C2 are: the names of one group of G codes."""
+
+CIRCLE = frozenset({"I", "J", "K", "AR", "TURN", "CR"})
+"""Those that do it while G2 or G3 is in force; the point on the way, while CIP is."""
+
+STRAIGHT_AND_ARCS = frozenset({0, 10, 20, 30})
+
+FOR_THIS_BLOCK = {530: "g53", 1530: "g153"} | dict.fromkeys(motion.SOFT_APPROACH, "soft")
+POLES = frozenset({1100, 1110, 1120})
+TAKES_WORDS = frozenset({40, 740, 750, 250, 260, 580, 590}) | POLES
+
+
+@dataclass(slots=True)
+class Turn:
+    """One block while it is executed.
+
+    at_once     T itself changes the tool
+    special     what applies to this block only: `supa`, `g53`, `meas`, `soft`
+    frame       the name of a frame instruction, which takes the axis words
+    subprogram  what is called after the block, with its arguments, so many times; `called` is the name that does it
+    elsewhere   the number that is called after the block, and is no subprogram at hand
+    modal       MCALL stands in the block
+    ends        RET stands in the block
+    used        something takes the axis words for itself
+    """
+
+    words: Words
+    plan: Plan
+    at_once: bool
+    special: set[str] = field(default_factory=set)
+    frame: str = ""
+    subprogram: Unit | None = None
+    called: Calling | None = None
+    arguments: tuple[Evaluate, ...] = ()
+    written: tuple[Expression | None, ...] = ()
+    times: int = 1
+    elsewhere: str = ""
+    modal: bool = False
+    ends: bool = False
+    used: bool = False
+
+    @property
+    def m(self) -> set[int]:
+        """The M codes of the block in tenths, `M=6` among them."""
+        value = self.words.values.get("M")
+        return {*self.plan.m} if value is None else {*self.plan.m, round(10 * value)}
+
+
+# -- names ------------------------------------------------------------------------------------------------------------
+
+
+def act(control: Sinumerik, turn: Turn, step: Calling, find: Find) -> None:
+    """Do what a name says, as far as it does not wait for the words of the block."""
+    name = step.name
+    if name in SPECIAL:
+        SPECIAL[name](control, turn, step)
+    elif name in framing.PROGRAMMABLE:
+        turn.frame = name
+    elif name in MOTIONS:
+        control.modal.motion, control.stated = MOTIONS[name], True
+    elif name in DIAMETERS.values():
+        control.count_in(name)
+    elif name in CALLED_BY_TEXT and call_by_text(turn, step, find):
+        return
+    elif name == "cycle832":
+        tolerance(control, step)
+    elif name in UNFOLLOWED:
+        control.suspended[name] = f"{UNFOLLOWED[name]} is in force, which ncfix does not follow"
+    elif name in ("orimks", "oriwks"):
+        control.modes.orientation_in_machine = name == "orimks"
+    elif name in ANGLE_KINDS:
+        control.modes.angles = name
+    elif name in TURNS_OF_THE_TOOL:
+        control.modes.orientation = name
+    elif name == "orireset":
+        control.lose_all(AFTER_RESET)
+    elif name in HARMLESS:
+        return
+    elif name == "cycle800":
+        swivel(control, turn.words.block, step)
+    elif name in DRILLING or name in MADE_BY_THE_CONTROL:
+        cycle(control, turn.words, step, modal=turn.modal)
+    else:
+        subprogram(control, turn, step, find)
+
+
+def supa(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """SUPA: this block goes in machine coordinates."""
+    turn.special.add("supa")
+
+
+def transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TRAORI."""
+    mind_frame(control, step)
+    control.suspended.pop("traori", None)
+    if len(step.written) > 1:
+        control.suspended["traori"] = "TRAORI with a direction of the tool of its own is in force"
+    number_of = number(step.arguments[0](control)) if step.written else None
+    if number_of is not None and number_of != 1.0:
+        text = f"TRAORI({number_of:g}) is taken as the kinematics of the machine file"
+        control.warn(OTHER_TRANSFORMATION, text, "check that the machine file is that of this transformation")
+    control.modes.transformed = True
+    control.switch_tcp()
+
+
+def tolerance(control: Sinumerik, step: Calling) -> None:
+    """CYCLE832: older controls take the third digit of its second argument as that of a transformation."""
+    kind = number(step.arguments[1](control)) if len(step.arguments) > 1 else None
+    if kind is not None and round(kind) // 100 % 10 and not control.modes.transformed:
+        control.suspended["traori"] = SWITCHED_ON
+
+
+def mind_frame(control: Sinumerik, step: Calling) -> None:
+    """A programmed frame is in force while a transformation goes on or off: machine data say whether it stays."""
+    if control.frames.program != WORLD and control.variables.value(FRAMES_STAY) != 1.0:
+        control.suspended["frame"] = FRAME_OVER.format(step.name.upper())
+    control.modes.carried = step.name.upper()
+
+
+def no_transformation(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TRAFOOF."""
+    if control.modes.transformed:
+        mind_frame(control, step)
+    control.modes.transformed = False
+    end_unfollowed(control, turn, step)
+    control.switch_tcp()
+
+
+def end_unfollowed(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """TRAFOOF, TOROTOF, PAROTOF, CP: what they end is not in force any more."""
+    over = ENDED_BY[step.name] & control.suspended.keys()
+    for name in over:
+        del control.suspended[name]
+    if over:
+        control.lose_all(framing.AFTER_UNFOLLOWED)
+
+
+def modal_call(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """MCALL: what follows it is called after each motion; alone it ends that."""
+    turn.modal = True
+    control.modes.modal_cycle = None
+    if control.suspended.pop("cycle", None):
+        control.lose_all(AFTER_CYCLE)
+
+
+def define(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """DEF."""
+    if not step.arguments:
+        raise Fault("NCF110", "DEF has no type and no name", "DEF REAL NAME, at the beginning of a block")
+    kind = str(step.arguments[0](control))
+    for place in range(1, len(step.written), 2):
+        variable, value = step.written[place], step.written[place + 1]
+        assert isinstance(variable, NamedParameter | Call)
+        control.variables.define(kind, variable.name, sizes_of(control, variable))
+        if isinstance(value, Call) and value.name in LISTS:
+            values = [each(control) for each in evaluates(value.arguments)]
+            start = (0.0,) * len(control.variables.scopes[-1].sizes[variable.name])
+            control.variables.fill(variable.name, start, values, repeated=value.name == "rep")
+        elif isinstance(variable, Call) and value is not None:
+            control.variables.forget(variable.name)
+        elif value is not None:
+            control.variables.assign(variable.name, step.arguments[place + 1](control))
+
+
+def sizes_of(control: Sinumerik, variable: NamedParameter | Call) -> tuple[int, ...]:
+    """How many elements an array has; none for a plain variable, and where that is known only at run time."""
+    if isinstance(variable, NamedParameter):
+        return ()
+    found = [number(part(control)) for part in evaluates(variable.arguments)]
+    return tuple(int(size) for size in found if size is not None) if None not in found else ()
+
+
+def come_back(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """RET."""
+    turn.ends = True
+
+
+def measure(control: Sinumerik, turn: Turn, step: Calling) -> None:
+    """MEAS and MEAW without a value stand with a motion."""
+    turn.special.add("meas")
+
+
+SPECIAL: dict[str, Callable[[Sinumerik, Turn, Calling], None]] = {
+    "supa": supa,
+    "traori": transformation,
+    "trafoof": no_transformation,
+    "mcall": modal_call,
+    "def": define,
+    "ret": come_back,
+    "meas": measure,
+    "meaw": measure,
+    **dict.fromkeys(ENDED_BY.keys() - {"trafoof"}, end_unfollowed),
+}
+
+
+# -- the block --------------------------------------------------------------------------------------------------------
+
+
+def finish_block(control: Sinumerik, turn: Turn) -> None:
+    """Codes and words of the block, and its motion."""
+    words, plan = turn.words, turn.plan
+    if "G" in words.values:
+        control.refusal = control.refusal or "a G code that is computed (G=..) is not followed"
+    codes(control, turn)
+    if turn.frame:
+        framing.programmable(control, turn.frame, words)
+        return
+    framing.tool(control, words, 60 in turn.m, turn.at_once and bool(words.values.keys() & {"T"} or words.texts))
+    feed(control, turn)
+    if "OFFN" in words.values:
+        allowance = words.values["OFFN"]
+        control.allowance = math.nan if allowance is None else control.modal.unit * allowance
+    if "RNDM" in words.values:
+        control.modes.rounds = words.values["RNDM"] != 0.0
+    if motion.REFERENCE.keys().isdisjoint(plan.g):
+        strangers(control, words)
+    if "MEAS" in words.values or "MEAW" in words.values:
+        turn.special.add("meas")
+    if turn.used:
+        return
+    if plan.axes or words.values.keys() & MOVING or is_circle(control, words):
+        motion.moved(control, words, frozenset(turn.special))
+    elif "soft" in turn.special:
+        control.lose_axes(GEOMETRY, motion.AFTER_APPROACH)  # the next block says where the approach leads
+
+
+def is_circle(control: Sinumerik, words: Words) -> bool:
+    """An arc with no end point: it ends where it began, or where its angle leads."""
+    if control.modal.motion == motion.CIP:
+        return not words.values.keys().isdisjoint((*VIA, *CIRCLE))
+    return control.modal.motion in (20, 30) and bool(words.values.keys() & CIRCLE)
+
+
+def codes(control: Sinumerik, turn: Turn) -> None:
+    """The G codes of a block."""
+    chosen = [code for code in turn.plan.g if code in STRAIGHT_AND_ARCS]
+    if len(set(chosen)) > 1:
+        first, second = chosen[0] // 10, chosen[1] // 10
+        raise Fault(CONFLICT, f"G{first} and G{second} exclude one another (both set the motion)")
+    for code in turn.plan.g:
+        if code in STRAIGHT_AND_ARCS or code in UNFOLLOWED_MOTIONS:
+            control.modal.motion, control.stated = code, True
+        elif code in SETTINGS:
+            SETTINGS[code](control, code)
+        elif code in (900, 910):
+            control.modal.incremental = code == 910
+        elif code in FOR_THIS_BLOCK:
+            turn.special.add(FOR_THIS_BLOCK[code])
+        elif code in TAKES_WORDS:
+            takes_words(control, turn, code)
+        elif code not in PASSED:
+            control.refuse_after(code, moving=bool(turn.words.axes or POLAR & turn.words.values.keys()))
+
+
+def takes_words(control: Sinumerik, turn: Turn, code: int) -> None:
+    """Codes that take the words of the block for themselves."""
+    turn.used = True
+    if code == 40:
+        motion.dwell(control, turn.words)
+    elif code in motion.REFERENCE:
+        motion.to_reference(control, turn.words, code)
+    elif code in POLES:
+        set_pole(control, turn.words, code)
+    elif code in (580, 590):
+        framing.programmed_shift(control, turn.words, code)
+
+
+def feed(control: Sinumerik, turn: Turn) -> None:
+    """F, unless it is the time of a dwell."""
+    if "F" not in turn.words.values or 40 in turn.plan.g:
+        return
+    value, modal = turn.words.values["F"], control.modal
+    unit = 1.0 if modal.feed_mode == 93 else modal.unit
+    modal.feed = float("nan") if value is None else unit * value
+
+
+def strangers(control: Sinumerik, words: Words) -> None:
+    """Axes that the program moves and the machine lacks."""
+    for address in words.values:
+        extended = len(address) > 1 and address[0] in "XYZABCUVWQ" and address[1:].isdigit()
+        if address in MOVING:
+            continue
+        lacking = address in INDEX and INDEX[address] not in control.machine
+        if (lacking or extended) and address not in control.foreign:
+            control.note_foreign(address)
+
+
+def say(text: str) -> str:
+    """A block as it is named in a message."""
+    short = " ".join(text.split(";")[0].split())
+    return f"'{short[:40]}...'" if len(short) > 40 else f"'{short}'"

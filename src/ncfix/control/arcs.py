@@ -1,0 +1,78 @@
+"""Arcs in their plane: centre, closure and sweep from the words of a block. Pure geometry, mm and rad.
+
+Points are (first, second) coordinates of the plane relative to the arc's start. Rules and tolerances are LinuxCNC's
+(interp_arc.cc, interp_internal.hh, read for the facts; tried out on `rs274`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from ncfix.control.faults import Fault
+
+Point = tuple[float, float]
+
+CLOCKWISE, COUNTER = 20, 30
+"""The motion codes of arcs, G2 and G3."""
+
+ARC_FAULT = "NCF220"
+ZERO_RADIUS = 0.00127
+"""A smaller radius counts as none, and an R arc may miss its end by as much (LinuxCNC: 0.00005 inch)."""
+
+SEMICIRCLE = 1e-12
+"""An R arc this near to a semicircle, relative, is one."""
+
+FUZZ = 1e-6
+"""An arc of a smaller angle, rad, is a full circle."""
+
+HOPELESS = 100.0
+"""Beyond so many times the closure tolerance an arc is refused whatever its radius."""
+
+
+def check_closure(centre: Point, end: Point, absolute: float, relative: float) -> None:
+    """Raise `Fault` if the control refuses an arc whose radii at start and end differ.
+
+    It does if they differ by more than `absolute` (mm) and by more than `relative` of the greater one, or by more than
+    a hundred times `absolute`.
+    """
+    start_radius = math.hypot(*centre)
+    end_radius = math.hypot(end[0] - centre[0], end[1] - centre[1])
+    if min(start_radius, end_radius) < ZERO_RADIUS:
+        raise Fault(ARC_FAULT, "the arc has no radius: its centre is at its start or end")
+    gap = abs(start_radius - end_radius)
+    greater = max(start_radius, end_radius)
+    if gap > absolute * HOPELESS or (gap > absolute and gap > relative * greater):
+        raise Fault(
+            ARC_FAULT,
+            f"the arc does not close: its radius is {start_radius:.4f} mm at the start and {end_radius:.4f} mm"
+            f" at the end ({gap:.4f} apart, {absolute:.4f} allowed)",
+            "check the centre words and whether they are meant incrementally (G91.1) or absolutely (G90.1)",
+        )
+
+
+def centre_from_radius(end: Point, radius: float, *, clockwise: bool) -> Point:
+    """The centre of an arc given by R; negative R takes the longer of the two arcs. Raises `Fault`."""
+    chord = math.hypot(*end)
+    if chord == 0.0:
+        raise Fault(ARC_FAULT, "an arc given by R must end elsewhere than it starts", "a full circle needs I J K")
+    if chord / 2 - abs(radius) > ZERO_RADIUS or radius == 0.0:
+        raise Fault(ARC_FAULT, f"the radius {abs(radius):.4f} mm is too small to reach the arc's end")
+    half = min(chord / 2, abs(radius))
+    if half / abs(radius) > 1 - SEMICIRCLE:
+        half = abs(radius)
+    height = math.sqrt(max(radius * radius - half * half, 0.0))
+    side = -1.0 if clockwise == (radius > 0) else 1.0
+    return end[0] / 2 - side * height * end[1] / chord, end[1] / 2 + side * height * end[0] / chord
+
+
+def sweep_angle(centre: Point, end: Point, turns: int, *, clockwise: bool) -> float:
+    """The signed angle from start to end about the centre, positive counter-clockwise; `turns` - 1 whole turns more."""
+    start_angle = math.atan2(-centre[1], -centre[0])
+    end_angle = math.atan2(end[1] - centre[1], end[0] - centre[0])
+    angle = start_angle - end_angle if clockwise else end_angle - start_angle
+    while angle < FUZZ:
+        angle += 2 * math.pi
+    if angle > 2 * math.pi + FUZZ:
+        angle -= 2 * math.pi
+    angle += 2 * math.pi * (turns - 1)
+    return -angle if clockwise else angle

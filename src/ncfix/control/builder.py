@@ -1,0 +1,400 @@
+"""Motions gathered as columns: single ones in lists, stretches as arrays; no object is kept per motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.coordinates import INDEX, N_LETTERS, Rotation, Vector
+from ncfix.control.moves import CycleCall, Frame, Kind, Moves, Rule
+from ncfix.control.passing import Pass
+from ncfix.control.rollover import Winding, doubtful, extremes, overturned
+from ncfix.control.stretch import Buffer, Stretch
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class Style(NamedTuple):
+    """What many motions have in common; `frame` and `reason` are indices."""
+
+    kind: Kind
+    rule: Rule
+    reason: int
+    frame: int
+    incremental: bool
+    arc_absolute: bool
+    tcp: bool
+    compensated: bool
+    tool: int
+    tool_length: float
+    feed_mode: int
+    modal: int
+    held: bool = False
+    passing: Pass = Pass.NONE
+    beside: float = 0.0
+    across: int = 2
+
+
+DTYPES: dict[str, type[np.generic]] = {
+    "kind": np.int8,
+    "rule": np.int8,
+    "reason": np.int16,
+    "frame": np.int32,
+    "tool": np.int32,
+    "tool_length": np.float64,
+    "feed_mode": np.int8,
+    "modal": np.int16,
+    "passing": np.int8,
+    "beside": np.float64,
+    "across": np.int8,
+}
+"""The types of the columns of `Moves` that styles hold; the others are flags."""
+
+
+class Arc(NamedTuple):
+    """The circle of an arc in command coordinates: centre (3), unit normal (3), signed sweep.
+
+    fixed  a word says where its centre is, not how far that is from the start
+    """
+
+    centre: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    sweep: float
+    fixed: bool = False
+
+
+class Circles(NamedTuple):
+    """The circles of k arcs in one plane, as columns of `Arc`; `row` (k,): which of some motions these are."""
+
+    row: IntArray
+    centre: FloatArray
+    normal: tuple[float, float, float]
+    sweep: FloatArray
+    fixed: NDArray[np.bool_]
+
+
+BUFFERED = 65536
+"""Motions that are kept as Python numbers before they become arrays."""
+
+
+class Builder:
+    """Gathers motions; `moves()` makes the columns of them.
+
+    rolls       (n_axes,) rotary axes that may roll over (see `rollover`); None: none
+    winding     how they came to where they stand, where that matters
+    overturned  the block of the first motion so far that might lead one of them the other way round
+    brought_back  that of the first one that brings one of them back from beyond a full turn
+    """
+
+    def __init__(self, axes: tuple[str, ...], rotary: frozenset[str]) -> None:
+        self.axes = axes
+        self.rotary = np.array([axis in rotary for axis in axes], dtype=np.bool_)
+        self.columns = [INDEX[axis] for axis in axes]
+        self.count = 0
+        self._buffer = Buffer()
+        self._stretches: list[Stretch] = []
+        self._styles: dict[Style, int] = {}
+        self._reasons: dict[str, int] = {"": 0}
+        self._frames: dict[tuple[tuple[float, ...], Rotation, float, bool, tuple[float, float]], int] = {}
+        self._arcs: dict[int, Arc] = {}
+        self._circles: list[Circles] = []
+        self._approaches: dict[int, Vector] = {}
+        self._calls: dict[CycleCall, int] = {}
+        self._called: dict[int, int] = {}
+        self._counted: dict[int, int] = {}
+        self._resting: dict[int, int] = {}
+        self._measured: dict[int, int] = {}
+        self.rolls: NDArray[np.bool_] | None = None
+        self.winding: Winding | None = None
+        self._said: list[tuple[int, int, int]] = []
+        self.overturned: int | None = None
+        self.brought_back: int | None = None
+
+    @property
+    def endless(self) -> int:
+        """The axes that may roll over, as bits."""
+        return 0 if self.rolls is None else sum(1 << self.columns[place] for place in np.flatnonzero(self.rolls))
+
+    # -- what is shared -----------------------------------------------------------------------------------------------
+
+    def style(self, style: Style) -> int:
+        """The index of a style."""
+        return self._styles.setdefault(style, len(self._styles))
+
+    @property
+    def styles(self) -> tuple[Style, ...]:
+        """The styles by their index."""
+        return tuple(self._styles)
+
+    def reason(self, text: str) -> int:
+        """The index of a reason."""
+        return self._reasons.setdefault(text, len(self._reasons))
+
+    def frame(
+        self,
+        offset: Vector,
+        rotation: Rotation,
+        unit: float,
+        diameter: bool,
+        increments: tuple[float, float] = (1.0, 1.0),
+    ) -> int:
+        """The index of a frame; `offset` has one number per letter."""
+        key = (tuple(offset[column] for column in self.columns), rotation, unit, diameter, increments)
+        return self._frames.setdefault(key, len(self._frames))
+
+    # -- motions ------------------------------------------------------------------------------------------------------
+
+    def add(
+        self, block: int, programmed: int, style: int, feed: float, start: Vector, end: Vector, adrift: int
+    ) -> None:
+        """One motion; `adrift`: axes that the program has not brought to where they stand."""
+        buffer = self._buffer
+        buffer.block.append(block)
+        buffer.programmed.append(programmed)
+        buffer.style.append(style)
+        buffer.feed.append(feed)
+        buffer.start.extend(start)
+        buffer.end.extend(end)
+        buffer.adrift.append(adrift)
+        self.count += 1
+        if len(buffer.block) >= BUFFERED:
+            self._flush()
+
+    def arc(self, arc: Arc) -> None:
+        """The circle of the motion that is added next."""
+        self._arcs[self.count] = arc
+
+    def circles(self, circles: Circles) -> None:
+        """The circles among the motions that are added next."""
+        if len(circles.row):
+            self._circles.append(circles._replace(row=circles.row + self.count))
+
+    def approach(self, command: Vector) -> None:
+        """The command at the level R of the canned cycle that is added next."""
+        self._approaches[self.count] = command
+
+    def called(self, call: CycleCall) -> None:
+        """The call of the canned cycle that is added next."""
+        self._called[self.count] = self._calls.setdefault(call, len(self._calls))
+
+    def counted(self, axes: int) -> None:
+        """The motion that is added next has words that count from where it starts for these axes, and only these."""
+        self._counted[self.count] = axes
+
+    def measures(self, axes: int) -> None:
+        """The motion that is added next has words for these axes that are computed from what has been measured."""
+        if axes:
+            self._measured[self.count] = axes
+
+    def rests(self, axes: int) -> None:
+        """The motion that is added next must leave these axes where they stand, though it names some of them."""
+        if axes:
+            self._resting[self.count] = axes
+
+    def many_rest(self, axes: IntArray) -> None:
+        """The same of many motions that are added next, (n,)."""
+        rows = np.flatnonzero(axes)
+        self._resting |= dict(zip((self.count + rows).tolist(), axes[rows].tolist(), strict=True))
+
+    def says_the_way(self, axes: int, motions: int = 1) -> None:
+        """The motions that are added next turn these axes in a way that their words say, or nothing leaves open."""
+        self._said.append((self.count, self.count + motions, axes))
+
+    def extend(self, stretch: Stretch) -> None:
+        """Many motions."""
+        self._flush()
+        self._stretches.append(stretch)
+        self.count += len(stretch.block)
+
+    @property
+    def latest(self) -> Stretch | None:
+        """The motions that came together last; None if single ones came behind them, or none at all."""
+        return self._stretches[-1] if self._stretches and not self._buffer.block else None
+
+    def latest_arc(self) -> tuple[int, Arc] | None:
+        """The last arc among the motions that came together last, and which of these it is."""
+        begin = self.count - (0 if self.latest is None else len(self.latest.block))
+        if not self._circles or self._circles[-1].row[-1] < begin:
+            return None
+        row, centre, normal, sweep, fixed = self._circles[-1]
+        x, y, z = centre[-1].tolist()
+        return int(row[-1]) - begin, Arc((x, y, z), normal, float(sweep[-1]), bool(fixed[-1]))
+
+    def _flush(self) -> None:
+        if self._buffer.block:
+            self._stretches.append(self._buffer.stretch())
+            self._buffer = Buffer()
+
+    # -- the result ---------------------------------------------------------------------------------------------------
+
+    def moves(self) -> Moves:
+        """All motions so far."""
+        self._flush()
+        parts = self._stretches or [Buffer().stretch()]
+        block, mask, adrift, style, feed = (
+            _joined([getattr(part, name) for part in parts])
+            for name in ("block", "programmed", "adrift", "style", "feed")
+        )
+        start, end = _joined_ends(parts, self.columns)
+        named = (np.arange(1 << N_LETTERS)[:, None] >> np.array(self.columns)) & 1 != 0
+        styles: dict[str, Any] = self._style_columns(style)
+        if not styles["passing"].any():
+            styles["passing"] = None
+        if not styles["beside"].any():
+            styles["beside"] = styles["across"] = None
+        programmed = named.take(mask, axis=0, mode="clip")
+        counted = self._mask_column(self._counted, styles["incremental"])
+        angles = self._keep_whole(styles, programmed, counted, start, end, block)
+        centre, normal, sweep = self._arc_columns(len(block))
+        return Moves(
+            axes=self.axes,
+            rotary=self.rotary,
+            start=start,
+            end=end,
+            programmed=programmed,
+            block=block.astype(np.int32),
+            feed=feed,
+            centre=centre,
+            normal=normal,
+            sweep=sweep,
+            frames=self._frame_table(),
+            reasons=tuple(self._reasons),
+            pointing=None,
+            approach=self._approach_column(len(block)),
+            placed=(~named).take(adrift, axis=0, mode="clip") if adrift.any() else None,
+            fixed_centre=self._fixed_column(len(block)),
+            counted=counted,
+            measured=self._mask_column(self._measured, np.zeros(len(block), dtype=np.bool_)),
+            angles=angles,
+            resting=self._mask_column(self._resting, np.zeros(len(block), dtype=np.bool_)),
+            call=self._call_column(len(block)),
+            calls=tuple(self._calls),
+            **styles,
+        )
+
+    def clear(self) -> None:
+        """Forget the motions so far; styles, reasons, frames and calls keep their numbers."""
+        self.count, self._called = 0, {}
+        self.overturned = self.brought_back = None
+        self._said, self._resting, self._circles, self._measured = [], {}, [], {}
+        self._buffer, self._stretches, self._arcs, self._approaches, self._counted = Buffer(), [], {}, {}, {}
+
+    def _style_columns(self, style: IntArray) -> dict[str, NDArray[Any]]:
+        """The columns of what styles hold, one row per motion."""
+        rows, used = list(self._styles), np.flatnonzero(np.bincount(style)).tolist()
+        columns: dict[str, NDArray[Any]] = {}
+        for index, name in enumerate(Style._fields):
+            kind, values = DTYPES.get(name, np.bool_), {rows[each][index] for each in used}
+            of_styles = np.array([row[index] for row in rows], dtype=kind)
+            columns[name] = np.full(len(style), values.pop(), kind) if len(values) == 1 else of_styles.take(style)
+        return columns
+
+    def _keep_whole(
+        self,
+        styles: dict[str, NDArray[Any]],
+        programmed: NDArray[np.bool_],
+        counted: NDArray[np.bool_] | None,
+        start: FloatArray,
+        end: FloatArray,
+        block: IntArray,
+    ) -> FloatArray | None:
+        """Motions in which an axis might roll over must not be split, nor their angles led to the other side.
+
+        Returns the angles to which plain words lead these axes, see `Moves.angles`.
+        """
+        if self.rolls is None:
+            return None
+        said = np.repeat(styles["incremental"][:, None], len(self.columns), axis=1) if counted is None else counted
+        said = said.copy()
+        for first, stop, axes in self._said:
+            said[first:stop] |= [bool(axes >> column & 1) for column in self.columns]
+        free = styles["rule"] != Rule.PASS
+        rows = overturned(self.rolls, said, start, end) & free
+        back, plain = np.zeros(len(block), dtype=np.bool_), programmed & ~said
+        offset = np.array([offset for offset, *_ in self._frames] or [(0.0,) * len(self.columns)])[styles["frame"]]
+        if self.winding is not None:
+            back = self.winding.back(self.rolls, plain, start - offset, end - offset) & free & ~rows
+        styles["compensated"] = styles["compensated"] | rows | back
+        styles["held"] = styles["held"] | doubtful(self.rolls, start, end)
+        cuts = styles["kind"] != Kind.RAPID
+        self.overturned = _first(block, rows & cuts, self.overturned)
+        self.brought_back = _first(block, back & cuts, self.brought_back)
+        return extremes(self.rolls, plain, end - offset)
+
+    def _frame_table(self) -> tuple[Frame, ...]:
+        return tuple(
+            Frame(np.array(offset, dtype=np.float64), np.array(rotation), unit, diameter, increments)
+            for offset, rotation, unit, diameter, increments in self._frames
+        )
+
+    def _approach_column(self, count: int) -> FloatArray | None:
+        if not self._approaches:
+            return None
+        column = np.full((count, len(self.columns)), np.nan)
+        column[list(self._approaches)] = np.array(list(self._approaches.values()))[:, self.columns]
+        return column
+
+    def _call_column(self, count: int) -> NDArray[np.int32] | None:
+        if not self._called:
+            return None
+        column = np.full(count, -1, dtype=np.int32)
+        column[list(self._called)] = list(self._called.values())
+        return column
+
+    def _fixed_column(self, count: int) -> NDArray[np.bool_] | None:
+        rows = [row for row, arc in self._arcs.items() if arc.fixed]
+        rows += [row for each in self._circles for row in each.row[each.fixed].tolist()]
+        if not rows:
+            return None
+        column = np.zeros(count, dtype=np.bool_)
+        column[rows] = True
+        return column
+
+    def _mask_column(self, masks: dict[int, int], otherwise: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+        """(n, n_axes) from bit masks of some motions, and what holds for the others (n,); None if there are none."""
+        if not masks:
+            return None
+        column = np.repeat(otherwise[:, None], len(self.columns), axis=1)
+        bits = np.array([1 << column for column in self.columns], dtype=np.int64)
+        column[list(masks)] = (np.array(list(masks.values()), dtype=np.int64)[:, None] & bits) != 0
+        return column
+
+    def _arc_columns(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        rows, nowhere, none = list(self._arcs), np.broadcast_to(np.nan, (count, 3)), np.broadcast_to(np.nan, count)
+        if not (rows or self._circles):
+            return nowhere, nowhere, none
+        centre, normal, sweep = nowhere.copy(), nowhere.copy(), none.copy()
+        if rows:
+            centre[rows], normal[rows], sweep[rows], _ = zip(*self._arcs.values(), strict=True)
+        for each in self._circles:
+            centre[each.row], normal[each.row], sweep[each.row] = each.centre, each.normal, each.sweep
+        return centre, normal, sweep
+
+
+def _first(block: IntArray, rows: NDArray[np.bool_], known: int | None) -> int | None:
+    """The block of the first of these motions, if none is known from before."""
+    found = np.flatnonzero(rows)
+    return int(block[found[0]]) if known is None and found.size else known
+
+
+def _joined_ends(parts: Sequence[Stretch], columns: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Where the motions of stretches start and end; views of one path where all go on from each other, to the bit."""
+    starts, ends = zip(*(part.ends(columns) for part in parts), strict=True)
+    if len(parts) == 1:
+        return starts[0], ends[0]
+    path, at = np.concatenate([starts[0][:1], *ends]), 0
+    for part, start in zip(parts, starts, strict=True):
+        seen = start if part.path is None else start[:1]
+        if path[at : at + len(seen)].tobytes() != seen.tobytes():
+            return np.concatenate(starts), path[1:]
+        at += len(start)
+    return path[:-1], path[1:]
+
+
+def _joined(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
+    """Columns one behind the other; a single one as it is."""
+    return columns[0] if len(columns) == 1 else np.concatenate(columns)

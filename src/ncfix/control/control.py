@@ -1,0 +1,305 @@
+"""The control while it follows a program: its motions, and what may be done to each of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+from ncfix.control import contour, tcp
+from ncfix.control.builder import Builder, Style
+from ncfix.control.coordinates import LETTERS, Vector
+from ncfix.control.motion import AT_START, Motion, Unknown, blanked, first_reason, leaves_unknown
+from ncfix.control.moves import Kind, Moves, Rule
+from ncfix.control.passing import Pass, Passing, may_pass
+from ncfix.control.places import mask_of
+from ncfix.control.pointing import Pointing
+from ncfix.control.recurrence import Budget
+from ncfix.control.standing import Standing
+from ncfix.diagnostics import Message
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+
+UNKNOWN_AXIS = "NCF206"
+NEITHER = 'all motions after it are refused; if it does neither, say passed_codes = ["{}"] in the setup file'
+TAKEN = (
+    "it is among passed_codes, but its block has words of axes or H, which it may take: give them a block of their own"
+)
+
+ADRIFT = "the program has not said where the axis {} stands, and this motion would need a word for it"
+"""Why a motion is left as it is, or refused, that moves an axis without naming it."""
+
+RIGHT = 42
+"""The control offsets the contour to the right of the way."""
+SQUARE = 1 - 1e-12
+"""A component of a turned axis that is no less lies along the axis itself."""
+
+
+class Control(Standing):
+    """What every control keeps while it follows a program, whatever its language; its motions go to `builder`.
+
+    budget     how much may still be executed
+    needs_feed a motion at feed is an error where no feed is set
+    refusal    why every motion from here on is refused; empty while all is well
+    suspended  the same, for as long as a code is in force: what suspends them -> why
+    foreign    the axes that the program moves and the machine lacks
+    external   the subprogram file that is executed; empty in the program itself
+    row_block  the block of the program to which motions belong: in a subprogram file the one that has called
+    numbers, first  the numbers of the text that is executed, and where those of the block begin
+    ends       where the motions of a block end, if somebody wants to know
+    points     a block gave the direction of the tool as a vector
+    whole      the motions of the block must not be split, as under cutter compensation
+    at_corner  the motion begins or ends at a corner that the control rounds or breaks, see `contour`
+    handedness -1 where coordinates are mirrored, so that arcs turn the other way; else 1
+    beside     axes that stand beside a contour whose compensation is over: the motion that leads off is not split
+    """
+
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        super().__init__(run, dialect)
+        self.builder = Builder(run.axes, run.rotary)
+        self.budget = Budget(run.setup.most_blocks, run.setup.most_blocks)
+        self.needs_feed = False
+        self.refusal = ""
+        self.suspended: dict[str, str] = {}
+        self.foreign: dict[str, Message] = {}
+        self.external = ""
+        self.row_block = 0
+        self.numbers: Sequence[float] = ()
+        self.first = 0
+        self.ends: list[Vector] | None = None
+        self.points = False
+        self.whole = self.at_corner = False
+        self.beside = 0
+        self.handedness = 1.0
+
+    @property
+    def closure_mm(self) -> float:
+        """By how much the radii at both ends of an arc may differ, mm."""
+        return self.dialect.closure_mm
+
+    @property
+    def takes_zero_across(self) -> bool:
+        """Whether an arc may have a centre word across its plane, a zero (I, J and K in all of them)."""
+        return True
+
+    @cached_property
+    def pointing(self) -> Pointing | None:
+        """How the machine's two rotary axes point the tool; None if that cannot be known."""
+        return tcp.pointing_of(self)
+
+    def moves(self) -> Moves:
+        """The motions so far."""
+        moves = self.builder.moves()
+        return replace(moves, pointing=self.pointing) if self.points else moves
+
+    def refuse_after(self, code: int, *, moving: bool) -> None:
+        """A G code (tenths) is not known: it may move or change coordinates. The setup may say that it does not.
+
+        moving  its block has words of axes or of a length: whether the code takes them, nobody has said
+        """
+        passed = code in self.setup.passed_codes
+        if self.refusal or (passed and not moving):
+            return
+        name = f"G{code / 10:g}"
+        self.refusal = f"{name} is not known, and may move axes or change coordinates"
+        self.warn("NCF228", self.refusal, TAKEN if passed else NEITHER.format(name))
+
+    @property
+    def frame(self) -> int:
+        """The index of the frame that is in force."""
+        if self._frame < 0:
+            self._frame = self.builder.frame(
+                self.offset, self.rotation, self.modal.unit, self.modal.diameter, self.increments
+            )
+        return self._frame
+
+    def make(self, motion: Motion) -> None:
+        """Make a motion, and keep the book of what is known behind it. All motions that come singly come by here."""
+        if not motion.passing:
+            self._ask_for_start(motion)
+        if self.shaky:
+            self.places.lose(mask_of(self.shaky))
+        settles = self._settles(motion)
+        adrift = self._adrift(settles) | self.still_beside(motion.axes)
+        self._note_increments(motion, settles)
+        fate = self._fate(motion, adrift)
+        self._keep_places(motion, settles)
+        style = self._style_of(fate)
+        self.beside &= ~fate.axes
+        if fate.arc is not None:
+            self.builder.arc(fate.arc)
+        if not fate.passing and fate.kind != Kind.DWELL:
+            self.builder.rests(contour.resting(self, fate))
+        start, end = blanked(self.position, self.unknown), blanked(fate.target, fate.unknown)
+        self.builder.add(self.row_block, fate.axes, style, self.modal.feed, start, end, adrift)
+        if self.ends is not None:
+            self.ends.append(fate.target[:])
+        self.position, self.unknown = fate.target, fate.unknown
+
+    def _ask_for_start(self, motion: Motion) -> None:
+        """Settle start positions that matter: where the motion ends, and for all but rapids where it begins."""
+        kind, unknown = motion.kind, motion.unknown
+        if AT_START in unknown.values() or (kind != Kind.RAPID and AT_START in self.unknown.values()):
+            everywhere = tuple(self.unknown) if kind != Kind.RAPID else tuple(unknown)
+            self.settle(everywhere)
+            for index in [index for index, why in unknown.items() if why is AT_START]:
+                del unknown[index]
+
+    def _settles(self, motion: Motion) -> int:
+        """The axes whose words say where they stand behind the motion."""
+        if motion.settles is not None:
+            return motion.settles
+        return 0 if motion.passing or self.modal.incremental else motion.axes
+
+    def _note_increments(self, motion: Motion, settles: int) -> None:
+        """Some words of the motion count from where it starts, or do not, against the distance mode in force."""
+        if not motion.passing and settles & motion.axes != (0 if self.modal.incremental else motion.axes):
+            self.builder.counted(motion.axes & ~settles)
+
+    def _keep_places(self, motion: Motion, settles: int) -> None:
+        """What the program has said of where the axes stand; a motion that is passed may lead elsewhere."""
+        if motion.passing and motion.kind != Kind.DWELL:
+            target, here = motion.target, self.position
+            self.places.lose(mask_of(i for i in self.machine if motion.axes >> i & 1 or target[i] != here[i]))
+        lost = self._lost_at_end(motion)
+        told = self.saying is not None and self.saying[0] is motion.unknown
+        if motion.kind != Kind.DWELL:
+            self.said = lost if told else None
+        self.saying = None
+        self.places.settle(settles)
+        self.places.lose(mask_of(lost))
+        self.places.begun = True
+
+    def _lost_at_end(self, motion: Motion) -> Unknown:
+        """What is not known at the end of a motion, along the axes of the program's frame."""
+        if self.saying is not None and self.saying[0] is motion.unknown:
+            return self.saying[1]
+        return tcp.lost_in_frame(self) if motion.kind == Kind.DWELL else tcp.along_frame(self, motion.unknown)
+
+    def ends_in_hole(self, motion: Motion) -> bool:
+        """Whether there is a hole where the motion ends: then it matters where that is, as in a cut."""
+        return motion.kind == Kind.CYCLE
+
+    def _fate(self, motion: Motion, adrift: int) -> Motion:
+        """The motion as it will be judged: rapids pass that need words for axes of which nobody has said enough."""
+        if motion.passing is None and self._leaves_unknown(motion) and not self.ends_in_hole(motion):
+            return motion._replace(passing=Passing(Pass.UNSAID, first_reason(motion.unknown)))
+        return self._dragged(motion, adrift)
+
+    def _leaves_unknown(self, rapid: Motion) -> bool:
+        """Whether a motion is a rapid that passes, see `motion.leaves_unknown`."""
+        if not rapid.unknown or rapid.kind != Kind.RAPID or rapid.refusal or self.refusal or self.suspended:
+            return False
+        before = {*self.unknown.values(), *tcp.lost_in_frame(self).values()}
+        return leaves_unknown(rapid, before, self._lost_at_end(rapid))
+
+    def _adrift(self, settled: int) -> int:
+        """Axes that must get no word in a motion that brings `settled` to their places; turned axes go together."""
+        adrift = self.places.adrift & ~settled
+        if adrift and self.is_rotated:
+            turned = self._turned()
+            adrift |= turned if adrift & turned else 0
+        return adrift
+
+    def still_beside(self, axes: int) -> int:
+        """Axes of the plane that get no word in a motion across it, see `contour`."""
+        plane = contour.plane_of(self) if self.modal.compensated else 0
+        return 0 if axes & plane else plane
+
+    def end_compensation(self) -> None:
+        """Where the axes of the plane stand after the contour the control knows, until they are named."""
+        if self.modal.compensated:
+            self.beside = mask_of((self.modal.plane.first, self.modal.plane.second)) & mask_of(self.machine)
+            self.places.lose(self.beside)
+        self.modal.compensated = 0
+
+    def _turned(self) -> int:
+        """Axes that are moved by words of others, since the frame is turned."""
+        return mask_of(i for i, row in enumerate(self.rotation) if i in self.machine and abs(row[i]) < SQUARE)
+
+    def _dragged(self, motion: Motion, adrift: int) -> Motion:
+        """The motion; if it moves an axis that has no word and must get none, a rapid passes, others are refused."""
+        wordless = adrift & self.places.adrift & ~motion.axes
+        if not wordless or motion.passing or motion.refusal or motion.unknown:
+            return motion
+        moved = mask_of(i for i in self.machine if motion.target[i] != self.position[i])
+        if self.is_rotated and motion.axes & self._turned():
+            moved |= self._turned()
+        index = next((i for i in self.machine if (wordless & moved) >> i & 1), None)
+        if index is None:
+            return motion
+        why = ADRIFT.format(LETTERS[index])
+        if motion.kind == Kind.RAPID and not self.ends_in_hole(motion):
+            return motion._replace(passing=Passing(Pass.UNSAID, why))
+        return motion._replace(refusal=why)
+
+    def _verdict(self, kind: Kind, unknown: Unknown, refusal: str) -> str:
+        """Why a motion that does not pass is refused; empty if it may be corrected.
+
+        A canned cycle begins with a rapid, so it does not matter where from.
+        """
+        reason = refusal or self.refusal or next(iter(self.suspended.values()), "")
+        if not reason and unknown:
+            reason = first_reason(unknown)
+        if not reason and kind not in (Kind.RAPID, Kind.CYCLE) and self.unknown:
+            reason = first_reason(self.unknown)
+        if not reason and self.external:
+            reason = f"the motion is in the subprogram file {self.external}, which is not rewritten"
+        return reason
+
+    def _style_of(self, motion: Motion) -> int:
+        """The style of a motion; behind a contour the one that leads off stays whole."""
+        passing, whole = motion.passing, self.whole
+        self.whole = whole or bool(self.beside & motion.axes)
+        if passing is not None and may_pass(passing, motion.kind):
+            style = self._style(motion.kind, Rule.PASS, passing.words, motion.code, passing.rule)
+        else:
+            wrong = motion.refusal if passing is None else passing.words
+            style = self._judged(motion.kind, motion.unknown, wrong, motion.code)
+        self.whole = whole
+        return style
+
+    def _judged(self, kind: Kind, unknown: Unknown, refusal: str, code: int) -> int:
+        """The style of a motion that does not pass."""
+        reason = self._verdict(kind, unknown, refusal)
+        return self._style(kind, Rule.REFUSE if reason else Rule.CORRECT, reason, code)
+
+    def style_of(self, kind: Kind, code: int) -> int:
+        """The style of motions whose start and end are known and that have no reason of their own."""
+        return self._judged(kind, {}, "", code)
+
+    def note_foreign(self, letter: str, also: str = "") -> None:
+        """The program moves an axis that the machine lacks; `also`: what else it may mean."""
+        names = " ".join(self.builder.axes)
+        text = f"the program moves the axis {letter}, and the machine has only {names}"
+        self.foreign[letter] = Message(UNKNOWN_AXIS, text, self.place(), f"is it the right machine file?{also}")
+
+    def _style(self, kind: Kind, rule: Rule, reason: str, code: int, passing: Pass = Pass.NONE) -> int:
+        modal = self.modal
+        tool, length = self.tool_length()
+        return self.builder.style(
+            Style(
+                kind,
+                rule,
+                self.builder.reason(reason),
+                self.frame,
+                modal.incremental,
+                modal.arc_absolute,
+                self.tcp,
+                modal.compensated != 0 or self.whole,
+                tool,
+                length,
+                modal.feed_mode,
+                code,
+                self.tilted,
+                passing,
+                self._beside(),
+                modal.plane.across if modal.compensated else 2,
+            )
+        )
+
+    def _beside(self) -> float:
+        """By how much the control offsets the contour to the left of the way, mm; NaN where it is not known."""
+        radius = self.tool_radius() if self.modal.compensated else 0.0
+        return -radius if self.modal.compensated == RIGHT and not math.isnan(radius) else radius

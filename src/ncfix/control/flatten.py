@@ -1,0 +1,128 @@
+"""A program made flat: every block that the control executes written out once, in order, with numbers for expressions.
+
+A block that is executed from several states (in a loop, a subprogram, a repeated cycle) can be corrected for one of
+them only. In the flat program each execution is a block of its own. The language writes it (`Language.unroll`) while
+it follows the program; here it is read and followed again, and must make the same motions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from ncfix.control.moves import Kind, Kinematics, Moves, Rule
+from ncfix.control.trace import trace
+from ncfix.diagnostics import RefusedError, SourceError
+from ncfix.text.language import Resolve, Run, language_of
+from ncfix.text.reader import read
+from ncfix.text.tree import Program
+
+if TYPE_CHECKING:
+    from ncfix.control.setup import Setup
+
+RUNTIME, TOO_LONG, NOT_FLAT = "NCF237", "NCF238", "NCF239"
+LINES = 500_000
+"""A flat program has no more lines."""
+
+LEADING = (Kind.RAPID, Kind.CYCLE)
+"""Motions that lead somewhere, wherever they begin."""
+
+ROUNDINGS = 2.0
+"""By so many least increments an end may be off: numbers are rounded to them, and several may add up."""
+
+
+class FlatLine(NamedTuple):
+    """A line of a flat program, and the line of the original that it comes from."""
+
+    text: str
+    line: int
+
+
+class Unroll(Protocol):
+    """Follows a program as the control would and writes down every block as it is executed.
+
+    steps  axis letter -> least increment of its axis, mm or degree
+    limit  lines that may be written
+
+    Raises SourceError NCF237 where what is executed depends on the machine at run time, NCF238 beyond the limit.
+    """
+
+    def __call__(
+        self,
+        program: Program,
+        run: Run,
+        steps: Mapping[str, float],
+        limit: int,
+    ) -> Sequence[FlatLine]:
+        """The lines of the flat program."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flat:
+    """A flat program.
+
+    program  read, under the path of the original
+    lines    the line of the original for each of its lines
+    """
+
+    program: Program
+    lines: tuple[int, ...]
+
+
+def flatten(
+    program: Program,
+    setup: Setup,
+    axes: tuple[str, ...],
+    rotary: frozenset[str],
+    steps: Mapping[str, float],
+    resolve: Resolve | None = None,
+    kinematics: Kinematics | None = None,
+    limit: int = LINES,
+) -> Flat:
+    """Write a program out flat; arguments as of `trace` and `Unroll`.
+
+    Raises RefusedError NCF237 and NCF238 where `Unroll` does, NCF239 if the language cannot, or if the flat program
+    would not make the same motions.
+    """
+    unroll = language_of(program.dialect).unroll
+    if unroll is None:
+        raise RefusedError.of(NOT_FLAT, f"programs in {program.dialect.title} cannot be written out flat")
+    try:
+        found = unroll(program, Run(setup, axes, rotary, resolve, kinematics=kinematics), steps, limit)
+    except SourceError as error:
+        if error.messages[0].code in (RUNTIME, TOO_LONG):
+            raise RefusedError.collected(error.messages) from None
+        raise
+    end = program.line_end.decode()
+    text = "".join(line.text + end for line in found).encode("latin-1")
+    flat = read(text, program.path, program.dialect)
+    before = trace(program, setup, axes, rotary, resolve, kinematics=kinematics).moves
+    after = trace(flat, setup, axes, rotary, resolve, kinematics=kinematics).moves
+    off = difference(before, after, steps)
+    if off:
+        raise RefusedError.of(NOT_FLAT, f"written out flat the program would not mean the same: {off}")
+    return Flat(flat, tuple(line.line for line in found))
+
+
+def difference(before: Moves, after: Moves, steps: Mapping[str, float]) -> str:
+    """What is different between the motions of a program and those of its flat form; empty if nothing is.
+
+    A refused arc without an angle stands in for a curve of any kind that is not followed. Where an axis stands at the
+    end of a rapid, or at a hole, the flat form may tell, and the program not: holes that the control would make up lead
+    it there.
+    """
+    rows, flat = (np.flatnonzero(moves.kind != Kind.DWELL) for moves in (before, after))
+    if len(rows) != len(flat):
+        return f"it has {len(rows)} motions, and would have {len(flat)}"
+    size = np.array([steps[axis] for axis in before.axes])
+    size = np.where(before.rotary, np.radians(size), size)
+    ends, flat_ends = before.end[rows], after.end[flat]
+    other = (np.abs(ends - flat_ends) > ROUNDINGS * size).any(axis=1)
+    told = (np.isnan(ends) & ~np.isnan(flat_ends)).any(axis=1) & ~np.isin(before.kind[rows], LEADING)
+    other |= told | (np.isnan(flat_ends) & ~np.isnan(ends)).any(axis=1)
+    stands_in = (before.kind == Kind.ARC) & (before.sweep == 0) & (before.rule == Rule.REFUSE)
+    other |= (before.kind[rows] != after.kind[flat]) & ~stands_in[rows] | (before.tcp[rows] != after.tcp[flat])
+    return f"motion {int(np.argmax(other)) + 1} of {len(rows)} would be another" if other.any() else ""

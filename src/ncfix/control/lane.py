@@ -1,0 +1,171 @@
+"""The fast lane: stretches of straight motions and arcs with plain numbers, taken all at once.
+
+It does what the interpreter would do block by block, with the same operations in the same order, so that the
+results are the same to the last bit; a test holds the two together. What it cannot take it leaves alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from ncfix.control.ahead import Ahead, rows_before
+from ncfix.control.arcs import CLOCKWISE, COUNTER
+from ncfix.control.builder import Circles
+from ncfix.control.contour import resting_of_many
+from ncfix.control.control import Control
+from ncfix.control.lane_tables import Lane
+from ncfix.control.moves import FeedMode, Kind
+from ncfix.control.stage import IntArray, Mask, Stage, Text
+from ncfix.control.stretch import Stretch
+
+SHORTEST = 16
+"""Stretches of fewer blocks go one by one."""
+ARCS = (CLOCKWISE, COUNTER)
+
+
+class HasLane(Protocol):
+    """The plan of a block."""
+
+    @property
+    def lane(self) -> Lane | None:
+        """Where its numbers are, if it may go through the fast lane."""
+
+
+class Unit(Text, Protocol):
+    """A program text of which stretches are taken."""
+
+    @property
+    def ahead(self) -> Ahead:
+        """What has been seen of the blocks to come."""
+
+    def plan(self, block: int) -> HasLane:
+        """The plan of a block."""
+
+    def lane_end(self, block: int) -> int:
+        """The first block from `block` on that cannot go through the fast lane."""
+
+
+Turned = tuple[Circles | None, int]
+"""The circles of the arcs of a stage, and how many of its blocks run before one that the lane cannot take."""
+
+
+def run_lane(
+    control: Control,
+    unit: Unit,
+    block: int,
+    main: bool,
+    turned: Callable[[int, Stage], Turned] | None = None,
+) -> int:
+    """Take the stretch that begins with a block; the number of blocks taken, 0 for none.
+
+    turned  of languages that have arcs in the fast lane: finds the circles of a stage that begins with a block
+    """
+    stop = min(unit.lane_end(block), block + unit.ahead.most)
+    if stop - block < SHORTEST or not is_open(control, unit, block):
+        return 0
+    stage = unit.ahead.stretch(control, unit, block, stop)
+    count, circles = min(before_placing(control, stage.mask, 0), count_allowed(control, stage)), None
+    if turned is not None and stage.turns is not None and count >= SHORTEST:
+        circles, count = turned(block, stage.rows(0, count))
+    unit.ahead.note(count, stop - block)
+    if count < SHORTEST:
+        return 0
+    unit.ahead.done = block + count
+    take(control, stage.rows(0, count), block, main, circles)
+    return count
+
+
+def is_open(control: Control, unit: Unit, block: int) -> bool:
+    """Whether the state allows the fast lane at all."""
+    modal = control.modal
+    lane = unit.plan(block).lane
+    begun = modal.motion in (0, 10) or (lane is not None and (lane.motion >= 0 or lane.turns))
+    known = not (control.unknown or control.shaky or control.is_rotated)
+    return begun and known and (modal.incremental or control.offset_checked)
+
+
+def before_placing(control: Control, mask: IntArray, block: int) -> int:
+    """The block that first brings an adrift axis to its place, or the end of blocks with these axis words (n,).
+
+    That block goes by itself, so that all of a stretch have the same axes adrift.
+    """
+    if not control.places.adrift or control.modal.incremental:
+        return block + len(mask)
+    placing = (mask & control.places.adrift) != 0
+    return block + (int(np.argmax(placing)) if placing.any() else len(mask))
+
+
+def count_allowed(control: Control, stage: Stage) -> int:
+    """How many blocks run before one that is refused for want of a feed, or that has no time of its own."""
+    modal, count = control.modal, len(stage.mask)
+    exact = control.needs_feed or modal.feed_mode == FeedMode.INVERSE_TIME
+    if not exact or (modal.feed_mode == FeedMode.PER_MINUTE and modal.feed_given and stage.feed.all()):
+        return count
+    at_feed = (stage.motion >= 10) & (moving(stage) | stage.coded)
+    if modal.feed_mode == FeedMode.INVERSE_TIME:
+        refused = at_feed & ~stage.fed
+    elif modal.feed_mode == FeedMode.PER_REVOLUTION and modal.speed == 0.0:
+        refused = at_feed
+    else:
+        refused, unfed = at_feed & (stage.feed == 0.0), rows_before(stage.fed)
+        refused[:unfed] = at_feed[:unfed] & (not modal.feed_given)
+    return int(np.argmax(refused)) if refused.any() else count
+
+
+def moving(stage: Stage) -> Mask:
+    """(n,) blocks that make a motion."""
+    named: Mask = stage.mask != 0
+    return named if stage.turns is None else named | stage.turns
+
+
+def take(control: Control, stage: Stage, block: int, main: bool, circles: Circles | None = None) -> None:
+    """Add the motions of a stretch, and leave the control as they leave it; `circles`: of its arcs, by their block."""
+    modal, moves = control.modal, moving(stage)
+    note_codes(control, stage)
+    if not moves.any():
+        return
+    rows = np.empty(0, dtype=np.int64) if circles is None else np.cumsum(moves)[circles.row] - 1
+    blocks, stage = np.arange(block, block + len(moves)), stage.only(moves)
+    blocks = blocks.compress(moves) if main else np.full(len(stage.mask), control.row_block)
+    control.places.begun = True
+    plane, adrift = control.still_beside(0), np.full(len(blocks), control.places.adrift)
+    if plane:
+        adrift |= np.where(stage.mask & plane != 0, 0, plane)
+    path = stage.path
+    stretch = Stretch(blocks, stage.mask, styles(control, stage), stage.feed, path[:-1], path[1:], adrift, path)
+    if plane:
+        resting = resting_of_many(control, stretch.programmed, stretch.start, stretch.end)
+        resting[rows] = 0
+        control.builder.many_rest(resting)
+    if circles is not None:
+        control.builder.circles(circles._replace(row=rows))
+    control.builder.extend(stretch)
+    control.position = path[-1].tolist()
+    modal.cycle.initial = None
+
+
+def note_codes(control: Control, stage: Stage) -> None:
+    """Leave feed and motion codes in force as a stretch leaves them."""
+    modal = control.modal
+    modal.motion = int(stage.motion[-1])
+    straight = stage.motion[-1:] if modal.motion <= 10 else stage.motion[stage.motion <= 10]
+    if straight.size:
+        modal.straight = int(straight[-1])
+    if stage.fed.any():
+        modal.feed = float(stage.feed[-1])
+        modal.feed_given = modal.feed != 0.0
+
+
+def styles(control: Control, stage: Stage) -> IntArray:
+    """The styles of motions whose start and end are known, (n,)."""
+    found = np.full(len(stage.motion), control.style_of(Kind.FEED, 10))
+    rapid = stage.motion == 0
+    if rapid.any():
+        found[rapid] = control.style_of(Kind.RAPID, 0)
+    for code in () if stage.turns is None or not stage.turns.any() else ARCS:
+        if (round_ := stage.motion == code).any():
+            found[round_] = control.style_of(Kind.ARC, code)
+    return found

@@ -1,0 +1,271 @@
+"""Motions as columns: what the control does, one row per motion, in the order in which it does it.
+
+Positions are *commands*: what the control is told in its own coordinate system of axes, with work offsets, G92 and
+tool offsets added. Without tool-centre-point control a command is the machine's axis positions. With it (`tcp`), X Y
+Z of the command are the coordinates of the tool tip in the workpiece, turned with it; the machine floor knows how to
+make axis positions of that, this floor does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.pointing import Pointing
+from ncfix.diagnostics import Message
+
+
+class Kind(IntEnum):
+    """What sort of motion."""
+
+    RAPID = 0
+    FEED = 1
+    ARC = 2
+    CYCLE = 3
+    """A canned cycle's motion to one hole: `end` is the position over the hole at the depth it reaches, `approach` that
+    at the level from which it feeds."""
+    DWELL = 4
+    """No motion, kept for time."""
+
+
+class Rule(IntEnum):
+    """What may be done to the block of a motion."""
+
+    CORRECT = 0
+    """May be corrected."""
+    PASS = 1
+    """Passed as it is, by rule: machine coordinates, reference points, probing, parking. `reason` says which."""
+    REFUSE = 2
+    """Must not be changed, and is not right: `reason` says why."""
+
+
+class FeedMode(IntEnum):
+    """How F is meant."""
+
+    PER_MINUTE = 94
+    INVERSE_TIME = 93
+    PER_REVOLUTION = 95
+
+
+@dataclass(frozen=True, slots=True)
+class TcpState:
+    """Whether tool-centre-point control is on, and the length of the tool that the control knows of, mm."""
+
+    on: bool
+    tool_length: float
+
+    @property
+    def shift(self) -> float:
+        """How far a command along Z is from the axis position while all rotary axes stand at zero, mm."""
+        return self.tool_length if self.on else 0.0
+
+
+class Kinematics(Protocol):
+    """What a machine's own kinematics say about positions of its axes."""
+
+    @property
+    def travel(self) -> Sequence[tuple[float, float]]:
+        """How far each axis goes, mm and rad; infinite where it is endless."""
+
+    def __call__(self, command: Sequence[float], before: TcpState, after: TcpState, /) -> Sequence[float]:
+        """A command (one number per axis) as it is under one state, said as it is under another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """How the numbers in the program become a command: `command = offset + rotation @ (unit * program)`.
+
+    offset    (n_axes,) mm, rad: work offset, G52/G92, tool offset, rotated where the control rotates them
+    rotation  (3, 3) acts on X Y Z (G68, G10 R)
+    unit      mm per program unit of linear words: 1.0 or 25.4
+    diameter  X is programmed as a diameter (G7)
+    increments  what one unit of a number without a decimal point is worth, linear and rotary words, in those of a
+              number with one: 0.001 where the control counts least increments in such words
+    """
+
+    offset: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    unit: float
+    diameter: bool = False
+    increments: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CycleCall:
+    """The call of a drilling cycle in a block by itself: what it takes to give one hole a depth of its own.
+
+    name       as it is written
+    arguments  their values when it was called; None where one is left out
+    depths     (place, sense): the arguments that say how deep the hole is, 1 for heights, -1 for ways down
+    across     the letter of the axis along which it drills
+    modal      it stands before the motion to the hole, and holds for others, too; else it drills where the axes stand
+    fixed      why no other call may be written in its place, or beside it; empty: it may
+    bound      an argument is known only at run time: the depth stays as the program has it
+    """
+
+    name: str
+    arguments: tuple[float | str | None, ...]
+    depths: tuple[tuple[int, int], ...]
+    across: str
+    modal: bool
+    fixed: str = ""
+    bound: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """The motions of a program, struct of arrays; n rows, one per motion, in order of execution.
+
+    axes         names of the columns of positions, e.g. ("X", "Y", "Z", "B", "C")
+    rotary       (n_axes,) which of them are rotary
+    start, end   (n, n_axes) commands in mm and rad; NaN where not known. A rapid that may be corrected has a known
+                 end, but its start need not be; other motions that may be corrected have both
+    programmed   (n, n_axes) True where the block has a word for the axis
+    kind         (n,) `Kind`
+    rule         (n,) `Rule`
+    reason       (n,) index into `reasons`; 0 is the empty reason
+    block        (n,) index of the block in the program
+    frame        (n,) index into `frames`
+    incremental  (n,) the block's words are increments (G91)
+    arc_absolute (n,) the centre of an arc is given absolutely (G90.1)
+    tcp          (n,) X Y Z are tool-tip coordinates in the workpiece
+    compensated  (n,) cutter radius compensation is active (G41/G42): the control offsets the contour
+    tool         (n,) number of the tool whose length that is: of the active length offset, else in the spindle
+    tool_length  (n,) mm, spindle reference to tip; NaN where not known
+    feed         (n,) mm/min, 1/min or mm/rev according to `feed_mode`; NaN where none is set, in mm
+    feed_mode    (n,) `FeedMode`
+    centre       (n, 3) of arcs: centre in command coordinates (mm), NaN elsewhere
+    normal       (n, 3) of arcs: unit normal of the plane; the sweep is right-handed about it
+    sweep        (n,) of arcs: signed angle, full turns included, rad
+    modal        (n,) of straight moves and arcs: the motion G code in tenths (0, 10, 20, 30) in force
+    frames       the frames that occur
+    reasons      the reasons that occur
+    held         (n,) rotary axes must stay as programmed: linear axes would not follow them (a swivelled plane without
+                 tool-centre-point control); None: nowhere
+    pointing     how rotary axes point the tool, where programs give its direction as a vector
+    approach     (n, n_axes) of canned cycles: the command over the hole at the level R from which it feeds, and to
+                 which it may return; NaN elsewhere and where such a level is not a word of the block's. None: nowhere
+    placed       (n, n_axes) the program itself has brought the axis to where it stands, in the coordinates in force:
+                 only then may it get a word that its block lacks (see `rs274.places`). None: all are
+    fixed_centre (n,) of arcs: a word says where the centre is, not how far from the start. None: where `arc_absolute`
+    counted      (n, n_axes) where words are increments for some axes of a block only. None: as `incremental` says
+    resting      (n, n_axes) axes that stay where they stand, whatever words say (see `rs274.contour`), or that have no
+                 words in such a block: rotary axes in many cycles. None: none
+    beside       (n,) radius by which the control offsets the contour to the left of the way, mm: negative to the right,
+                 NaN where it is not known, 0 where nothing is offset. None: nowhere
+    across       (n,) which of X Y Z of the program is normal to the plane of such contours. None: nothing is offset
+    passing      (n,) the rule by which a motion passes (`passing.Pass`). None: none does, or nobody says by which
+    measured     (n, n_axes) axes whose words are computed from what the machine has measured itself: `end` is nominal,
+                 and the words stay as they are, since what was measured has the machine's error in it. None: none
+    angles       (n_axes, 2) smallest and largest angle, rad, to which plain words lead rotary axes that a control
+                 may count from 0 to 360 degrees; NaN for others. None: none
+    call         (n,) of canned cycles whose depth stands in a call of its own: index into `calls`; -1 of others.
+                 None: of none
+    calls        the calls that occur
+    spelled      (n, n_axes) axes that get a word even if they stand where it would lead them. None: none
+    """
+
+    axes: tuple[str, ...]
+    rotary: NDArray[np.bool_]
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    programmed: NDArray[np.bool_]
+    kind: NDArray[np.int8]
+    rule: NDArray[np.int8]
+    reason: NDArray[np.int16]
+    block: NDArray[np.int32]
+    frame: NDArray[np.int32]
+    incremental: NDArray[np.bool_]
+    arc_absolute: NDArray[np.bool_]
+    tcp: NDArray[np.bool_]
+    compensated: NDArray[np.bool_]
+    tool: NDArray[np.int32]
+    tool_length: NDArray[np.float64]
+    feed: NDArray[np.float64]
+    feed_mode: NDArray[np.int8]
+    centre: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    sweep: NDArray[np.float64]
+    modal: NDArray[np.int16]
+    frames: tuple[Frame, ...]
+    reasons: tuple[str, ...]
+    held: NDArray[np.bool_] | None = None
+    pointing: Pointing | None = None
+    approach: NDArray[np.float64] | None = None
+    placed: NDArray[np.bool_] | None = None
+    fixed_centre: NDArray[np.bool_] | None = None
+    counted: NDArray[np.bool_] | None = None
+    measured: NDArray[np.bool_] | None = None
+    resting: NDArray[np.bool_] | None = None
+    angles: NDArray[np.float64] | None = None
+    passing: NDArray[np.int8] | None = None
+    beside: NDArray[np.float64] | None = None
+    across: NDArray[np.int8] | None = None
+    call: NDArray[np.int32] | None = None
+    calls: tuple[CycleCall, ...] = ()
+    spelled: NDArray[np.bool_] | None = None
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    @property
+    def wordless(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that have no word, and must get none: nobody knows but the machine where they stand.
+
+        Those that rest have one, which must lead them nowhere else.
+        """
+        wordless: NDArray[np.bool_] = np.zeros(self.end.shape, dtype=bool)
+        if self.placed is not None:
+            wordless = ~(self.placed | self.programmed)
+        return wordless if self.resting is None else wordless | self.resting
+
+    @property
+    def increments(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes along which a motion makes the same way wherever it starts."""
+        counted = self.incremental[:, None] if self.counted is None else self.counted
+        return np.broadcast_to(counted & (self.rule != Rule.PASS)[:, None], self.end.shape)
+
+    @property
+    def about_fixed_point(self) -> NDArray[np.bool_]:
+        """(n,) arcs whose centre is where a word says, wherever they start."""
+        if self.fixed_centre is None:
+            return self.arc_absolute
+        fixed: NDArray[np.bool_] = self.arc_absolute | self.fixed_centre
+        return fixed
+
+    def call_of(self, row: int) -> CycleCall | None:
+        """The call with which the cycle of a motion is called, if that has a block of its own."""
+        return None if self.call is None or self.call[row] < 0 else self.calls[self.call[row]]
+
+    @property
+    def cuts(self) -> NDArray[np.bool_]:
+        """(n,) motions at feed: straight ones, arcs and canned cycles, but for what is passed by rule."""
+        cuts: NDArray[np.bool_] = (self.kind != Kind.RAPID) & (self.kind != Kind.DWELL) & (self.rule != Rule.PASS)
+        return cuts
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that a motion takes to its end; a reference point without words takes all of them."""
+        moved: NDArray[np.bool_] = self.programmed | (self.end != self.start)
+        passed = np.flatnonzero((self.rule == Rule.PASS) & (self.kind != Kind.DWELL))
+        moved[passed[~self.programmed[passed].any(axis=1)]] = True
+        return moved
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A program followed as the control would: its motions and what there is to say about them."""
+
+    moves: Moves
+    messages: tuple[Message, ...] = ()
+    assumed: tuple[str, ...] = ()
+    """What was not given and was taken as zero (`assume_zero`), in words, e.g. "work offset G54"."""
+    stamp: str = ""
+    """The text of the stamp comment if the program carries one."""
+    switches: frozenset[int] = frozenset()
+    """The switches of block delete that were asked: blocks with `/`, `/2`, ... stand where the control got to."""

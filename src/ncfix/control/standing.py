@@ -1,0 +1,209 @@
+"""Where a control stands while it follows a program: positions, what its numbers count from, and what is not known."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Hashable, Sequence
+
+from ncfix.control.coordinates import (
+    DEGREE,
+    IDENTITY,
+    INDEX,
+    LETTERS,
+    ROTARY_LETTERS,
+    Rotation,
+    Vector,
+    Z,
+    dot,
+    product,
+    rotated,
+    transposed,
+    zeros,
+)
+from ncfix.control.knowledge import Knowledge
+from ncfix.control.modal import Modal, Offsets, Tools
+from ncfix.control.motion import AT_START, Unknown
+from ncfix.control.places import Places
+from ncfix.diagnostics import Message, Place
+from ncfix.text.dialect import Dialect
+from ncfix.text.language import Run
+from ncfix.text.reach import Deletable
+
+BLOCK_DELETE = "NCF235"
+
+
+def named_switches(switches: Collection[int]) -> str:
+    """Switches of block delete as they are written in blocks: `/2 /3`."""
+    return " ".join(f"/{number}" for number in sorted(switches))
+
+
+class Standing(ABC):
+    """Where the axes stand, in commands and in the coordinates of the program.
+
+    machine    letter indices of the machine's axes, in the order of its columns
+    rotary     for each letter whether it turns; `turning`: the letter indices of the machine's rotary axes
+    modal      what is in force of modal codes; `offsets` and `tools` likewise
+    position   the command of every letter, mm and rad; a nominal value where `unknown` has the letter's index
+    unknown    letter index -> why the position is not known
+    shaky      letter index -> why the offset of the letter is not known
+    said       what is not known along the axes of a turned frame, where its words have said more than the machine's
+               axes alone tell; None: they tell all. `saying`: what of the machine's axes is not known where the words
+               of this block lead, and with it the same along those of the frame
+    places     which axes the program itself has brought to where they stand
+    knowledge  what was asked of the setup, and what it does not give
+    offset_checked  it has been asked for the work offset in force
+    tcp        X Y Z are those of the tip (tool-centre-point control)
+    tilted     a tilted plane is in force, in which they are
+    switches   the switches of block delete that have been asked, where that matters to the path
+    increments what a number without a decimal point counts, linear and rotary words
+    locate     where in the program we are; `messages` are the remarks so far, by their text, and `rolled` those about
+               axes that may roll over, which come behind them
+    """
+
+    def __init__(self, run: Run, dialect: Dialect) -> None:
+        self.setup = run.setup
+        self.kinematics = run.kinematics
+        self.dialect = dialect
+        self.machine = tuple(INDEX[axis] for axis in run.axes)
+        self.rotary = tuple(
+            (letter in run.rotary) if letter in run.axes else letter in ROTARY_LETTERS for letter in LETTERS
+        )
+        self.turning = tuple(index for index in self.machine if self.rotary[index])
+        self.modal = Modal()
+        self.offsets = Offsets()
+        self.tools = Tools()
+        self.knowledge = Knowledge(run.setup, self.place)
+        self.messages: dict[str, Message] = {}
+        self.rolled: dict[str, Message] = {}
+        self.increments = (1.0, 1.0)
+        self.tilted = False
+        self.switches = set[int]()
+        self.tcp = run.setup.tcp
+        self.said: Unknown | None = None
+        self.saying: tuple[Unknown, Unknown] | None = None
+        self.shaky: Unknown = {}
+        self.locate: Callable[[], Place] = lambda: Place("")
+        self.offset_checked = False
+        self._frame = -1
+        self.places = Places.at_start(run.setup, run.axes, LETTERS)
+        self.rotation: Rotation = IDENTITY
+        self.position = zeros()
+        self.unknown: Unknown = {}
+        self._start(run.axes)
+
+    def _start(self, axes: tuple[str, ...]) -> None:
+        """The start position, as far as it is given."""
+        for axis in axes:
+            index = INDEX[axis]
+            if axis in self.setup.initial:
+                self.position[index] = self.setup.initial[axis] * (DEGREE if self.rotary[index] else 1.0)
+            else:
+                self.unknown[index] = AT_START
+
+    def place(self) -> Place:
+        """Where in the program we are."""
+        return self.locate()
+
+    def warn(self, code: str, text: str, hint: str = "") -> None:
+        """A remark, once per text."""
+        if text not in self.messages:
+            self.messages[text] = Message(code, text, self.place(), hint)
+
+    def is_deleted(self, block: Deletable) -> bool:
+        """Whether a block that may be skipped is passed over."""
+        switches, stated = block.switches, self.setup.block_skip
+        deleted = bool(switches & stated) if isinstance(stated, frozenset) else bool(stated)
+        if not block.matters:
+            return deleted
+        self.switches |= switches
+        told = "skipped" if deleted else "executed"
+        name = "/" if stated is None or isinstance(stated, bool) else named_switches(switches)
+        hint = "--block-skip off: they are executed" if deleted else "--block-skip on: they are skipped"
+        self.warn(BLOCK_DELETE, f"blocks with {name} are taken as {told}", hint)
+        return deleted
+
+    # -- frames -------------------------------------------------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Compose the offsets; to be called after any of them, the unit or the diameter mode has changed."""
+        offsets = self.offsets
+        centre = offsets.centre
+        if offsets.rotation is not IDENTITY:
+            turned = rotated(offsets.rotation, centre)
+            parts = zip(offsets.shift, offsets.local, centre, turned, offsets.feature, strict=True)
+            inner = [shift + own + c - t + f for shift, own, c, t, f in parts]
+        else:
+            shifts = zip(offsets.shift, offsets.local, offsets.feature, strict=True)
+            inner = [shift + own + f for shift, own, f in shifts]
+        outer = inner if offsets.turn is IDENTITY else rotated(offsets.turn, inner)
+        tool = zeros() if self.tcp else offsets.tool
+        self.offset: Vector = [a + b + c for a, b, c in zip(offsets.origin, outer, tool, strict=True)]
+        before, self.rotation = self.rotation, product(offsets.turn, offsets.rotation)
+        if self.rotation != before:
+            self.said = None
+        self.is_rotated = self.rotation != IDENTITY
+        self.inverse = transposed(self.rotation)
+        self.scale = [DEGREE if turning else self.modal.unit for turning in self.rotary]
+        if self.modal.diameter:
+            self.scale[0] /= 2
+        self._frame = -1
+        self.places.watch(self.anchors(), self.rotation)
+
+    @abstractmethod
+    def anchors(self) -> list[Hashable]:
+        """For each letter what its numbers count from, besides shifts and turns that the program states in numbers."""
+
+    def spatial_anchor(self, index: int) -> Hashable:
+        """The same for what X, Y and Z have of their own: whether they are those of the tip, and the tool's length."""
+        return self.tcp, self.tools.offset if (self.tcp and not self.tilted) or index == Z else None
+
+    def program_position(self) -> Vector:
+        """Where the control stands in the frame of the program, mm and rad."""
+        inner = [p - o for p, o in zip(self.position, self.offset, strict=True)]
+        return rotated(self.inverse, inner) if self.is_rotated else inner
+
+    def in_frame(self, step: Vector) -> Vector:
+        """A difference of commands in the axes of the program's frame, mm and rad."""
+        if not self.is_rotated:
+            return step
+        return [dot(row, step) for row in self.inverse] + step[3:]
+
+    def unit_of(self, index: int) -> float:
+        """mm or rad per program unit of an axis, X not as a diameter."""
+        return DEGREE if self.rotary[index] else self.modal.unit
+
+    # -- what is known ------------------------------------------------------------------------------------------------
+
+    def settle(self, indices: Sequence[int]) -> None:
+        """The start positions of these axes matter: they are given, or lacking and taken as zero."""
+        for index in indices:
+            if self.unknown.get(index) is AT_START:
+                self.knowledge.start_position(LETTERS[index])
+                del self.unknown[index]
+
+    def lose(self, indices: Sequence[int], reason: str) -> None:
+        """These axes stand somewhere that is not known from here on; `reason` has a `{}` for the axis letter."""
+        self.said = None
+        for index in indices:
+            if index in self.machine:
+                self.unknown[index] = reason
+
+    def stands_square(self) -> bool:
+        """Whether the tool is known to lie along Z of a tilted plane that is in force."""
+        return False
+
+    def tool_length(self) -> tuple[int, float]:
+        """Number and length (mm) of the tool of the active length offset, else of that in the spindle; NaN unknown."""
+        if self.tools.offset is not None:
+            return self.tools.offset, self.offsets.tool[2]
+        known = self.tools.lengths.get(self.tools.spindle, self.knowledge.known_tool_length(self.tools.spindle))
+        return self.tools.spindle, math.nan if known is None else known
+
+    def tool_radius(self) -> float:
+        """The radius by which the control offsets contours, mm; NaN where it is not known."""
+        if not math.isnan(self.tools.cutter):
+            return self.tools.cutter
+        number = self.tool_length()[0] if self.tools.register is None else self.tools.register
+        known = self.knowledge.known_tool_radius(number)
+        return math.nan if known is None else known

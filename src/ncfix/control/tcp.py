@@ -1,0 +1,113 @@
+"""Tool-centre-point control: what is known of X Y Z when it goes on and off, or the tool length changes in it.
+
+X Y Z of a command are then those of the tip in the workpiece. Only the machine's kinematics connect them with axis
+positions; where they are not given, only while all rotary axes stand at zero is known how the two differ: by the tool
+length along Z.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.coordinates import Rotation, Vector, X, Y, Z
+from ncfix.control.moves import TcpState
+from ncfix.control.pointing import Pointing
+
+if TYPE_CHECKING:
+    from ncfix.control.control import Control
+    from ncfix.control.motion import Unknown
+
+PROBE = 128.0
+"""mm, the length of the tool that shows its direction; a power of two, so that dividing by it rounds nothing."""
+
+TURNED = "where the axis {} stands in tool-centre-point coordinates depends on the machine's kinematics"
+
+
+def rotary_at_zero(control: Control, position: Vector, unknown: Unknown) -> bool:
+    """Whether all rotary axes of the machine stand at zero."""
+    return all(index not in unknown and abs(position[index]) < 1e-12 for index in control.turning)
+
+
+def from_machine(control: Control, target: Vector, unknown: Unknown) -> None:
+    """Make a position of the axes one of tool-centre-point control, in place."""
+    if not converted(control, target, unknown, TcpState(False, 0.0), TcpState(True, control.offsets.tool[Z])):
+        unknown |= {index: TURNED for index in (X, Y, Z) if index in control.machine}
+
+
+def converted(control: Control, position: Vector, unknown: Unknown, before: TcpState, after: TcpState) -> bool:
+    """Say the same position as another command, in place; False where that is not known."""
+    if rotary_at_zero(control, position, unknown):
+        position[Z] += before.shift - after.shift
+        return True
+    if control.kinematics is None or unknown.keys() & set(control.machine):
+        return False
+    command = control.kinematics([position[index] for index in control.machine], before, after)
+    for index, value in zip(control.machine, command, strict=True):
+        position[index] = value
+    return True
+
+
+def lost_in_frame(control: Control) -> Unknown:
+    """What is not known along the axes of the program's frame."""
+    if control.said is not None and control.unknown:
+        return control.said
+    return along_frame(control, control.unknown)
+
+
+def along_frame(control: Control, unknown: Unknown) -> Unknown:
+    """The axes of the program's frame that have a part in one of these of the machine."""
+    return mixed_into(unknown, control.inverse) if unknown and control.is_rotated else unknown
+
+
+def lost_of_axes(control: Control, lost: Unknown) -> Unknown:
+    """Which axes of the machine are not known where this is not known along those of the program's frame."""
+    return {index: why for index, why in mixed_into(lost, control.rotation).items() if index in control.machine}
+
+
+def mixed_into(unknown: Unknown, rotation: Rotation) -> Unknown:
+    """What is not known of turned axes, each of which is made of those in its row: of one of them it is enough."""
+    mixed = {index: why for index, why in unknown.items() if index > Z}
+    for index in (X, Y, Z):
+        why = next((unknown[k] for k in (X, Y, Z) if rotation[index][k] != 0.0 and k in unknown), None)
+        if why is not None:
+            mixed[index] = why
+    return mixed
+
+
+def switch(control: Control, tool: Vector, on: bool) -> None:
+    """Another tool length, and tool-centre-point control on or off: the machine stands still, the tip may not.
+
+    Where the tool lies along Z of a tilted plane, another length moves the tip along that only.
+    """
+    lost = {**lost_in_frame(control), Z: TURNED} if on and control.tcp and control.stands_square() else None
+    before = TcpState(control.tcp, control.offsets.tool[Z])
+    after = TcpState(on, tool[Z])
+    if (before.shift != after.shift or control.tcp != on) and not converted(
+        control, control.position, control.unknown, before, after
+    ):
+        control.lose((X, Y, Z), TURNED)
+        control.said = lost
+    control.tcp = on
+
+
+def pointing_of(control: Control) -> Pointing | None:
+    """How the machine's two rotary axes point the tool: the tips of two tool lengths say which way it points.
+
+    None if it has others, if it lacks X, Y or Z, or if nobody knows its kinematics.
+    """
+    machine, kinematics = control.machine, control.kinematics
+    turning = [machine.index(index) for index in control.turning]
+    if kinematics is None or len(turning) != 2 or not {X, Y, Z} <= set(machine):
+        return None
+    places = [machine.index(index) for index in (X, Y, Z)]
+
+    def directions(first: float, second: float) -> NDArray[np.float64]:
+        command = [0.0] * len(machine)
+        command[turning[0]], command[turning[1]] = first, second
+        tips = [kinematics(command, TcpState(False, long), TcpState(True, long)) for long in (PROBE, 0.0)]
+        return np.array([(tips[1][place] - tips[0][place]) / PROBE for place in places])
+
+    return Pointing.of((turning[0], turning[1]), directions)

@@ -1,0 +1,272 @@
+"""From the parser's tree of one block to the template of its shape."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from lark import Token, Tree
+
+from ncfix.text.grammar import Squeezed
+from ncfix.text.tree import (
+    END,
+    START,
+    Anchor,
+    Assignment,
+    Binary,
+    Comment,
+    Constant,
+    Exists,
+    Expression,
+    Flow,
+    Item,
+    Literal,
+    NamedParameter,
+    Opaque,
+    Parameter,
+    Skip,
+    Span,
+    Tape,
+    Template,
+    Unary,
+    Word,
+)
+
+NUMBERS = frozenset({"NUMBER", "UNSIGNED"})
+"""The terminals whose text is a number of the block; every other digit belongs to its shape."""
+
+MAX_DEPTH = 150
+"""How deep expressions may be nested, or how many operators they may chain; a control allows less."""
+
+Branch = Tree[Token]
+Node = Branch | Token
+
+
+class TooDeepError(Exception):
+    """An expression is nested deeper than `MAX_DEPTH`; `position` is where, in the squeezed block."""
+
+    def __init__(self, position: int) -> None:
+        super().__init__(position)
+        self.position = position
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed:
+    """One block, understood.
+
+    template  what its shape means
+    spans     start and stop of each number in the block
+    values    the numbers
+    comment   where the comment that ends the block starts, -1 without one
+    """
+
+    template: Template
+    spans: tuple[tuple[int, int], ...]
+    values: tuple[float, ...]
+    comment: int
+
+
+def build(tree: Branch, text: str, squeezed: Squeezed, maker: type[Builder] | None = None) -> Parsed:
+    """Make the template of a block from its tree, by a language's own kind of builder; raises `TooDeepError`."""
+    tokens = [token for token in tokens_of(tree) if kind(token) in NUMBERS]
+    spans = tuple(squeezed.span(*edges(token)) for token in tokens)
+    slots = {edges(token): slot for slot, token in enumerate(tokens)}
+    items = (maker or Builder)(text, squeezed, slots, tuple(stop for _, stop in spans)).items(tree)
+    comment = final_comment(tree)
+    place = squeezed.span(*edges(comment))[0] if comment else -1
+    return Parsed(Template(items, len(tokens)), spans, tuple(map(float, tokens)), place)
+
+
+def final_comment(tree: Branch) -> Token | None:
+    """The comment that ends the block, if one does."""
+    last = tree.children[-1] if tree.children else None
+    return last if isinstance(last, Token) and kind(last) == "COMMENT" else None
+
+
+def kind(node: Node) -> str:
+    """The name of a rule or terminal in its own grammar, without that of the grammar that it was imported from."""
+    name = node.type if isinstance(node, Token) else str(node.data)
+    return name.rpartition("__")[2]
+
+
+def tokens_of(tree: Branch) -> Iterator[Token]:
+    """All tokens of a tree, from left to right."""
+    stack: list[Node] = [tree]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Token):
+            yield node
+        else:
+            stack.extend(reversed(node.children))
+
+
+@dataclass(frozen=True, slots=True)
+class Builder:
+    """Makes items of trees; knows where the numbers of the block stand.
+
+    slots  edges of a number in the squeezed block -> its slot
+    stops  where each number stops in the block
+    """
+
+    text: str
+    squeezed: Squeezed
+    slots: dict[tuple[int, int], int]
+    stops: tuple[int, ...]
+
+    # -- places -------------------------------------------------------------------------------------------------------
+
+    def anchor(self, place: int) -> Anchor:
+        """A place in the block, counted from the last number before it."""
+        before = bisect_right(self.stops, place)
+        return Anchor(before - 1, place - self.stops[before - 1]) if before else Anchor(START, place)
+
+    def span(self, node: Node) -> Span:
+        """The stretch that a rule or terminal covers."""
+        return self.between(*edges(node))
+
+    def between(self, start: int, stop: int) -> Span:
+        """A stretch of the squeezed block."""
+        return Span(*map(self.anchor, self.squeezed.span(start, stop)))
+
+    def span_to_end(self, token: Token) -> Span:
+        """The stretch of the last terminal of a block: its length may differ from block to block."""
+        start, stop = self.squeezed.span(*edges(token))
+        return Span(self.anchor(start), Anchor(END, stop - len(self.text)))
+
+    # -- items --------------------------------------------------------------------------------------------------------
+
+    def items(self, tree: Branch) -> tuple[Item, ...]:
+        """The items of a block."""
+        items = [self.item(node) for node in tree.children]
+        if comment := final_comment(tree):
+            items[-1] = Comment(self.span_to_end(comment))
+        return tuple(items)
+
+    def item(self, node: Node) -> Item:
+        """One item of a block."""
+        if isinstance(node, Token):
+            return self.terminal(node)
+        makers: dict[str, Callable[[Branch], Item]] = {
+            "word": self.word,
+            "line_number": self.word,
+            "code": self.code,
+            "assignment": self.assignment,
+            "flow": self.flow,
+            "program_number": self.program_number,
+        }
+        return makers[kind(node)](node)
+
+    def terminal(self, token: Token) -> Item:
+        """An item that is a single terminal; one without a meaning of its own is opaque under its name."""
+        span = self.span(token)
+        match kind(token):
+            case "COMMENT":
+                return Comment(span)
+            case "SKIP":
+                return Skip(int(token[1:] or 1), span)
+            case "TAPE":
+                return Tape(span)
+            case name:
+                return Opaque(name.lower().replace("_", " "), span)
+
+    def word(self, tree: Branch) -> Word:
+        """An address and its value."""
+        address, node = tree.children
+        value = self.expression(node)
+        if isinstance(value, Literal) and kind(node) == "bracket":
+            value = Unary("+", value)
+        return Word(str(address).upper(), value, self.span(tree), self.span(node))
+
+    def code(self, tree: Branch) -> Word:
+        """G or M with a plain number, which is part of the shape."""
+        text = str(tree.children[0])
+        start, stop = edges(tree)
+        return Word(
+            text[0].upper(), Constant(float(text[1:])), self.between(start, stop), self.between(start + 1, stop)
+        )
+
+    def assignment(self, tree: Branch) -> Assignment:
+        """A parameter that gets a value."""
+        target, value = tree.children
+        parameter = self.expression(target)
+        assert isinstance(parameter, Parameter | NamedParameter)
+        return Assignment(parameter, self.expression(value), self.span(tree))
+
+    def flow(self, tree: Branch) -> Flow:
+        """A label, a keyword and its arguments; comments may stand between them."""
+        label, keyword, *arguments = tree.children
+        values = tuple(self.expression(each) for each in arguments if kind(each) != "ARGUMENT_COMMENT")
+        return Flow(self.label(label), str(keyword).lower(), values, self.span(tree))
+
+    def program_number(self, tree: Branch) -> Flow:
+        """A bare O-word."""
+        (label,) = tree.children
+        return Flow(self.label(label), "program", (), self.span(tree))
+
+    def label(self, node: Node) -> str | Expression:
+        """The label of an O-word."""
+        match kind(node):
+            case "NAME":
+                return name_of(node)
+            case "LABEL":
+                return str(int(str(node)))
+        return self.expression(node)
+
+    # -- expressions --------------------------------------------------------------------------------------------------
+
+    def expression(self, node: Node, depth: int = 0) -> Expression:
+        """The expression that a tree, or the terminal of a number, stands for."""
+        if isinstance(node, Token):
+            return self.literal(node)
+        if depth > MAX_DEPTH:
+            raise TooDeepError(edges(node)[0])
+        return self.compound(node, depth + 1)
+
+    def literal(self, token: Token) -> Literal:
+        """A number."""
+        return Literal(self.slots[edges(token)])
+
+    def compound(self, tree: Branch, depth: int) -> Expression:
+        """The expression that a tree stands for."""
+        parts = tree.children
+        match kind(tree):
+            case "literal" | "bracket":
+                return self.expression(parts[0], depth)
+            case "parameter":
+                return Parameter(self.expression(parts[0], depth))
+            case "named_parameter":
+                return NamedParameter(name_of(parts[0]))
+            case "unary":
+                return Unary(str(parts[0]).lower(), self.expression(parts[1], depth))
+            case "binary":
+                left, operator, right = parts
+                return self.binary(left, operator, right, depth)
+            case "arc_tangent":
+                function, left, _, right = parts
+                return self.binary(left, function, right, depth)
+            case "exists":
+                return self.exists(parts[0], depth)
+        raise AssertionError(f"the grammar has an expression {tree.data!r} that nobody builds")
+
+    def binary(self, left: Node, operator: Node, right: Node, depth: int) -> Binary:
+        """Two operands and their operator; `ATAN[left]/[right]` is one, too."""
+        return Binary(str(operator).lower(), self.expression(left, depth), self.expression(right, depth))
+
+    def exists(self, node: Node, depth: int) -> Exists:
+        """`EXISTS[parameter]`."""
+        parameter = self.expression(node, depth)
+        assert isinstance(parameter, Parameter | NamedParameter)
+        return Exists(parameter)
+
+
+def edges(node: Node) -> tuple[int, int]:
+    """Start and stop of a rule or terminal in the squeezed block."""
+    if isinstance(node, Token):
+        return node.start_pos or 0, node.end_pos or 0
+    return node.meta.start_pos, node.meta.end_pos
+
+
+def name_of(node: Node) -> str:
+    """The name between `<` and `>`, lower case and without blanks."""
+    return str(node)[1:-1].lower()

@@ -1,0 +1,87 @@
+"""A dialect as a small declarative table: which grammar, which words, which limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+FOREIGN: tuple[tuple[str, bytes], ...] = (
+    ("Heidenhain Klartext", rb"(?im)^[ \t]*(?:\d+[ \t]*)?BEGIN[ \t]+PGM\b"),
+    ("Heidenhain DIN/ISO", rb"(?im)^[ \t]*%[ \t]*[\w.-]+[ \t]+G7[01][ \t]*(?:\*[ \t]*)?\r?$"),
+    ("Siemens SINUMERIK code", rb"(?im)^(?:%_N_|[ \t]*;\$PATH[ \t]*=)"),
+    (
+        "Siemens SINUMERIK code",
+        rb"(?im)^[ \t]*(?:N\d+[ \t]*)?(?:DEF[ \t]+(?:REAL|INT|BOOL|CHAR|STRING|AXIS|FRAME)\b|PROC[ \t]+\w"
+        rb"|A?(?:TRANS|ROT|MIRROR|SCALE)\b|MSG[ \t]*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+[ \t]*\(|R\d+[ \t]*=)",
+    ),
+    ("Okuma OSP code", rb"(?im)^[^(;\n]*(?<![A-Z])(?:G1[56][ \t]*H[ \t]*\d|VC\d+[ \t]*=|CALL[ \t]+O[A-Z\d])"),
+)
+"""Other families of controls: what people call their language, and what shows it; for `Dialect.foreign`.
+
+With Okuma G54 to G59 are tool lengths, and G15 H selects work offsets.
+"""
+
+LATHE = "lathe code (X a diameter, U and W increments)"
+TURNING: tuple[tuple[str, bytes], ...] = (
+    (LATHE, rb"(?im)^[ \t/]*(?:N\d+[ \t]*)?(G[ \t]*50[ \t]*S[ \t]*\d)"),
+    (LATHE, rb"(?im)^[^(;\n]*(?<![A-Z])(G[ \t]*7(?:[0-2]|3(?=[^(;\n]{0,80}[UW]))[ \t]*P[ \t]*\d+[ \t]*Q[ \t]*\d)"),
+    (
+        LATHE,
+        rb"(?im)\A(?!(?s:.*)^[^(;\n]*(?<![A-Z])Y[ \t]*[-+.\d#\[])(?s:.*?)^[^(;\n]*(?<![A-Z])(G[ \t]*96(?![\d.]))",
+    ),
+)
+"""What shows that a text of the Fanuc family is for a lathe: the spindle's limit (G50 S), turning cycles that name the
+blocks of a contour (P and Q), or constant surface speed (G96) in a text that names no Y."""
+
+HINTS = {LATHE: "lathe programs are followed where they say what X is: LinuxCNC (G7, G8), Siemens (DIAMON, DIAMOF)"}
+"""What helps with a language that is refused by name, where it is another thing than to name the dialect."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """One control's language, as data; the grammar says what a block is, this says what the control makes of it.
+
+    name                short name, as in `--dialect`
+    title               for people
+    grammar             file name under `grammars/`, or the path of a plugin's own
+    suffixes            file extensions that suggest it, lower case with the point
+    signature           regular expressions (bytes) in a file that suggest it, strongest first
+    variant_of          the dialect of which this is a variant: a text that shows that one is read as this where the
+                        machine has this control
+    foreign             languages that are refused by name: what people call them, and a regular expression (bytes)
+                        whose first group, if there is one, is what shows it
+    line_limit          characters a line may have, its end not counted; 0 = no limit
+    comment             how to write a one-line comment, with `{}` for the text
+    upper_case          comments are written in upper case: older controls know no other letters
+    block_numbers       of blocks that are put in, where every block has one: "same" as the block that they belong to,
+                        "none", or "renumber": all blocks anew
+    closure_mm          an arc whose start and end radii differ by more is refused by the control
+    closure_relative    the same relative to the radius (both must be exceeded)
+    feed_of             whose speed F is where linear and rotary axes move together: "linear" (rotary axes keep pace),
+                        "all" (of all axes together), or "" where that differs from control to control
+    understands         what is followed and corrected, a short sentence each; for `ncfix dialects NAME`
+    passes              what is left as it is, by rule
+    refuses             what cannot be corrected, and is named with its line
+    language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
+    semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
+                        refuses is an error) or "iso" (codes that cannot move anything are passed over)
+    """
+
+    name: str
+    title: str
+    grammar: str
+    suffixes: tuple[str, ...]
+    signature: tuple[bytes, ...] = ()
+    variant_of: str = ""
+    foreign: tuple[tuple[str, bytes], ...] = ()
+    line_limit: int = 0
+    comment: str = "({})"
+    upper_case: bool = False
+    block_numbers: str = "same"
+    closure_mm: float = 0.0283
+    closure_relative: float = 0.001
+    feed_of: str = ""
+    understands: tuple[str, ...] = ()
+    passes: tuple[str, ...] = ()
+    refuses: tuple[str, ...] = ()
+    language: str = "ncfix_iso.rs274.language:RS274"
+    semantics: str = "iso"

@@ -1,0 +1,257 @@
+"""Why a block cannot be read, said to people: from the parser's complaint to a coded message with its place."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from lark import UnexpectedInput
+from lark.exceptions import UnexpectedCharacters, UnexpectedToken
+
+from ncfix.text.grammar import Squeezed
+
+FLOW = re.compile(r"/?(n[\d.]*)?o(<[^<>]*>|\d+|\[.*?\](?=[a-z])|#\d+)(?P<keyword>[a-z]*)", re.IGNORECASE | re.DOTALL)
+"""The start of a squeezed block of flow control."""
+
+MACRO_B = re.compile(
+    r"[ \t/]*(?:N\d+[ \t]*)?(?P<keyword>IF[ \t]*\[|WHILE[ \t]*\[|GOTO[ \t]*[\d#\[]|END[ \t]*\d|DO[ \t]*\d)",
+    re.IGNORECASE,
+)
+"""Flow control as Fanuc and its like have it."""
+
+FUNCTIONS = re.compile(r"(abs|acos|asin|atan|cos|exists|exp|fix|fup|ln|round|sin|sqrt|tan)\Z", re.IGNORECASE)
+KEYWORDS = (
+    *("sub", "endsub", "call", "return", "if", "elseif", "else", "endif", "while", "endwhile", "do", "repeat"),
+    *("endrepeat", "break", "continue"),
+)
+OPERATORS = "compare with EQ, NE, GT, GE, LT or LE"
+
+HINTS = {
+    "/": "block skip stands at the start of the block",
+    "N": "the line number stands first in the block",
+    "O": "an O-word stands first in the block",
+    "=": "words are written without = in this dialect",
+    "%": "the tape mark stands alone on its line",
+}
+NUMERIC = frozenset("0123456789.")
+SIGNS = frozenset("+-")
+BARE = re.compile(r"#(\d+|<[^<>]*>)=[^=]+\Z")
+"""A parameter and its value, behind which an expression goes on that has no brackets."""
+
+
+@dataclass(frozen=True, slots=True)
+class BlockError(Exception):
+    """What is the matter in a block, and where in it (from 0)."""
+
+    code: str
+    text: str
+    place: int
+    hint: str = ""
+
+
+def explain(error: UnexpectedInput, text: str, squeezed: Squeezed) -> BlockError:
+    """The fault behind a complaint of the parser about one squeezed block."""
+    stop = Stop(text, squeezed, position_of(error, squeezed.code))
+    found = (look(stop) for look in (in_comment, in_number, in_expression, in_brackets, in_flow, in_word))
+    return next((fault for fault in found if fault), None) or unexpected(stop)
+
+
+def position_of(error: UnexpectedInput, code: str) -> int:
+    """Where in the squeezed block the parser stopped; its length if it missed something at the end."""
+    if isinstance(error, UnexpectedToken) and error.token.type == "$END":
+        return len(code)
+    if isinstance(error, UnexpectedCharacters | UnexpectedToken) and error.pos_in_stream is not None:
+        return int(error.pos_in_stream)
+    return len(code)
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Where the parser stopped in a block.
+
+    text      the block
+    squeezed  the block without blanks
+    position  in the squeezed block
+    at        the character there, empty at the end of the block
+    before    the character before it
+    rest      the block from there on
+    """
+
+    text: str
+    squeezed: Squeezed
+    position: int
+    at: str = field(init=False)
+    before: str = field(init=False)
+    rest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        code = self.squeezed.code
+        object.__setattr__(self, "at", code[self.position : self.position + 1])
+        object.__setattr__(self, "before", code[self.position - 1 : self.position] if self.position else "")
+        object.__setattr__(self, "rest", self.text[self.place() :])
+
+    def place(self, back: int = 0) -> int:
+        """The place in the block, or of the character so many before."""
+        places = self.squeezed.places
+        position = self.position - back
+        return places[position] if position < len(places) else len(self.text)
+
+    def fault(self, code: str, text: str, hint: str = "", back: int = 0) -> BlockError:
+        """A fault here, or so many characters before."""
+        return BlockError(code, text, self.place(back), hint)
+
+    def not_closed(self) -> BlockError:
+        """The innermost bracket that is open here is never closed."""
+        opened = unmatched(self.squeezed.code[: self.position])[-1]
+        return BlockError("NCF113", "the bracket is not closed", self.squeezed.places[opened], "close it with ]")
+
+
+def bare_expression(place: int) -> BlockError:
+    """An operator outside brackets."""
+    text = "in this dialect an expression stands in brackets [ ]"
+    return BlockError("NCF110", text, place, "--dialect fanuc, if the control takes it without them")
+
+
+def in_comment(stop: Stop) -> BlockError | None:
+    """A comment without an end, without a start, or with another in it."""
+    if stop.at == ")":
+        return stop.fault("NCF111", "no comment is open that this ) could close")
+    if stop.at != "(":
+        return None
+    inner, end = stop.rest.find("(", 1), stop.rest.find(")")
+    if end < 0:
+        return stop.fault("NCF111", "the comment is not closed", "close it with ) on the same line")
+    if 0 < inner < end:
+        text = "there is a ( inside the comment"
+        return BlockError("NCF112", text, stop.place() + inner, "use other brackets inside comments")
+    return None
+
+
+def in_number(stop: Stop) -> BlockError | None:
+    """A second point or sign, a point alone, or a decimal comma."""
+    if stop.at == "." and stop.before in NUMERIC:
+        return stop.fault("NCF115", "the number has a second point")
+    if stop.at == ".":
+        return stop.fault("NCF115", "the number has no digit")
+    if stop.at == "," and stop.before in NUMERIC:
+        return stop.fault("NCF115", "the number has a decimal comma", "write a point")
+    if stop.at in SIGNS and stop.before in SIGNS:
+        return stop.fault("NCF115", "the number has two signs")
+    return None
+
+
+def in_expression(stop: Stop) -> BlockError | None:
+    """An operator or a value that is missing, a function that is none, or an expression without its brackets."""
+    done = stop.squeezed.code[: stop.position]
+    if stop.at in {*SIGNS, "*", "/"} and BARE.search(done) and not unmatched(done):
+        return bare_expression(stop.place())
+    if stop.before in {*SIGNS, "*", "/"} and unmatched(done):
+        return stop.fault("NCF114", f"there is no value after {stop.before!r}", back=1)
+    if stop.before in SIGNS:
+        return stop.fault("NCF115", "the sign has no number after it", back=1)
+    if function := FUNCTIONS.search(done):
+        text = f"{function[0]!r} takes what it works on in brackets [ ]"
+        return stop.fault("NCF110", text, back=len(function[0]))
+    if re.search(r"atan\[[^\[\]]*\]\Z", done, re.IGNORECASE):
+        return stop.fault("NCF110", "ATAN takes two values", "write ATAN[..]/[..]")
+    if re.search(r"exists\[\Z", done, re.IGNORECASE):
+        return stop.fault("NCF110", "EXISTS takes a parameter", "write EXISTS[#<name>]")
+    if stop.at.isalpha() and unmatched(done):
+        return in_expression_word(stop)
+    return None
+
+
+def in_expression_word(stop: Stop) -> BlockError:
+    """A letter inside brackets that starts nothing the language knows there."""
+    name = re.match(r"[A-Za-z]*", stop.rest)
+    shown = repr(name[0]) if name and name[0] else repr(stop.at)
+    if stop.before in {*NUMERIC, "]", ">"} and unmatched(stop.squeezed.code) == []:
+        return stop.fault("NCF110", f"{shown} is no operator", OPERATORS)
+    if unmatched(stop.squeezed.code):
+        return stop.not_closed()
+    return stop.fault("NCF110", f"{shown} is no function")
+
+
+def in_brackets(stop: Stop) -> BlockError | None:
+    """Brackets that do not match, or with nothing or a sign of another language in them."""
+    open_before = unmatched(stop.squeezed.code[: stop.position])
+    if stop.at == "]" and not open_before:
+        return stop.fault("NCF113", "no bracket is open that this ] could close")
+    if stop.at == "]" and stop.before == "[":
+        return stop.fault("NCF114", "there is nothing between the brackets", back=1)
+    if open_before and stop.at and stop.at in "<>=!&|" and stop.before != "#":
+        return stop.fault("NCF110", f"{stop.at!r} is no operator", OPERATORS)
+    if open_before and unmatched(stop.squeezed.code):
+        return stop.not_closed()
+    return None
+
+
+def unmatched(code: str) -> list[int]:
+    """Where brackets open in `code` that are not closed."""
+    stack: list[int] = []
+    for position, character in enumerate(code):
+        if character == "[":
+            stack.append(position)
+        elif character == "]" and stack:
+            stack.pop()
+    return stack
+
+
+def in_flow(stop: Stop) -> BlockError | None:
+    """A block of flow control with a wrong keyword, without one, or with more than belongs to it."""
+    start = FLOW.match(stop.squeezed.code)
+    if start is None or unmatched(stop.squeezed.code[: stop.position]):
+        return None
+    keyword = start["keyword"]
+    place = stop.squeezed.places[start.start("keyword")] if keyword else 0
+    if keyword.lower() in KEYWORDS and stop.position < start.end("keyword"):
+        return BlockError("NCF119", "this dialect has no flow control with O-words", place, "--dialect linuxcnc has")
+    if stop.position < start.start("keyword"):
+        return None
+    if not keyword:
+        return stop.fault("NCF119", "after the O-word a keyword is missing", f"one of {', '.join(KEYWORDS)}")
+    if stop.position >= start.end("keyword"):
+        what = f"{stop.at!r} cannot follow {keyword!r}" if stop.at else f"after {keyword!r} an expression is missing"
+        return stop.fault("NCF119", what, "arguments stand in brackets [ ]")
+    return BlockError("NCF119", f"{keyword!r} is no keyword of flow control", place, f"one of {', '.join(KEYWORDS)}")
+
+
+def in_word(stop: Stop) -> BlockError | None:
+    """An address, a parameter or an `=` without what belongs to it; text that is no word at all."""
+    if macro := MACRO_B.match(stop.text):
+        text = "this is flow control of another dialect (Macro B)"
+        return BlockError("NCF110", text, macro.start("keyword"), "name it with --dialect")
+    if stop.before == "=":
+        return stop.fault("NCF114", "there is no value after =", back=1)
+    if stop.before == "#":
+        text = "the name is not closed with >" if stop.at == "<" else "there is no parameter number after #"
+        return stop.fault("NCF114", text, back=1)
+    if not stop.at and re.search(r"#(\d+|<[^<>]*>)\Z", stop.squeezed.code):
+        return stop.fault("NCF114", "the parameter gets no value", "write = and a value")
+    if stop.before.isalpha() and stop.before.isascii() and stop.at != "=":
+        return in_address(stop)
+    return None
+
+
+def in_address(stop: Stop) -> BlockError:
+    """A letter without a value."""
+    address = stop.before.upper()
+    prose = re.match(r"[A-Za-z_]{3,}", stop.text[stop.place(1) :])
+    if prose:
+        return stop.fault("NCF110", f"{prose[0][:40]!r} is no word of this dialect", back=1)
+    if address == "O":
+        text = "the name is not closed with >" if stop.at == "<" else "the O-word has no number or name"
+        return stop.fault("NCF119", text, back=1)
+    if address == "N" and stop.at:
+        return stop.fault("NCF114", "the line number is no plain number", back=1)
+    return stop.fault("NCF114", f"the word {address} has no value", back=1)
+
+
+def unexpected(stop: Stop) -> BlockError:
+    """Anything else: what stands where the parser stopped."""
+    if not stop.at:
+        return stop.fault("NCF110", "the block is not complete")
+    if stop.at == "\r":
+        return stop.fault("NCF110", "there is a carriage return within the line", "make all line ends alike")
+    shown = repr(stop.at) if stop.at.isprintable() and stop.at.isascii() else f"byte 0x{ord(stop.at):02X}"
+    return stop.fault("NCF110", f"{shown} is not expected here", HINTS.get(stop.at.upper(), ""))

@@ -1,0 +1,115 @@
+"""A dialect's grammar: where its file is, and one block of text made into a tree by it.
+
+The `.lark` file is the only definition of what a block is. Blanks mean nothing outside comments, so they are taken
+out before the parser sees the text (`squeeze`), and every position is put back where it was in the block.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ncfix import caches
+from ncfix.plugin_faults import working
+
+if TYPE_CHECKING:
+    from lark import Lark, Token, Tree
+
+    from ncfix.text.dialect import Dialect
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+FOLDERS = (PACKAGE / "grammars", PACKAGE.parents[1] / "grammars")
+"""Where grammars are: inside an installed package, and beside `src` in a source tree."""
+
+PIECE = re.compile(r"\([^()]*\)|;.*|[^ \t]", re.DOTALL)
+"""What squeezing keeps: comments whole, and single characters that are not blank."""
+
+
+@dataclass(frozen=True, slots=True)
+class Squeezed:
+    """A block without the blanks outside comments.
+
+    code    what is left
+    places  place in the block of each character of `code`
+    """
+
+    code: str
+    places: list[int]
+
+    def span(self, start: int, stop: int) -> tuple[int, int]:
+        """Where a stretch of `code` starts and stops in the block."""
+        if start == stop:
+            return 0, 0
+        return self.places[start], self.places[stop - 1] + 1
+
+
+def squeeze(text: str) -> Squeezed:
+    """Take out the blanks outside comments."""
+    kept = [match.span() for match in PIECE.finditer(text)]
+    code = "".join(text[start:stop] for start, stop in kept)
+    return Squeezed(code, [place for span in kept for place in range(*span)])
+
+
+def find_grammar(name: str) -> Path:
+    """The file of a grammar: a path of its own (a plugin's), or a name of those that ship with ncfix.
+
+    Raises FileNotFoundError: an installation without its grammars, or a plugin that names a wrong one.
+    """
+    for path in (Path(name), *(folder / name for folder in FOLDERS)):
+        if path.is_file():
+            return path
+    raise FileNotFoundError(f"no grammar {name!r} in {', '.join(map(str, FOLDERS))}")
+
+
+def place_of_tables(grammar: Path) -> str | None:
+    """Where the tables of a grammar's parser are kept: beside what Python keeps of this module, or in the user's cache.
+
+    None if nothing can be kept. Lark takes them only for the same grammar, with all that it imports, in the same Python
+    and version of Lark.
+    """
+    name = f"{grammar.stem}.{sha256(str(grammar).encode()).hexdigest()[:12]}.{sys.implementation.cache_tag}.tables"
+    for folder in caches.folders(__file__):
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            if (folder / name).exists() or os.access(folder, os.W_OK):
+                return str(folder / name)
+    return None
+
+
+@lru_cache(maxsize=32)
+def parser(name: str) -> Lark:
+    """The LALR parser of a grammar; its tables are worked out once (0.1 s), and kept on the disk."""
+    return parser_of(name, place_of_tables(find_grammar(name)))
+
+
+def parser_of(name: str, tables: str | None = None) -> Lark:
+    """A new LALR parser of a grammar, which takes its tables from a file, or leaves them there."""
+    from lark import Lark
+
+    return Lark.open(
+        str(find_grammar(name)),
+        cache=tables or False,
+        parser="lalr",
+        start="block",
+        propagate_positions=True,
+        maybe_placeholders=False,
+        import_paths=[str(folder) for folder in FOLDERS],
+    )
+
+
+def parse(dialect: Dialect, code: str) -> Tree[Token]:
+    """The tree of one squeezed block; raises Lark's own `UnexpectedInput`."""
+    try:
+        grammar = parser(dialect.grammar)
+    except Exception:
+        with working("dialects", dialect.name):  # a grammar that is missing, or is none, is the fault of whose it is
+            raise
+    return grammar.parse(code)

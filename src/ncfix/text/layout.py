@@ -1,0 +1,151 @@
+"""Where things stand in a motion block: which words may be rewritten, and where a missing word or code goes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from ncfix.text.language import ArcLayout, BulkLayout
+from ncfix.text.tree import Anchor, Constant, Flow, Literal, Opaque, Program, Skip, Span, Tape, Word
+
+#: In the order in which programs write them.
+AXIS_LETTERS = "XYZABCUVW"
+MOTION_CODES = frozenset((0.0, 1.0, 2.0, 3.0))
+CONTROL_CHARACTER = "control character"
+"""The kind of an `Opaque` that moves nothing and may stand anywhere (DC1, Grbl's `?`)."""
+FEED_MODES = frozenset((93.0, 94.0))
+CENTRE_LETTERS = ("I", "J", "K")
+#: M codes that act after the motion of their block: they belong on its last piece.
+CODES_AFTER_MOTION = frozenset((0.0, 1.0, 2.0, 30.0, 60.0, 99.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The writable parts of a motion block. Same for all blocks of a shape.
+
+    axes      axis words by letter
+    centre    I J K words by letter
+    radius    the R word of an arc
+    turns     its P word
+    feed      the F word
+    motion    the G0..G3 word
+    feed_mode the G93 or G94 word
+    after     words that act after the motion (M0, M1, M2, M30, M60, M99)
+    words_at  where a missing axis word goes: after the last axis word
+    code_at   where a missing motion code goes: before the first axis word
+    blank     what separates words in this block
+    prefix    the span of the block skip, which further pieces repeat
+    allowed   axes that may get a word where they have none; None: all
+    """
+
+    axes: dict[str, Word]
+    centre: dict[str, Word]
+    radius: Word | None
+    turns: Word | None
+    feed: Word | None
+    motion: Word | None
+    feed_mode: Word | None
+    after: tuple[Word, ...]
+    words_at: Anchor
+    code_at: Anchor
+    blank: str
+    prefix: Span | None
+    allowed: frozenset[str] | None = None
+
+
+class BlockWords:
+    """The words of one block, by their address and by their code, and where others go beside them."""
+
+    def __init__(self, program: Program, block: int) -> None:
+        self.program, self.block = program, block
+        self.items = program.items_of(block)
+        self.words = [item for item in self.items if isinstance(item, Word)]
+        self.by_address = {word.address: word for word in self.words}
+        self.axes = {word.address: word for word in self.words if word.address in AXIS_LETTERS}
+
+    def some(self, addresses: Iterable[str]) -> dict[str, Word]:
+        """Those of these addresses that the block has, in this order."""
+        return {address: self.by_address[address] for address in addresses if address in self.by_address}
+
+    def coded(self, address: str, codes: frozenset[float]) -> tuple[Word, ...]:
+        """The words of an address that have one of these codes."""
+        return tuple(word for word in self.words if word.address == address and self._code(word) in codes)
+
+    def first_coded(self, address: str, codes: frozenset[float]) -> Word | None:
+        """The first of them."""
+        return next(iter(self.coded(address, codes)), None)
+
+    @property
+    def skip(self) -> Span | None:
+        """Where block skip stands."""
+        return next((item.span for item in self.items if isinstance(item, Skip)), None)
+
+    def beside(self, words: Sequence[Word]) -> tuple[Anchor, Anchor, str]:
+        """The places behind and before some words, and what stands before the last of them: a blank or nothing."""
+        last = max(words, key=lambda word: self.program.position(self.block, word.span.stop))
+        first = min(words, key=lambda word: self.program.position(self.block, word.span.start))
+        return last.span.stop, first.span.start, self._separator(last)
+
+    def _code(self, word: Word) -> float | None:
+        if isinstance(word.value, Constant):
+            return word.value.value
+        values = self.program.values_of(self.block)
+        return float(values[word.value.slot]) if isinstance(word.value, Literal) else None
+
+    def _separator(self, word: Word) -> str:
+        at = self.program.position(self.block, word.span.start)
+        if at == int(self.program.blocks[self.block, 0]):
+            return " "
+        before = self.program.source[at - 1 : at]
+        return before.decode("latin-1") if before in (b" ", b"\t") else ""
+
+
+def layout_of(program: Program, block: int) -> Layout:
+    """The layout of a motion block."""
+    words = BlockWords(program, block)
+    numbered = [word for word in words.words if word.address != "N"]
+    words_at, code_at, blank = words.beside(list(words.axes.values()) or numbered or words.words)
+    return Layout(
+        axes=words.axes,
+        centre=words.some(CENTRE_LETTERS),
+        radius=words.by_address.get("R"),
+        turns=words.by_address.get("P"),
+        feed=words.by_address.get("F"),
+        motion=words.first_coded("G", MOTION_CODES),
+        feed_mode=words.first_coded("G", FEED_MODES),
+        after=words.coded("M", CODES_AFTER_MOTION),
+        words_at=words_at,
+        code_at=code_at,
+        blank=blank,
+        prefix=words.skip,
+    )
+
+
+def has_free_text(program: Program, block: int) -> bool:
+    """Whether the block holds what may mean more than words do: flow, tape marks, opaque text."""
+    return any(
+        isinstance(item, (Flow, Tape)) or (isinstance(item, Opaque) and item.kind != CONTROL_CHARACTER)
+        for item in program.items_of(block)
+    )
+
+
+def bulk_layout(program: Program, block: int, layout: Layout) -> BulkLayout | None:
+    """The part of a layout that holds for all blocks of the shape; None if an axis word is no plain number."""
+    slots = {letter: word.value.slot for letter, word in layout.axes.items() if isinstance(word.value, Literal)}
+    if len(slots) < len(layout.axes):
+        return None
+    at = program.position(block, layout.code_at)
+    return BulkLayout(slots, layout.words_at, layout.blank, program.source[at : at + 1].islower())
+
+
+def arc_layout(program: Program, block: int, layout: Layout) -> ArcLayout | None:
+    """The same of the words of an arc; None if one of them is no plain number."""
+    slots = {letter: word.value.slot for letter, word in layout.centre.items() if isinstance(word.value, Literal)}
+    word = layout.radius
+    if len(slots) < len(layout.centre) or not (word is None or isinstance(word.value, Literal)):
+        return None
+    if word is None or not isinstance(word.value, Literal):
+        return ArcLayout(slots)
+    at, (slot, offset) = program.position(block, word.span.start), word.span.start
+    blank = at > program.blocks[block, 0] and program.source[at - 1 : at] in (b" ", b"\t")
+    return ArcLayout(slots, (word.value.slot, Span(Anchor(slot, offset - blank), word.span.stop)))

@@ -1,0 +1,299 @@
+"""From bytes to a `Program`: two lanes, one grammar.
+
+The grammar decides what a block means. A block's shape is parsed once, and its template is then used for every block
+of that shape, with the numbers that the scan found. Where the scan and the grammar do not see the same numbers, the
+block's own text is its shape, and its numbers are the grammar's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Place, SourceError
+from ncfix.text import dialects
+from ncfix.text.build import Parsed
+from ncfix.text.content import check_content, header_length
+from ncfix.text.dialect import Dialect
+from ncfix.text.faults import BlockError
+from ncfix.text.language import Language, language_of
+from ncfix.text.reach import UNREAD, Reach
+from ncfix.text.shapes import Scan, firsts
+from ncfix.text.templates import parse_block, shapes_of, texts_of
+from ncfix.text.tree import END, START, Anchor, Opaque, Program, Span, Template
+from ncfix.text.writer import line_end
+
+PART_BYTES = 1 << 22
+"""How much text is scanned at once: more than a part of a long program."""
+
+WHOLE_BLOCK = Span(Anchor(START, 0), Anchor(END, 0))
+
+
+def opaque_block(kind: str) -> Parsed:
+    """A block that is passed through whole."""
+    return Parsed(Template((Opaque(kind, WHOLE_BLOCK),), 0), (), (), -1)
+
+
+ONE_UNSCANNED = Scan([None], np.array([-1]), np.array([0, 0]), np.empty((0, 2), np.int64), np.empty(0))
+"""A part of one block that was not looked at."""
+
+AFTER_TAPE = opaque_block("after the end of the tape")
+NOT_READ = opaque_block(UNREAD)
+
+
+def read(source: bytes, path: str = "<program>", dialect: Dialect | str | None = None) -> Program:
+    """Read an NC program; `dialect` is found from content and suffix if it is not given.
+
+    Raises SourceError NCF101 to NCF103 if the bytes are no program of that kind, NCF105 to NCF119 with the first line
+    that cannot be read, and UsageError NCF104 for an unknown dialect.
+    """
+    chosen = dialects.detect(source, path) if dialect is None else dialect
+    known = dialects.get(chosen) if isinstance(chosen, str) else chosen
+    check_content(source, path, known)
+    language = language_of(known)
+    blocks = language.split(source)
+    blocks[0, 0] = header_length(source)
+    return Reading(source, path, known, language, blocks, language.end(source, blocks)).program()
+
+
+def source_error(path: str, block: int, text: str, fault: BlockError) -> SourceError:
+    """A fault of a block as an error with its place."""
+    return SourceError.of(fault.code, fault.text, Place(path, block + 1, fault.place + 1, text), fault.hint)
+
+
+def check_length(dialect: Dialect, length: int) -> None:
+    """Refuse a line that is longer than the control's buffer."""
+    if dialect.line_limit and length > dialect.line_limit:
+        text = f"the line has {length} characters; {dialect.title} takes {dialect.line_limit}"
+        raise BlockError("NCF105", text, dialect.line_limit, "break the line or shorten its comment")
+
+
+class Columns(NamedTuple):
+    """The columns of a part of a program: the first number of each block, and how many there are; spans and values."""
+
+    first: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class Reading:
+    """One program while it is being read, part by part.
+
+    tape_end   the block that ends the tape
+    templates  the templates found so far
+    index      shape -> its template; for a block without a shape, its text and a line feed
+    rows       the template of each block, as far as blocks are read: `done` of them
+    reach      what follows from the first `followed` blocks; it is only asked where something cannot be read
+    first_line the line of the file on which the text begins
+    line_end   the line end that the file uses first; if not given, that of the text
+    """
+
+    source: bytes
+    path: str
+    dialect: Dialect
+    language: Language
+    blocks: NDArray[np.int64]
+    tape_end: int
+    templates: list[Template] = field(default_factory=list)
+    index: dict[bytes | None, int] = field(default_factory=dict)
+    rows: NDArray[np.int32] = field(init=False)
+    done: int = 0
+    reach: Reach = field(default_factory=Reach)
+    followed: int = 0
+    first_line: int = 1
+    line_end: bytes = b""
+
+    def __post_init__(self) -> None:
+        self.rows = np.empty(len(self.blocks), dtype=np.int32)
+
+    def program(self) -> Program:
+        """Read all parts, then what follows the end of the tape."""
+        parts = [self.part(first, stop) for first, stop in self.parts()]
+        parts.append(self.tail())
+        parts = [part for part in parts if len(part.first) > 1] or parts[:1]
+        first, spans, values = parts[0] if len(parts) == 1 else joined(parts)
+        return Program(
+            source=self.source,
+            path=self.path,
+            dialect=self.dialect,
+            templates=tuple(self.templates),
+            template=self.rows,
+            blocks=self.blocks,
+            first_number=first,
+            number_spans=spans,
+            numbers=values,
+            first_line=self.first_line,
+            line_end=self.line_end or line_end(self.source),
+        )
+
+    def parts(self) -> Iterator[tuple[int, int]]:
+        """First block and the one after the last of each part; a very long line is a part of its own."""
+        first, end = 0, min(self.tape_end + 1, len(self.blocks))
+        while first < end:
+            limit = self.blocks[first, 0] + PART_BYTES
+            stop = max(int(np.searchsorted(self.blocks[:end, 1], limit, side="right")), first + 1)
+            yield first, stop
+            first = stop
+
+    def part(self, first: int, stop: int) -> Columns:
+        """Read the blocks from `first` up to `stop`."""
+        found = self.scan(first, stop)
+        known = list(map(self.index.get, found.shapes))
+        if None in known and self.learned(first, found, known):
+            known = list(map(self.index.get, found.shapes))
+        if None not in known:
+            shapes = np.array(known, dtype=np.int32)
+            self.take(shapes if found.group is None else shapes[found.group])
+            return Columns(found.first_number, moved_by(found.spans, self.blocks[first, 0]), found.values)
+        exact: dict[int, Parsed] = {}
+        if found.group is not None:
+            known = [known[group] for group in found.group.tolist()]
+        found = found.expanded()
+        lacking = [row for row, template in enumerate(known) if template is None]
+        self.take(np.array([-1 if template is None else template for template in known], dtype=np.int32))
+        for row in lacking:
+            template = self.index.get(found.shapes[row])
+            self.rows[first + row] = self.learn(first, row, found, exact) if template is None else template
+        columns = with_exact(found, exact, self.blocks[first:stop, 0] - self.blocks[first, 0])
+        return columns._replace(spans=columns.spans + self.blocks[first, 0])
+
+    def learned(self, first: int, scan: Scan, known: list[int | None]) -> bool:
+        """Learn the shapes that are not known yet from the first block of each; whether that will do."""
+        rows = range(len(known)) if scan.group is None else np.unique(scan.group, return_index=True)[1].tolist()
+        new = {scan.shapes[number]: rows[number] for number in range(len(known) - 1, -1, -1) if known[number] is None}
+        return None not in new and all(
+            self.understood(first, row, scan, shape) is not None
+            for shape, row in sorted(new.items(), key=itemgetter(1))
+        )
+
+    def understood(self, first: int, row: int, scan: Scan, shape: bytes | None) -> int | None:
+        """The template of a new shape; None where its block cannot be read, or has to be taken as it is."""
+        assert shape is not None
+        template = shapes_of(self.dialect).recall(shape)
+        if template is None:
+            try:
+                parsed = parse_block(self.dialect, self.source[slice(*self.blocks[first + row])].decode("latin-1"))
+            except BlockError:
+                return None
+            if not agrees(scan, row, parsed, self.blocks[first + row, 0] - self.blocks[first, 0]):
+                return None
+            template = parsed.template
+            shapes_of(self.dialect).keep(shape, template)
+        return self.number(shape, template)
+
+    def tail(self) -> Columns:
+        """The blocks after the end of the tape."""
+        count = len(self.blocks) - self.done
+        if count:
+            self.take(np.full(count, self.number(b"\n", AFTER_TAPE.template), dtype=np.int32))
+        return Columns(np.zeros(count + 1, np.int64), np.empty((0, 2), np.int64), np.empty(0))
+
+    def take(self, templates: NDArray[np.int32]) -> None:
+        """Note the templates of the next blocks."""
+        stop = self.done + len(templates)
+        self.rows[self.done : stop] = templates
+        self.done = stop
+
+    def scan(self, first: int, stop: int) -> Scan:
+        """The shapes and numbers of a part; a line that is too long has no shape."""
+        blocks = self.blocks[first:stop]
+        start, end = blocks[0, 0], blocks[-1, 1] if stop < len(self.blocks) else len(self.source)
+        lengths = blocks[:, 1] - blocks[:, 0]
+        limit = self.dialect.line_limit
+        if limit and len(blocks) == 1 and lengths[0] > limit:
+            return ONE_UNSCANNED
+        found = self.language.scan(self.source[start:end], moved_by(blocks, -start))
+        long = np.flatnonzero(lengths > limit) if limit else ()
+        if not len(long):
+            return found
+        found = found.expanded()
+        for row in long:
+            found.shapes[row] = None
+        return found
+
+    def learn(self, first: int, row: int, scan: Scan, exact: dict[int, Parsed]) -> int:
+        """The template of a block that is the first of its shape here, or that has to be taken as it is."""
+        shape = scan.shapes[row]
+        known = shapes_of(self.dialect).recall(shape) if shape is not None else None
+        if shape is not None and known is not None:
+            return self.number(shape, known)
+        start, stop = self.blocks[first + row]
+        text = self.source[start:stop]
+        parsed = self.parsed(first + row, text)
+        if parsed is NOT_READ:
+            exact[row] = parsed
+            return self.number(b"\n\n", parsed.template)
+        if shape is not None and agrees(scan, row, parsed, start - self.blocks[first, 0]):
+            shapes_of(self.dialect).keep(shape, parsed.template)
+            return self.number(shape, parsed.template)
+        exact[row] = parsed
+        return self.number(text + b"\n", parsed.template)
+
+    def number(self, key: bytes, template: Template) -> int:
+        """The index of a template, which is known by `key` from now on."""
+        if key not in self.index:
+            self.index[key] = len(self.templates)
+            self.templates.append(template)
+        return self.index[key]
+
+    def parsed(self, block: int, text: bytes) -> Parsed:
+        """One block by the grammar; raises SourceError, unless the control may never get there."""
+        known = texts_of(self.dialect).recall(text)
+        if known is not None:
+            return known
+        try:
+            check_length(self.dialect, len(text))
+            parsed = parse_block(self.dialect, text.decode("latin-1"))
+        except BlockError as fault:
+            if self.language.lenient and self.in_doubt(block):
+                return NOT_READ
+            raise source_error(self.path, block + self.first_line - 1, text.decode("latin-1"), fault) from None
+        texts_of(self.dialect).keep(text, parsed)
+        return parsed
+
+    def in_doubt(self, block: int) -> bool:
+        """Whether the control may never get to a block."""
+        for row in self.rows[self.followed : block].tolist():
+            self.reach.follow(self.templates[row])
+        self.followed = block
+        return self.reach.in_doubt
+
+
+def moved_by(spans: NDArray[np.int64], offset: int) -> NDArray[np.int64]:
+    """Spans so many bytes further on."""
+    return spans + offset if offset else spans
+
+
+def agrees(scan: Scan, row: int, parsed: Parsed, start: int) -> bool:
+    """Whether the scan saw the same numbers, and the same comment at the end of the block, as the grammar."""
+    spans = scan.spans[scan.first_number[row] : scan.first_number[row + 1]] - start
+    comment = max(scan.comment[row] - start, -1)
+    return bool(comment == parsed.comment and np.array_equal(spans, np.reshape(parsed.spans, (-1, 2))))
+
+
+def with_exact(scan: Scan, exact: dict[int, Parsed], starts: NDArray[np.int64]) -> Columns:
+    """The columns of a scan, where the blocks in `exact` have the grammar's numbers instead of the scan's."""
+    if not exact:
+        return Columns(scan.first_number, scan.spans, scan.values)
+    counts = np.diff(scan.first_number)
+    owner = np.repeat(np.arange(len(counts)), counts)
+    keep = ~np.isin(owner, list(exact))
+    parts = [(owner[keep], scan.spans[keep], scan.values[keep])]
+    for row, parsed in exact.items():
+        spans = np.array(parsed.spans, dtype=np.int64).reshape(-1, 2) + starts[row]
+        parts.append((np.full(len(spans), row), spans, np.array(parsed.values)))
+    owner, spans, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    order = np.argsort(owner, kind="stable")
+    return Columns(firsts(np.bincount(owner, minlength=len(counts))), spans[order], values[order])
+
+
+def joined(parts: list[Columns]) -> Columns:
+    """The columns of parts that follow each other."""
+    counts, spans, values = map(np.concatenate, zip(*((np.diff(each[0]), *each[1:]) for each in parts), strict=True))
+    return Columns(firsts(counts), spans, values)

@@ -1,0 +1,365 @@
+"""The shapes of a text's blocks: their bytes with every number, and the comment that ends them, replaced by a mark.
+
+Blocks of one shape mean the same but for their numbers, so one of them is parsed for all. The scan does not know the
+language: it only says where numbers would be. Whether they are is checked once per shape.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial, reduce
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix import fast
+from ncfix.text.alike import Alike, alike
+from ncfix.text.numbers import (
+    BLANK,
+    BLANKS,
+    EIGHT,
+    EXACT_DIGITS,
+    NUMERIC,
+    OWN,
+    POINT,
+    POWERS,
+    SIGN,
+    UNSIGNED_AFTER,
+    Numbers,
+    eight_at,
+    fill,
+    find_numbers,
+    is_numeric,
+    table,
+)
+
+NUMBER_MARK = 1
+COMMENT_MARK = 2
+POINTLESS_MARK = 3
+"""Of a number without a decimal point, in languages where it means something else than one with."""
+
+ODD = table(bytes([0, NUMBER_MARK, COMMENT_MARK, POINTLESS_MARK]) + b"\r")
+"""What a block may not hold to have a shape: zero and the marks, and carriage returns, where a comment might end."""
+
+FIXED = table(b"GgMmOo")
+"""A number after these belongs to the shape: what it selects has a meaning of its own."""
+
+MAX_RETURNS = 2
+"""How many carriage returns before a line feed belong to the line end."""
+
+COMMENT = re.compile(rb"(?:\([^()\r\n]*\)|;[^\r\n]*)(?P<last>(?=[ \t]*(?:[\r\n]|\Z)))?")
+"""A comment; group `last` takes part if nothing but blanks follows on the line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What the scan of a text found, columns over its n blocks and m numbers.
+
+    shapes        n keys: blocks with equal keys have equal shapes; None for a block that must be taken as it is
+    group         (n,) index into `shapes`, if most are given but once; None: one for each block
+    comment       (n,) where the comment that ends the block starts, -1 without one
+    first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
+    spans         (m, 2) start and stop byte of each number
+    values        (m,)
+    """
+
+    shapes: list[bytes | None]
+    comment: NDArray[np.int64]
+    first_number: NDArray[np.int64]
+    spans: NDArray[np.int64]
+    values: NDArray[np.float64]
+    group: NDArray[np.int64] | None = None
+
+    @classmethod
+    def of(
+        cls, keys: bytes, blocks: NDArray[np.int64], comment: NDArray[np.int64], numbers: Numbers, apart: set[int]
+    ) -> Scan:
+        """Of the keys of all blocks, see `shape_keys`; the blocks `apart` must be taken as they are."""
+        shapes: list[bytes | None]
+        if apart:
+            shapes, group = list(keys.split(b"\n")[: len(blocks)]), None
+        else:
+            shapes, group = distinct(keys)
+        for block in apart:
+            shapes[block] = None
+        return cls(shapes, comment, first_numbers(blocks, numbers.spans), numbers.spans, numbers.values, group)
+
+    @classmethod
+    def joined(cls, parts: Sequence[tuple[int, Scan]]) -> Scan:
+        """The scan of a text, from those of what it consists of; each begins at a byte of the text."""
+        shapes, comment, counts, spans, group = list[bytes | None](), [], [], [], []
+        for at, part in parts:
+            comment.append(np.where(part.comment < 0, -1, part.comment + at))
+            counts.append(np.diff(part.first_number))
+            spans.append(part.spans + at)
+            group.append(len(shapes) + part.groups)
+            shapes += part.shapes
+        values = np.concatenate([part.values for _, part in parts])
+        first = firsts(np.concatenate(counts))
+        return cls(shapes, np.concatenate(comment), first, np.concatenate(spans), values, np.concatenate(group))
+
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """(n,) which of the shapes each block has."""
+        return np.arange(len(self.comment)) if self.group is None else self.group
+
+    def expanded(self) -> Scan:
+        """The same, with a shape for each block."""
+        if self.group is None:
+            return self
+        return replace(self, shapes=[self.shapes[index] for index in self.group.tolist()], group=None)
+
+
+def split_blocks(source: bytes) -> NDArray[np.int64]:
+    """Start and stop byte of each line, shape (n, 2), line ends not included.
+
+    A line ends with LF, CR LF, or CR CR LF (which some transfers leave); with CR alone only in a text
+    that has no LF. Text after the last line end is a line.
+    """
+    text = np.frombuffer(source, dtype=np.uint8)
+    ends = np.flatnonzero(text == ord("\n"))
+    if not len(ends):
+        ends = np.flatnonzero(text == ord("\r"))
+    starts = np.concatenate(([0], ends + 1))
+    stops = np.concatenate((ends, [len(text)]))
+    if starts[-1] == len(text):
+        starts, stops = starts[:-1], stops[:-1]
+    for _ in range(MAX_RETURNS if b"\r" in source else 0):
+        stops = stops - ((stops > starts) & (text[np.maximum(stops - 1, 0)] == ord("\r")))
+    return np.stack((starts, stops), axis=1)
+
+
+def scan(source: bytes, blocks: NDArray[np.int64], *, pointless: bool = False) -> Scan:
+    """Find the numbers and the shape of every block; `pointless`: numbers without a point make another shape."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    if fast.engaged():
+        found = scan_compiled(text, blocks, pointless)
+        if found is not None:
+            return found
+    same = alike(source, blocks, pointless=pointless)
+    if same is None:
+        return in_slices(source, blocks, partial(scan_any, pointless=pointless))
+    return with_others(source, blocks, pointless, same)
+
+
+def with_others(source: bytes, blocks: NDArray[np.int64], pointless: bool, same: Alike) -> Scan:
+    """The scan of a text of which some lines are alike; the others are put together and scanned as any text is."""
+    n, m, mark = len(blocks), len(same.columns), bytes([NUMBER_MARK])
+    shapes: list[bytes | None] = [same.example.key(mark, bytes([POINTLESS_MARK]) if pointless else mark)]
+    comment, counts, group = np.full(n, -1), np.full(n, m), np.zeros(n, dtype=np.int64)
+    spans, values = same.line_by_line()
+    if len(same.rows) == n:
+        return Scan(shapes, comment, np.arange(0, n * m + 1, m), spans, values, group)
+    alone = np.ones(n, dtype=np.bool_)
+    alone[same.rows] = False
+    rows = np.flatnonzero(alone)
+    starts, stops = blocks[rows, 0], np.append(blocks[1:, 0], len(source))[rows]
+    text = b"".join(source[start:stop] for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
+    moved = starts - firsts(stops - starts)[:-1]
+    rest = in_slices(text, blocks.take(rows, axis=0) - moved[:, None], partial(scan_any, pointless=pointless))
+    comment[rows] = np.where(rest.comment < 0, -1, rest.comment + moved)
+    counts[rows] = np.diff(rest.first_number)
+    group[rows] = len(shapes) + rest.groups
+    first = firsts(counts)
+    own, spans_moved = np.repeat(~alone, counts), rest.spans + np.repeat(moved, counts[rows])[:, None]
+    return Scan(
+        shapes + rest.shapes, comment, first, mixed(own, spans, spans_moved), mixed(own, values, rest.values), group
+    )
+
+
+def mixed(own: NDArray[np.bool_], some: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+    """The rows of two tables, each in order: those of the first where they are its own (n,)."""
+    result = np.empty((len(own), *some.shape[1:]), dtype=some.dtype)
+    kind = f"V{result.nbytes // len(own)}"
+    rows = result.view(kind).ravel()
+    rows[own], rows[~own] = some.view(kind).ravel(), others.view(kind).ravel()
+    return result
+
+
+SLICE_BYTES = 1 << 19
+"""How much of a text of any kind is scanned at once: the columns take about a hundred times as much."""
+
+SPARE, DENSE, VARIED = 1 << 12, 5, 16
+"""What room there is at first: for so many numbers and characters of different shapes, and for one in so many bytes."""
+
+PlainScan = Callable[[bytes, NDArray[np.int64]], Scan]
+
+
+def in_slices(source: bytes, blocks: NDArray[np.int64], scan: PlainScan) -> Scan:
+    """What `scan` makes of a text, a slice of it at a time."""
+    begins = set(np.searchsorted(blocks[:, 0], np.arange(0, len(source), SLICE_BYTES)).tolist())
+    if len(source) <= SLICE_BYTES or len(begins) == 1:
+        return scan(source, blocks)
+    parts = list[tuple[int, Scan]]()
+    for begin, end in pairwise(sorted(begins | {len(blocks)})):
+        start, stop = int(blocks[begin, 0]), int(blocks[end, 0]) if end < len(blocks) else len(source)
+        parts.append((start, scan(source[start:stop], blocks[begin:end] - start)))
+    return Scan.joined(parts)
+
+
+def scan_any(source: bytes, blocks: NDArray[np.int64], pointless: bool) -> Scan:
+    """As `scan`, of any text, with numpy alone."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    starts, stops, last = comments_of(source)
+    numeric = is_numeric(text)
+    fill(numeric, np.stack((starts, stops), axis=1), False)
+    numbers = find_numbers(text, numeric, FIXED)
+    comment = np.full(len(blocks), -1, dtype=np.int64)
+    comment[block_of(blocks, starts[last])] = starts[last]
+    marks = np.full(len(numbers.spans), NUMBER_MARK, dtype=np.uint8)
+    if pointless:
+        marks[without_point(text, numbers.spans)] = POINTLESS_MARK
+    ending = np.stack((starts[last], stops[last]), axis=1)
+    keys = shape_keys(text, blocks, numbers.spans, ending, marks, numbers.covered)
+    apart = {*block_of(blocks, numbers.spans[numbers.broken, 0]).tolist(), *odd_blocks(text, blocks)}
+    return Scan.of(keys, blocks, comment, numbers, apart)
+
+
+def scan_compiled(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    pointless: bool,
+    comments: bytes = b"(;",
+    fixed: NDArray[np.bool_] = FIXED,
+    odd: NDArray[np.bool_] = ODD,
+) -> Scan | None:
+    """As `scan`, compiled; None where there are blocks that must be taken as they are.
+
+    comments  the characters with which comments begin
+    fixed     a number after these belongs to the shape
+    odd       bytes that a block may not hold
+    """
+    from ncfix.text import kernels
+
+    kinds = np.zeros(256, dtype=np.uint8)
+    for members, kind in ((NUMERIC, kernels.NUMERIC), (SIGN, kernels.SIGN), (odd, kernels.ODD)):
+        kinds[members] = kind
+    kinds[list(comments)] = kernels.COMMENT
+    n = len(blocks)
+    group, comment, first = np.empty(n, np.int64), np.full(n, -1, np.int64), np.empty(n + 1, np.int64)
+    shapes, starts = np.empty(len(text) + 1, np.uint8), np.empty(n + 1, np.int64)
+    for most, rows in ((SPARE + len(text) // DENSE, SPARE + len(text) // VARIED), (len(text), len(text) + 1)):
+        spans, values = np.empty((most, 2), np.int64), np.empty(most)
+        known = kernels.scan(
+            text,
+            np.ascontiguousarray(blocks),
+            (kinds, fixed, UNSIGNED_AFTER, BLANK),
+            (BLANKS, EXACT_DIGITS),
+            (NUMBER_MARK, POINTLESS_MARK if pointless else NUMBER_MARK, COMMENT_MARK),
+            POWERS,
+            (group, comment, first),
+            (spans, values),
+            (shapes, starts, np.empty((rows, 4), np.int32)),
+        )
+        if known != kernels.CRAMPED:
+            break
+    if known == kernels.UNTOUCHED:
+        return None
+    edges, count = starts[: known + 1].tolist(), int(first[n])
+    keys: list[bytes | None] = [shapes[slice(*each)].tobytes() for each in pairwise(edges)]
+    return Scan(keys, comment, first, spans[:count], values[:count], group)
+
+
+def odd_blocks(text: NDArray[np.uint8], blocks: NDArray[np.int64]) -> list[int]:
+    """The blocks that hold an `ODD` byte."""
+    suspicious = np.flatnonzero((text <= ord("\r")) & (text != ord("\n")))
+    places = suspicious[ODD[text[suspicious]]]
+    owner = block_of(blocks, places)
+    return list(map(int, owner[places < blocks[owner, 1]]))
+
+
+def first_numbers(blocks: NDArray[np.int64], numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n + 1,) the first number of each block."""
+    starts = np.ascontiguousarray(numbers[:, 0])
+    return np.append(np.searchsorted(starts, blocks[:, 0]), len(starts))
+
+
+def firsts(counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The first number of each block (n,) with so many of them, and how many there are, (n + 1,)."""
+    return np.concatenate(([0], np.cumsum(counts)))
+
+
+def block_of(blocks: NDArray[np.int64], places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The blocks in which some bytes of the text stand; those of a line end stand in the block before it."""
+    return np.searchsorted(blocks[:, 0], places, side="right") - 1
+
+
+def comments_of(source: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Start and stop of each comment, and whether it ends its block."""
+    found = [(*match.span(), match.start("last") >= 0) for match in matches(COMMENT, source, b"(;")]
+    columns = np.array(found, dtype=np.int64).reshape(-1, 3)
+    return columns[:, 0], columns[:, 1], columns[:, 2].astype(np.bool_)
+
+
+def matches(pattern: re.Pattern[bytes], source: bytes, heads: bytes) -> Iterator[re.Match[bytes]]:
+    """As `pattern.finditer`, if all it may find begins with one of a few characters: sought where these are alone."""
+    text = np.frombuffer(source, dtype=np.uint8)
+    begins = reduce(np.logical_or, [text == head for head in heads if head in source] or [np.empty(0, np.bool_)])
+    done = 0
+    for place in np.flatnonzero(begins).tolist():
+        found = pattern.match(source, place) if place >= done else None
+        if found:
+            done = found.end()
+            yield found
+
+
+def shape_keys(
+    text: NDArray[np.uint8],
+    blocks: NDArray[np.int64],
+    numbers: NDArray[np.int64],
+    comments: NDArray[np.int64],
+    marks: NDArray[np.uint8],
+    covered: NDArray[np.bool_],
+) -> bytes:
+    """The key of each block and a line feed: its bytes, with one mark for each number and for the comment at its end.
+
+    covered  (n,) the bytes that belong to numbers
+    """
+    marked = np.empty(len(text) + 1, dtype=np.uint8)
+    np.bitwise_and(text, covered.view(np.uint8) - np.uint8(1), out=marked[:-1])  # zero is what goes
+    fill(marked, comments, 0)
+    for places, mark in ((numbers[:, 0], marks), (comments[:, 0], COMMENT_MARK), (blocks[:, 1], ord("\n"))):
+        marked[places] = mark
+    fill(marked, np.stack((np.append(0, blocks[:, 1] + 1), np.append(blocks[:, 0], len(text) + 1)), axis=1), 0)
+    return marked.tobytes().translate(None, b"\0")
+
+
+LONG = 8 * EIGHT
+"""Longer keys are not compared with others."""
+KINDS = 16
+"""So many of the different keys are sought among all others; the rest are rare."""
+
+
+def distinct(keys: bytes) -> tuple[list[bytes | None], NDArray[np.int64]]:
+    """The different ones of some keys, each with a line feed; rare ones more than once. And which one each of them is.
+
+    They are compared eight characters at a time, from the last one on.
+    """
+    padded = np.zeros((len(keys) + LONG) // EIGHT * EIGHT + 2 * EIGHT, dtype=np.uint8)
+    padded[LONG : LONG + len(keys)] = np.frombuffer(keys, dtype=np.uint8)
+    stops = np.flatnonzero(padded == ord("\n")) - LONG
+    starts = np.append(0, stops[:-1] + 1)
+    lengths, lanes = stops - starts, padded.view("<u8")
+    compared = range(0, min(int(lengths.max(initial=0)), LONG), EIGHT)
+    words = [eight_at(lanes, stops + LONG - EIGHT - k) & OWN.take(lengths - k, mode="clip") for k in compared]
+    group, rows = np.full(len(stops), -1), list[int]()
+    left = np.flatnonzero(lengths <= LONG)
+    while len(left) and len(rows) < KINDS:
+        same = reduce(np.logical_and, (word.take(left) == word[left[0]] for word in words), np.ones(len(left), bool))
+        group[left.compress(same)] = len(rows)
+        rows.append(int(left[0]))
+        left = left.compress(~same)
+    alone = np.flatnonzero(group < 0)
+    group[alone] = np.arange(len(rows), len(rows) + len(alone))
+    rows += alone.tolist()
+    return [keys[slice(*edges)] for edges in zip(starts[rows].tolist(), stops[rows].tolist(), strict=True)], group
+
+
+def without_point(text: NDArray[np.uint8], numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which numbers have no decimal point, (m,)."""
+    points = np.concatenate(([0], np.cumsum(text == POINT)))
+    return np.asarray(points[numbers[:, 1]] == points[numbers[:, 0]])

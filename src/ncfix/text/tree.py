@@ -1,0 +1,369 @@
+"""The lossless tree of an NC program: blocks as spans of the source, their words as shared templates.
+
+A program has many blocks and few *shapes*: a shape is the text of a block with its numbers replaced. One `Template`
+is kept per shape, made from the Lark tree of the first block that had it; a block is a reference to its template plus
+the places and values of its own numbers, held in arrays. The source bytes are kept as they came, so whatever is not
+edited goes out as it came in.
+
+Places inside a block are given by `Anchor`: so many bytes after the end of the block's number `slot`
+(slot -1: after the start of the block; slot -2: after its end, with an offset that is zero or negative). They hold for
+every block of the shape, however long its numbers are, and however long the comment that ends it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.diagnostics import Place
+
+if TYPE_CHECKING:
+    from ncfix.text.dialect import Dialect
+
+
+START = -1
+"""The slot of anchors that count from the start of the block."""
+
+END = -2
+"""The slot of anchors that count from the end of the block."""
+
+
+class Anchor(NamedTuple):
+    """A place in every block of a shape: `offset` bytes after the end of number `slot`, or after `START` or `END`."""
+
+    slot: int
+    offset: int
+
+
+class Span(NamedTuple):
+    """A stretch of a block, from `start` up to `stop`."""
+
+    start: Anchor
+    stop: Anchor
+
+
+# -- expressions ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A number written in the block: the value of number `slot` of the block.
+
+    `pointless`: it has no decimal point, in a language where that matters: there the value of an axis word may count
+    least increments, and `numbers` holds it as it is written.
+    """
+
+    slot: int
+    pointless: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number that every block of the shape has: a plain, unsigned number after G or M."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A numbered parameter, `#5`, `##5`, `#[1+2]`."""
+
+    index: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class NamedParameter:
+    """A named parameter, `#<depth>`, `#<_global>`; the name is lower case without blanks."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """`-x`, `+x`, or a function of one argument: `sin`, `cos`, `fix`, ... (lower case)."""
+
+    operator: str
+    operand: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """`left operator right`; the operator in lower case: `+ - * / ** mod and or xor eq ne gt ge lt le atan`."""
+
+    operator: str
+    left: Expression
+    right: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Exists:
+    """`EXISTS[#<name>]` or `EXISTS[#5]`."""
+
+    parameter: Parameter | NamedParameter
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A string, `"DRILL 8.5"`, without its quotation marks."""
+
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """A name with something in brackets, lower case: a function, `SIN(R1)`, or an element of an array, `BORE[2]`.
+
+    An argument that is left out is None. `indexed`: the brackets are square.
+    """
+
+    name: str
+    arguments: tuple[Expression | None, ...]
+    indexed: bool = False
+
+
+Expression = Literal | Constant | Parameter | NamedParameter | Unary | Binary | Exists | Text | Call
+
+
+# -- the items of a block ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """An address with its value, `X12.5`, `G[#1]`; the address in upper case. `value_span` covers the value only.
+
+    The value is a `Literal` or `Constant` only where a plain number is written: `X[4]` is `+4`, a `Unary`.
+    """
+
+    address: str
+    value: Expression
+    span: Span
+    value_span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """`#1=...`, `#<name>=...`: takes effect after the whole block."""
+
+    target: Parameter | NamedParameter | Call
+    value: Expression
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A name that stands for itself or takes arguments in brackets, lower case: `SUPA`, `CYCLE81(10,0,2,-5)`.
+
+    An argument that is left out is None. `called`: brackets are written, if only empty ones.
+    """
+
+    name: str
+    arguments: tuple[Expression | None, ...]
+    called: bool
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """`( ... )`, `; ...` or another form of the dialect; delimiters included in the span."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Skip:
+    """Block skip `/` with its level: if none is written, the first there is (0 on SINUMERIK, else 1)."""
+
+    level: int
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """A flow-control line of RS274NGC: `o100 while [...]`, `o<name> call [..]`.
+
+    `label` is the name, or the number without leading zeros, as text (`o100` and `o<100>` are the same), else an
+    expression whose rounded value is that number. `keyword` is lower case; it is `program` for a bare program number
+    (`O1234`, `:1234`), which starts a program or a subprogram that M98 calls.
+    """
+
+    label: str | Expression
+    keyword: str
+    arguments: tuple[Expression, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Tape:
+    """The `%` that starts and ends a tape."""
+
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Opaque:
+    """Text that is understood to mean no motion and is passed through: program names, text after the end, ..."""
+
+    kind: str
+    span: Span
+
+
+Item = Word | Assignment | Command | Comment | Skip | Flow | Tape | Opaque
+
+
+BEYOND = 1e9
+"""A G or M code with a larger number is none, and all such are the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """What every block of one shape has in common.
+
+    items      what the block consists of, in the order written
+    n_numbers  how many numbers it has; `Literal.slot` and `Anchor.slot` count them from 0
+    g_codes    the constant G codes in tenths (G1 is 10, G38.2 is 382), in the order written
+    m_codes    the constant M codes in tenths, in the order written
+    slots      address -> slot, of the words with a plain number; not for G and M, which may stand several times
+    """
+
+    items: tuple[Item, ...]
+    n_numbers: int
+    g_codes: tuple[int, ...] = field(init=False, compare=False, repr=False)
+    m_codes: tuple[int, ...] = field(init=False, compare=False, repr=False)
+    slots: Mapping[str, int] = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        literals = {word.address: word.value.slot for word in self.words if isinstance(word.value, Literal)}
+        object.__setattr__(self, "g_codes", self._codes("G"))
+        object.__setattr__(self, "m_codes", self._codes("M"))
+        object.__setattr__(self, "slots", {key: slot for key, slot in literals.items() if key not in "GM"})
+
+    def _codes(self, address: str) -> tuple[int, ...]:
+        values = (word.value for word in self.words if word.address == address)
+        return tuple(round(10 * min(value.value, BEYOND)) for value in values if isinstance(value, Constant))
+
+    @property
+    def words(self) -> tuple[Word, ...]:
+        """The words of the block in the order written."""
+        return tuple(item for item in self.items if isinstance(item, Word))
+
+
+# -- the program ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """An NC program, lossless. One row per block (a line of the source, or several where the dialect continues lines).
+
+    source        the bytes as read; `program.source` is the program
+    path          as the user wrote it, for messages
+    dialect       the dialect it was read with
+    templates     the shapes that occur
+    template      (n,) index into `templates`
+    blocks        (n, 2) start and stop byte of each block, line end not included
+    first_number  (n + 1,) the numbers of block i are first_number[i] : first_number[i + 1]
+    number_spans  (m, 2) start and stop byte of each number in the source, sign included
+    numbers       (m,) their values as written (in the program's units)
+    first_line    the line of the file on which `source` begins, where that is a part of it
+    line_end      the line end that the file uses first, which that of new lines is, too
+    """
+
+    source: bytes
+    path: str
+    dialect: Dialect
+    templates: tuple[Template, ...]
+    template: NDArray[np.int32]
+    blocks: NDArray[np.int64]
+    first_number: NDArray[np.int64]
+    number_spans: NDArray[np.int64]
+    numbers: NDArray[np.float64]
+    first_line: int = 1
+    line_end: bytes = b"\n"
+    _lines_ended: int = field(default=-1, init=False, repr=False, compare=False)
+
+    def __len__(self) -> int:
+        return len(self.template)
+
+    def text_of(self, block: int) -> str:
+        """The text of a block, as Latin-1 (one character per byte)."""
+        start, stop = self.blocks[block]
+        return self.source[start:stop].decode("latin-1")
+
+    def items_of(self, block: int) -> tuple[Item, ...]:
+        """The items of a block."""
+        return self.templates[int(self.template[block])].items
+
+    def values_of(self, block: int) -> NDArray[np.float64]:
+        """The values of the block's numbers, by slot, (k,), as written."""
+        return self.numbers[self.first_number[block] : self.first_number[block + 1]]
+
+    def column(self, address: str) -> NDArray[np.float64]:
+        """The plain numbers after an address, (n,), one for each block; NaN where there is none, or not a plain one."""
+        slot = np.array([template.slots.get(address, -1) for template in self.templates], dtype=np.int64)[self.template]
+        values = np.full(len(self), np.nan)
+        rows = np.flatnonzero(slot >= 0)
+        values[rows] = self.numbers[self.first_number[rows] + slot[rows]]
+        return values
+
+    def position(self, block: int, anchor: Anchor) -> int:
+        """The byte of the source that an anchor of this block stands for."""
+        if anchor.slot < 0:
+            return int(self.blocks[block, 0 if anchor.slot == START else 1]) + anchor.offset
+        return int(self.number_spans[self.first_number[block] + anchor.slot, 1]) + anchor.offset
+
+    def span(self, block: int, span: Span) -> tuple[int, int]:
+        """Start and stop byte of a span of this block."""
+        return self.position(block, span.start), self.position(block, span.stop)
+
+    def slice(self, block: int, span: Span) -> str:
+        """The text of a span of this block, as Latin-1."""
+        start, stop = self.span(block, span)
+        return self.source[start:stop].decode("latin-1")
+
+    @property
+    def lines_ended(self) -> int:
+        """How many lines of the text have an end; blocks may go over several. Counted once."""
+        if self._lines_ended < 0:
+            object.__setattr__(self, "_lines_ended", _counted(self.source, "\n"))
+        return self._lines_ended
+
+    def line(self, block: int) -> int:
+        """The line number (from 1) on which the block starts."""
+        character = "\n" if b"\n" in self.source else "\r"
+        return self.first_line + self.lines_ended_before(int(self.blocks[block, 0]), character)
+
+    def lines_ended_before(self, stop: int, character: str = "\n") -> int:
+        """How many lines end before a byte."""
+        if character == "\n" and 2 * stop > len(self.source):
+            return self.lines_ended - _counted(self.source, character, stop)
+        return _counted(self.source, character, 0, stop)
+
+    def lines(self, blocks: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+        """The line numbers on which blocks (n,) start, all at once."""
+        text = np.frombuffer(self.source, dtype=np.uint8)
+        ends = np.flatnonzero(text == ord("\n" if b"\n" in self.source else "\r"))
+        lines: NDArray[np.int64] = self.first_line + np.searchsorted(ends, self.blocks[blocks, 0])
+        return lines
+
+    def place(self, block: int, span: Span | None = None) -> Place:
+        """Where a block, or a span of it, stands in the file: for messages."""
+        column = 0
+        if span is not None:
+            column = self.position(block, span.start) - int(self.blocks[block, 0]) + 1
+        return Place(self.path, self.line(block), column, self.text_of(block))
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(range(len(self)))
+
+
+def _counted(text: bytes, character: str, start: int = 0, stop: int | None = None) -> int:
+    """How often a character is there; `bytes.count` takes several times as long where there are many."""
+    return int(np.count_nonzero(np.frombuffer(text, dtype=np.uint8)[start:stop] == ord(character)))
+
+
+def view(array: NDArray[Any]) -> Sequence[Any]:
+    """An array as a sequence of plain Python numbers, made one at a time."""
+    return memoryview(np.ascontiguousarray(array))  # type: ignore[arg-type]

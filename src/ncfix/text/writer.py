@@ -1,0 +1,208 @@
+"""From edits back to bytes: what no edit covers goes out as it came in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix import fast
+from ncfix.text.numbers import fill
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """Replace the source's bytes from `start` up to `stop` by `text`; with start == stop, insert it there."""
+
+    start: int
+    stop: int
+    text: bytes
+
+
+def apply(source: bytes, edits: Sequence[Edit]) -> bytes:
+    """The source with the edits made; they are sorted and do not overlap (insertions at one place keep their order).
+
+    Raises ValueError if an edit reaches outside the source or into the one before it: a fault of the caller.
+    """
+    pieces: list[bytes] = []
+    done = 0
+    for edit in edits:
+        if not done <= edit.start <= edit.stop <= len(source):
+            raise ValueError(f"edit {edit} overlaps an earlier one, or lies outside the {len(source)} bytes")
+        pieces += (source[done : edit.start], edit.text)
+        done = edit.stop
+    pieces.append(source[done:])
+    return b"".join(pieces)
+
+
+def line_end(source: bytes) -> bytes:
+    """The line end that a text uses first; a carriage return alone only where there is no line feed."""
+    at = source.find(b"\n")
+    if at < 0 and b"\r" in source.rstrip(b"\r"):
+        return b"\r"
+    return b"\r\n" if at > 0 and source[at - 1 : at] == b"\r" else b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Splices:
+    """Many edits as columns.
+
+    start, stop  (n,) what is replaced
+    length       (n,) bytes of each replacement
+    data         the replacements, one after the other
+    """
+
+    start: NDArray[np.int64]
+    stop: NDArray[np.int64]
+    length: NDArray[np.int64]
+    data: bytes
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @classmethod
+    def of(cls, edits: Sequence[Edit]) -> Splices:
+        """From single edits."""
+        places = np.array([(edit.start, edit.stop, len(edit.text)) for edit in edits], dtype=np.int64).reshape(-1, 3)
+        return cls(places[:, 0], places[:, 1], places[:, 2], b"".join(edit.text for edit in edits))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Splices]) -> Splices:
+        """Several, sorted by place; at one place in the order given."""
+        parts = [part for part in parts if len(part)] or [cls.of(())]
+        if len(parts) == 1:
+            start, stop, length, data = parts[0].start, parts[0].stop, parts[0].length, parts[0].data
+        else:
+            columns = ([getattr(part, name) for part in parts] for name in ("start", "stop", "length"))
+            start, stop, length = map(np.concatenate, columns)
+            data = b"".join(part.data for part in parts)
+        if not (stop[:-1] > start[1:]).any():
+            return cls(start, stop, length, data)
+        order = np.argsort(2 * start + (stop > start), kind="stable")
+        ends = np.cumsum(length)
+        breaks = np.flatnonzero(np.diff(order) != 1)  # what lies between two breaks stands together already
+        heads, tails = np.append(0, breaks + 1), np.append(breaks, len(order) - 1)
+        edges = zip((ends - length)[order[heads]].tolist(), ends[order[tails]].tolist(), strict=True)
+        return cls(start[order], stop[order], length[order], b"".join(data[slice(*each)] for each in edges))
+
+    def moved(self, way: int) -> Splices:
+        """The same so many bytes further on."""
+        return replace(self, start=self.start + way, stop=self.stop + way)
+
+    def outside(self, spans: NDArray[np.int64]) -> Splices:
+        """Those that are not within spans (k, 2) of the source, which are apart from each other; in any order."""
+        starts, stops = np.sort(spans, axis=0).T
+        at = np.searchsorted(starts, self.start, side="right") - 1
+        kept = (at < 0) | (self.start > stops[at])
+        data = np.frombuffer(self.data, dtype=np.uint8)[np.repeat(kept, self.length)]
+        return Splices(self.start[kept], self.stop[kept], self.length[kept], data.tobytes())
+
+    def rows(self, chosen: NDArray[np.int64]) -> Splices:
+        """Some of them, (k,) in order."""
+        length, before = self.length.take(chosen), np.cumsum(self.length) - self.length
+        places = np.arange(int(length.sum())) + np.repeat(before.take(chosen) - (np.cumsum(length) - length), length)
+        data = np.frombuffer(self.data, dtype=np.uint8).take(places).tobytes()
+        return Splices(self.start.take(chosen), self.stop.take(chosen), length, data)
+
+    def edits(self) -> Iterator[Edit]:
+        """One by one."""
+        at = 0
+        for start, stop, length in zip(self.start.tolist(), self.stop.tolist(), self.length.tolist(), strict=True):
+            yield Edit(start, stop, self.data[at : at + length])
+            at += length
+
+
+def spliced(source: bytes, splices: Splices) -> bytes:
+    """The source with many edits made, as `apply` does it; raises ValueError likewise."""
+    if not len(splices):
+        return source
+    start, stop = splices.start, splices.stop
+    if start[0] < 0 or stop[-1] > len(source) or (start > stop).any() or (stop[:-1] > start[1:]).any():
+        raise ValueError(f"edits overlap, or lie outside the {len(source)} bytes")
+    if fast.engaged():
+        from ncfix.writer import writing_kernels
+
+        text, data = (np.frombuffer(each, dtype=np.uint8) for each in (source, splices.data))
+        out = np.empty(len(source) + len(data) - int((stop - start).sum()), dtype=np.uint8)
+        columns = (np.ascontiguousarray(each) for each in (start, stop, splices.length))
+        writing_kernels.spliced(text, *columns, data, out)
+        return out.tobytes()
+    other = np.flatnonzero(splices.length != stop - start)
+    begun, others = _in_place(source, splices, other), splices.rows(other)
+    return _laid_out(begun, others) if FEW * len(other) > len(splices) else _put_in(begun, others)
+
+
+def overlong(source: bytes, blocks: NDArray[np.int64], splices: Splices, limit: int) -> dict[int, int]:
+    """Blocks (n, 2) of which edits make a line of more than `limit` characters, and how many; 0 is no limit."""
+    if not limit or not len(splices):
+        return {}
+    grown = np.zeros(len(blocks), dtype=np.int64)
+    own = np.searchsorted(blocks[:, 0], splices.start, side="right") - 1
+    np.add.at(grown, own, np.maximum(splices.length - (splices.stop - splices.start), 0))
+    found = {}
+    for block in np.flatnonzero((grown > 0) & (blocks[:, 1] - blocks[:, 0] + grown > limit)).tolist():
+        start, stop = blocks[block].tolist()
+        edits = splices.rows(np.flatnonzero(own == block)).moved(-start)
+        longest = max(map(len, apply(source[start:stop], tuple(edits.edits())).splitlines()))
+        if longest > limit:
+            found[block] = longest
+    return found
+
+
+def left_alone(source: bytes, splices: Splices, text: bytes) -> bool:
+    """Whether a text that was made by edits is the source, byte for byte, between them: only asked where compiled."""
+    from ncfix.text import kernels
+
+    columns = tuple(np.ascontiguousarray(each) for each in (splices.start, splices.stop, splices.length))
+    old, new = (np.frombuffer(each, dtype=np.uint8) for each in (source, text))
+    fitting = len(new) - len(old) == int((splices.length + splices.start - splices.stop).sum())
+    return fitting and bool(kernels.left_alone(old, new, *columns))
+
+
+FEW = 16
+"""Where no more than one in so many edits changes the length of the text, these are made one by one."""
+
+
+def _in_place(source: bytes, splices: Splices, other: NDArray[np.int64]) -> memoryview:
+    """The source with all edits made but the `other` ones, which change its length."""
+    text, begins, length = bytearray(source), np.cumsum(splices.length) - splices.length, splices.length.copy()
+    length[other] = 0
+    for size in (np.flatnonzero(np.bincount(length)[1:]) + 1).tolist():
+        rows = np.flatnonzero(length == size)
+        _stretches(text, size)[splices.start.take(rows)] = _stretches(splices.data, size)[begins.take(rows)]
+    return memoryview(text)
+
+
+def _stretches(text: bytes | bytearray, size: int) -> NDArray[np.void]:
+    """The `size` bytes from each byte of a text on."""
+    return np.ndarray((len(text) - size + 1,), f"V{size}", text, strides=(1,))
+
+
+def _put_in(source: memoryview, splices: Splices) -> bytes:
+    """The source with all edits made, one by one."""
+    pieces, done, at = list[bytes | memoryview](), 0, 0
+    for start, stop, length in zip(splices.start.tolist(), splices.stop.tolist(), splices.length.tolist(), strict=True):
+        pieces += (source[done:start], splices.data[at : at + length])
+        done, at = stop, at + length
+    return b"".join([*pieces, source[done:]])
+
+
+def _laid_out(source: memoryview, splices: Splices) -> bytes:
+    """The source with all edits made, by masks of what is kept and of what is new."""
+    start, stop = splices.start, splices.stop
+    kept = ~_cover(len(source), start, stop)
+    ends = np.cumsum(splices.length + start - np.append(0, stop[:-1]))
+    out = np.empty(int(np.count_nonzero(kept) + splices.length.sum()), dtype=np.uint8)
+    new = _cover(len(out), ends - splices.length, ends)
+    out[new] = np.frombuffer(splices.data, dtype=np.uint8)
+    out[~new] = np.frombuffer(source, dtype=np.uint8)[kept]
+    return out.tobytes()
+
+
+def _cover(size: int, starts: NDArray[np.int64], stops: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """A mask over `size` bytes that is True from each start up to its stop."""
+    mask = np.zeros(size, dtype=np.bool_)
+    fill(mask, np.stack((starts, stops), axis=1), True)
+    return mask

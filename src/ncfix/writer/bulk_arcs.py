@@ -1,0 +1,210 @@
+"""Arcs among motions written all at once: their centre words, as soon as those of their axes are known.
+
+What the renderer does arc by arc (`render.BlockRenderer._kept_arc`), done as columns, byte for byte; a test holds the
+two together. An arc qualifies if it stays one, by G2 or G3, and has a plain R or plain I J K; a full circle does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.moves import Kind, Moves
+from ncfix.text.number_text import Styles, in_style, is_plain, laid_out, plain, rounded, styles_of
+from ncfix.text.tree import Program
+from ncfix.text.writer import Splices
+from ncfix.writer.bulk_layouts import NONE, Layouts, places_of
+from ncfix.writer.frames import FrameMap
+from ncfix.writer.pieces import Pieces
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+PLANES = np.array(((1, 2), (2, 0), (0, 1)))
+"""The axes of a plane, X Y Z being 0 1 2, in the order in which their words are added; by the one across it."""
+CIRCLE_MM = 1e-3
+"""Ends that are nearer to each other may be those of a full circle: that is for the renderer to say."""
+SEMICIRCLE = 1e-6
+"""Program units: a radius that is so near to half the chord says too little of where the centre is."""
+TIE = 1e-4
+"""Half output steps: so near to what is allowed between two centres, which side it is on is for the renderer to say."""
+
+
+def whole_arcs(program: Program, moves: Moves, pieces: Pieces, first: IntArray, layouts: Layouts) -> Mask:
+    """(n,) arcs that become one arc, and whose words are such that it may be written in bulk.
+
+    Those that the renderer writes by themselves may become more than that.
+
+    first  (n,) the first piece of each motion
+    """
+    fit: Mask = moves.kind == Kind.ARC
+    if not fit.any() or not {"X", "Y", "Z"} <= set(moves.axes):
+        return np.zeros(len(moves), dtype=np.bool_)
+    shapes = program.template[moves.block]
+    alone, single = layouts.alone[shapes], pieces.fraction[first] == 1
+    fit &= np.where(alone, single | layouts.further[shapes], single & pieces.arc[first])
+    fit &= layouts.round[shapes] & ((moves.modal == 20) | (moves.modal == 30))
+    rows = np.flatnonzero(fit)
+    plane = _spatial(moves)[_planes(moves, rows)]
+    chord = np.take_along_axis(moves.end[rows] - moves.start[rows], plane, axis=1)
+    known = np.isfinite(pieces.centre[first[rows]]).all(axis=1) | ~pieces.arc[first[rows]]
+    fit[rows] = known & (np.abs(chord) >= CIRCLE_MM).any(axis=1)
+    return fit
+
+
+def _planes(moves: Moves, rows: IntArray) -> IntArray:
+    """(k, 2) the axes of the planes of arcs `rows`, X Y Z being 0 1 2, in a frame that is not turned."""
+    planes: IntArray = PLANES.take(np.abs(moves.normal[rows]).argmax(axis=1), axis=0)
+    return planes
+
+
+def _spatial(moves: Moves) -> IntArray:
+    """The columns of X, Y and Z."""
+    return np.array([moves.axes.index(letter) for letter in "XYZ"])
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How numbers are written: the text they stand in, digits that the least increment needs, half output steps.
+
+    decimals, half  (n_axes,)
+    signed          with a sign
+    """
+
+    text: NDArray[np.uint8]
+    decimals: IntArray
+    half: FloatArray
+    signed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class CentreWords:
+    """The centre words of arcs in order: k rows, a column for each of the two axes of an arc's plane.
+
+    block    (k,) the block of each arc
+    plane    (k, 2) its axes
+    words    (k, 2) the number of each centre word, `NONE` where there is none
+    wanted   (k, 2) what they are to say, program numbers
+    rewrite  (k, 2) words that get another value; `styles`: how these are written, in this order
+    add      (k, 2) words that are missing
+    given_up (k,) R gives way to them
+    centre   (k, 3) command coordinates of the centre that is meant then, mm
+    clear    (k,) all that is clear to the last digit
+    """
+
+    block: IntArray
+    plane: IntArray
+    words: IntArray
+    wanted: FloatArray
+    decimals: IntArray
+    rewrite: Mask
+    styles: Styles
+    add: Mask
+    given_up: Mask
+    centre: FloatArray
+    clear: Mask
+
+    @classmethod
+    def of(
+        cls,
+        program: Program,
+        layouts: Layouts,
+        moves: Moves,
+        rows: IntArray,
+        ends: tuple[FloatArray, FloatArray],
+        centre: FloatArray,
+        frame: FrameMap,
+        manner: Manner,
+    ) -> CentreWords:
+        """Work out which words of arcs `rows` change.
+
+        ends    (k, n_axes) the commands at their starts and ends, as they are written
+        centre  (k, 3) where their centres shall be, command coordinates
+        """
+        block = moves.block.take(rows).astype(np.int64)
+        shape, plane, each = program.template.take(block), _planes(moves, rows), np.arange(len(rows))[:, None]
+        columns, first = _spatial(moves)[plane], program.first_number.take(block)[:, None]
+        half, decimals = manner.half[columns], manner.decimals[columns]
+        start, end = (frame.program(each_end)[each, columns] for each_end in ends)
+        point = frame.program_point(centre)
+        slots, radius = layouts.centre[shape[:, None], plane], layouts.radius[shape]
+        words = np.where(slots >= 0, first + slots, NONE)
+        by_radius = np.where(radius >= 0, np.abs(program.numbers.take(first[:, 0] + radius, mode="clip")), np.nan)
+        meant, off = _nearest_centre(by_radius, start, end, point[each, plane])
+        says = off <= 2 * half[:, 0]
+        fixed = layouts.fixed[shape[:, None], plane] | moves.arc_absolute[rows, None]
+        base = np.where(fixed, 0.0, start)
+        wanted = point[each, plane] - base
+        original = np.where(words >= 0, program.numbers.take(words, mode="clip"), 0.0)
+        changes = (np.abs(wanted - original) >= half) & ~says[:, None]
+        rewrite, digits = changes & (words >= 0), decimals.copy()
+        anew = np.flatnonzero(rewrite)
+        spans = program.number_spans.take(words.ravel().take(anew), axis=0)
+        styles = styles_of(manner.text, spans, signed=manner.signed)
+        digits.ravel()[anew] = np.maximum(digits.ravel().take(anew), styles.decimals)
+        clear = is_plain(wanted, digits) | ~changes
+        clear.ravel()[anew] &= styles.clear
+        point[each, plane] = np.where(says[:, None], meant, base + np.where(changes, rounded(wanted, digits), original))
+        sure = ~(np.abs(by_radius - np.hypot(*(end - start).T) / 2) < SEMICIRCLE)
+        sure &= ~(np.abs(off - 2 * half[:, 0]) < TIE * half[:, 0])
+        return cls(
+            block,
+            plane,
+            words,
+            wanted,
+            decimals,
+            rewrite,
+            styles,
+            changes & ~rewrite,
+            (radius >= 0) & ~says,
+            frame.command_point(point),
+            sure & clear.all(axis=1),
+        )
+
+    def rows(self, chosen: Mask) -> CentreWords:
+        """Some of the arcs."""
+        styles = self.styles.rows(np.flatnonzero(chosen[np.flatnonzero(self.rewrite) // 2]))
+        columns = {each.name: getattr(self, each.name)[chosen] for each in fields(self) if each.name != "styles"}
+        return CentreWords(styles=styles, **columns)
+
+    def splices(self, program: Program, layouts: Layouts, manner: Manner) -> Splices:
+        """What changes in the source."""
+        shape = program.template.take(self.block)
+        old, rows = np.flatnonzero(self.rewrite), np.flatnonzero(self.given_up)
+        spans = program.number_spans.take(self.words.ravel().take(old), axis=0)
+        new = in_style(self.wanted.ravel().take(old), self.styles, self.decimals.ravel().take(old))
+        lacking = np.flatnonzero(self.add)
+        owner = lacking // 2
+        heads = np.zeros((len(lacking), 4), dtype=np.uint8)
+        heads[:, 2:] = layouts.centre_heads[shape.take(owner), self.plane.ravel().take(lacking)]
+        wanted, decimals = self.wanted.ravel().take(lacking), self.decimals.ravel().take(lacking)
+        added = plain(wanted, decimals, heads, signed=manner.signed)
+        at = layouts.places(program, self.block.take(owner))
+        start, stop = np.concatenate((spans[:, 0], at)), np.concatenate((spans[:, 1], at))
+        order = np.argsort(2 * start + (stop > start), kind="stable")
+        texts = laid_out(new.and_then(added, order))
+        gone = [places_of(program, self.block.take(rows), layouts.taken[:, edge]) for edge in (0, 1)]
+        words = Splices(start.take(order), stop.take(order), texts.length, texts.data)
+        return Splices.joined([words, Splices(gone[0], gone[1], np.zeros(len(rows), np.int64), b"")])
+
+
+def _nearest_centre(
+    radius: FloatArray, start: FloatArray, end: FloatArray, wanted: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The centre (k, 2) that a radius means, of the two the one nearer to `wanted`, and how far off it is, (k,).
+
+    As `render.BlockRenderer._centre_by_radius`. Infinitely far where there is no radius (NaN), or none that reaches.
+    """
+    way = end - start
+    half_chord = np.hypot(way[:, 0], way[:, 1]) / 2
+    able = (radius > half_chord) & (half_chord > 0)
+    height = np.sqrt(np.where(able, radius * radius - half_chord * half_chord, 0.0))
+    across = np.stack((-way[:, 1], way[:, 0]), axis=1)
+    rise = height[:, None] * across / (2 * np.where(able, half_chord, 1.0))[:, None]
+    sides = [(start + end) / 2 + side * rise for side in (1, -1)]
+    off = [np.hypot(*(side - wanted).T) for side in sides]
+    nearest = np.where((off[1] < off[0])[:, None], sides[1], sides[0])
+    return nearest, np.where(able, np.minimum(*off), np.inf)

@@ -1,0 +1,176 @@
+"""Where things stand in the blocks of all shapes that are written in bulk: `BulkLayout` as columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.moves import Moves
+from ncfix.text.language import ArcLayout, BulkLayout, Language
+from ncfix.text.layout import AXIS_LETTERS, CENTRE_LETTERS
+from ncfix.text.tree import START, Program
+
+IntArray = NDArray[np.int64]
+
+OPENING, CLOSING = 4, 8
+"""Bytes that stand at most before and behind the axis words of a further piece."""
+
+
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How a program writes its numbers, and lines of further pieces.
+
+    signed  with a sign
+    comma   with a decimal comma
+    lined   such lines begin with more than axis words
+    """
+
+    signed: bool = False
+    comma: bool = False
+    lined: bool = False
+
+    @classmethod
+    def of(cls, layout: BulkLayout) -> Manner:
+        """That of a shape, and so of all shapes of the program."""
+        return cls(layout.signed, layout.comma, layout.lead is not None)
+
+
+NOTHING_SPECIAL = Manner()
+NONE, LED = -1, -2
+"""The slots of axes that have no word, and of those that other words of the block lead to where they shall be."""
+LED_HEAD = 1
+"""The letter of these."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layouts:
+    """The layouts of a program's shapes, one row for each template; columns by axis.
+
+    known      (s,) blocks of the shape may be written in bulk
+    further    (s,) further pieces of their motions, too
+    slots      (s, n_axes) which of the block's numbers an axis has, `NONE`, or `LED`
+    by_place   (s, n_axes) the axes as their words stand in the block, -1 behind the last one
+    by_letter  (n_axes,) the axes in the order in which programs write them
+    anchors    (s, 2) slot and offset of the place where missing words go
+    heads      (s, n_axes, 2) what stands before the number of a missing word: a blank, or 0 for nothing, and the
+               letter; 0 for it: such an axis gets no word; `LED_HEAD`: it is led
+    leads      (s, 2) slot and offset of the place up to which lines of further pieces repeat the beginning of the block
+    openings   (s, k) what stands on them before their words, 0 for nothing
+    closings   (s, k) what stands on them behind these
+    round      (s,) arcs of the shape may be written in bulk, too, as long as they stay one arc
+    centre     (s, 3) which of the block's numbers is I, J and K, or `NONE`
+    fixed      (s, 3) which of these count from the origin
+    centre_heads  (s, 3, 2) what stands before the number of one that is missing, as `heads`
+    radius     (s,) which of them is R, or `NONE`
+    alone      (s,) the renderer writes them
+    taken      (s, 2, 2) slot and offset of where that word begins, with the blank before it, and of its end
+    manner     how numbers and lines are written
+    """
+
+    known: NDArray[np.bool_]
+    further: NDArray[np.bool_]
+    slots: IntArray
+    by_place: IntArray
+    by_letter: IntArray
+    anchors: IntArray
+    heads: NDArray[np.uint8]
+    leads: IntArray
+    openings: NDArray[np.uint8]
+    closings: NDArray[np.uint8]
+    round: NDArray[np.bool_]
+    centre: IntArray
+    fixed: NDArray[np.bool_]
+    centre_heads: NDArray[np.uint8]
+    radius: IntArray
+    taken: IntArray
+    alone: NDArray[np.bool_]
+    manner: Manner = NOTHING_SPECIAL
+
+    @classmethod
+    def of(cls, language: Language, program: Program, moves: Moves) -> Layouts:
+        """The layouts of the shapes that occur and can be written in bulk."""
+        n, axes = len(program.templates), moves.axes
+        by_letter = np.array(sorted(range(len(axes)), key=lambda column: AXIS_LETTERS.index(axes[column])), np.int64)
+        table = cls(
+            np.zeros(n, np.bool_),
+            np.zeros(n, np.bool_),
+            np.full((n, len(axes)), -1),
+            np.full((n, len(axes)), -1),
+            by_letter,
+            np.zeros((n, 2), np.int64),
+            np.zeros((n, len(axes), 2), np.uint8),
+            np.full((n, 2), (START, 0)),
+            np.zeros((n, OPENING), np.uint8),
+            np.zeros((n, CLOSING), np.uint8),
+            np.zeros(n, np.bool_),
+            np.full((n, 3), NONE),
+            np.zeros((n, 3), np.bool_),
+            np.zeros((n, 3, 2), np.uint8),
+            np.full(n, NONE),
+            np.zeros((n, 2, 2), np.int64),
+            np.zeros(n, np.bool_),
+        )
+        if language.bulk is not None and len(moves):
+            shapes = program.template.take(moves.block)
+            for shape in np.flatnonzero(np.bincount(shapes)).tolist():
+                layout = language.bulk(program, int(moves.block[np.argmax(shapes == shape)]))
+                if layout is not None:
+                    table.enter(shape, layout, moves)
+                    table = replace(table, manner=Manner.of(layout))
+        return table
+
+    def enter(self, shape: int, layout: BulkLayout, moves: Moves) -> None:
+        """Fill in the row of a shape."""
+        axes = moves.axes
+        present = sorted((layout.slots[letter], column) for column, letter in enumerate(axes) if letter in layout.slots)
+        self.known[shape], self.further[shape] = True, layout.further
+        for place, (slot, column) in enumerate(present):
+            self.slots[shape, column], self.by_place[shape, place] = slot, column
+        self.anchors[shape] = layout.words_at
+        blank = ord(layout.blank) if layout.blank else 0
+        self.heads[shape] = [(blank, ord(letter.lower() if layout.lower else letter)) for letter in axes]
+        if layout.turns_named:
+            self.heads[shape, moves.rotary & (self.slots[shape] < 0), 1] = 0
+        if layout.led:
+            self.slots[shape, moves.rotary], self.heads[shape, moves.rotary, 1] = LED, LED_HEAD
+        if layout.lead is not None:
+            self.leads[shape] = layout.lead
+        for table, text in ((self.openings, layout.opening), (self.closings, layout.closing)):
+            table[shape, : len(text)] = list(text.encode("latin-1"))
+        if layout.arc is not None:
+            self._enter_arc(shape, layout, layout.arc)
+
+    def _enter_arc(self, shape: int, layout: BulkLayout, arc: ArcLayout) -> None:
+        """Fill in what the row of a shape says about arcs."""
+        self.round[shape], self.alone[shape] = True, arc.alone
+        self.centre[shape] = [arc.centre.get(letter, NONE) for letter in CENTRE_LETTERS]
+        self.fixed[shape] = [letter in arc.fixed for letter in CENTRE_LETTERS]
+        letters = [letter.lower() if layout.lower else letter for letter in CENTRE_LETTERS]
+        self.centre_heads[shape] = [(ord(layout.blank or "\0"), ord(letter)) for letter in letters]
+        if arc.radius is not None:
+            self.radius[shape], self.taken[shape] = arc.radius
+
+    def nameless(self, program: Program, blocks: IntArray) -> NDArray[np.bool_]:
+        """(k, n_axes) axes that get no word where `blocks` have none."""
+        nameless: NDArray[np.bool_] = self.heads[:, :, 1] == 0
+        return nameless.take(program.template.take(blocks), axis=0)
+
+    def places(self, program: Program, blocks: IntArray) -> IntArray:
+        """The bytes of `blocks` (k,) at which missing words go."""
+        return places_of(program, blocks, self.anchors)
+
+    def lead_ends(self, program: Program, blocks: IntArray) -> IntArray:
+        """The bytes up to which lines of further pieces repeat `blocks` (k,)."""
+        return places_of(program, blocks, self.leads)
+
+
+def places_of(program: Program, blocks: IntArray, anchors: IntArray) -> IntArray:
+    """The bytes of `blocks` (k,) that anchors (s, 2), those of each shape, stand for."""
+    slot, offset = anchors[program.template[blocks]].T
+    edges = program.blocks[blocks, np.where(slot == START, 0, 1)]
+    behind = slot >= 0
+    edges[behind] = program.number_spans[program.first_number[blocks[behind]] + slot[behind], 1]
+    places: IntArray = edges + offset
+    return places

@@ -1,0 +1,399 @@
+"""Corrected motions back into the text of the program: which bytes change, and what the control will understand.
+
+The emitter walks the motions in the order of execution and keeps the book that the control keeps: where it stands
+(as emitted, digits and all) and which motion code is in force. A block that is executed several times must come out
+the same each time; where it does not, the block is reported as a conflict, and the caller keeps it as it was.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.moves import FeedMode, Kind, Kinematics, Moves, Rule
+from ncfix.control.standstill import jumps, passed_through, renamed
+from ncfix.control.turns import UNTIMED, at_their_pace, is_dragged, minutes, turn_alone, turns_alone
+from ncfix.text.language import BlockLayout, language_of
+from ncfix.text.tree import Program, view
+from ncfix.text.writer import Edit, Splices, overlong
+from ncfix.writer.bulk import Bulk
+from ncfix.writer.bulk_alone import write_alone
+from ncfix.writer.frames import FrameMap
+from ncfix.writer.levels import LevelBook
+from ncfix.writer.pieces import Pieces
+from ncfix.writer.render import STRAIGHT_AND_ARCS
+from ncfix.writer.second_reading import SecondReading
+from ncfix.writer.target import TANGENTIAL, Rendered, Target, plane_across
+
+FloatArray = NDArray[np.float64]
+
+NOWHERE = np.full(3, np.nan)
+SEVERAL_STATES = "the block is executed from several states that need different corrections"
+FLOW = "the block is more than words"
+TOO_LONG = "the corrected line would have {} characters, and the control takes {}"
+MODE_LOST = "a kept block that follows relies on its motion code"
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What was written.
+
+    splices    replacements and insertions in the source, sorted
+    end        (m, n_axes) the command at the end of each piece as the control will understand it
+    centre     (m, 3) the centre of arc pieces likewise
+    start      (n, n_axes) the command at the start of each motion likewise
+    conflicts  block -> why it cannot be written; the text is not to be used while there are any
+    added_blocks  lines added
+    """
+
+    splices: Splices
+    end: FloatArray
+    centre: FloatArray
+    start: FloatArray
+    conflicts: dict[int, str]
+    added_blocks: int
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """The replacements and insertions one by one."""
+        return tuple(self.splices.edits())
+
+
+def emit(
+    program: Program,
+    moves: Moves,
+    pieces: Pieces,
+    least_increment: FloatArray,
+    reading: SecondReading | None = None,
+    done: FloatArray | None = None,
+    kinematics: Kinematics | None = None,
+    bulk: Bulk | None = None,
+) -> Emission:
+    """Write `pieces` into the program.
+
+    least_increment  (n_axes,) mm and rad: what the control can resolve
+    reading          what a control made of an earlier attempt, if it was not what was meant
+    done             (n_axes,) the command at the end of the first motion, if that is written already
+    kinematics       what the machine's own say where tool-centre-point control goes on or off; else an attempt shows it
+    bulk             the stretches of motions that all go on from each other, if known; then `done` is where they begin
+    """
+    reading = reading or SecondReading(moves.frame, moves.frames)
+    emitter = _Emitter(program, moves, pieces, least_increment, reading, kinematics, bulk)
+    return emitter.run(done, 0 if done is None or bulk is not None else 1)
+
+
+class _Emitter:
+    """The walk over the motions; `run()` is called once.
+
+    position     (n_axes,) the command at which the control stands, as emitted
+    jumps        (n, n_axes) where a motion does not start where the one before ended
+    replaced     the motion code in force, in tenths, where it is not the program's own; else None
+    replaced_by  the block that has put it there
+    cycle_end    (n_axes,) the bottom of the last hole while canned cycles follow each other; None otherwise
+    levels       the level R of canned cycles
+    in_stretch   (n,) motions that were written in bulk
+    written      block -> what was written of each of the others
+    latest       the blocks among these whose edits have not been taken yet
+    end, centre, start, conflicts  as in `Emission`
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        moves: Moves,
+        pieces: Pieces,
+        least_increment: FloatArray,
+        reading: SecondReading,
+        kinematics: Kinematics | None,
+        bulk: Bulk | None,
+    ) -> None:
+        self.program, self.language, self.kinematics = program, language_of(program.dialect), kinematics
+        self.moves, self.pieces, self.reading = moves, pieces, reading
+        self.nominal_frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in moves.frames]
+        self.frames = [FrameMap(frame, moves.axes, moves.rotary) for frame in reading.frames]
+        self.decimals = [frame.decimals(least_increment) for frame in self.frames]
+        self.jumps = jumps(moves) if bulk is None else np.zeros(moves.start.shape, dtype=bool)
+        self.bulk = bulk or Bulk.of(self.language, program, moves, pieces, reading.frame, reading.frames, self.jumps)
+        self.first_piece = self.bulk.first_piece
+        self.kind, self.rotary = view(moves.kind), tuple(moves.rotary.tolist())
+        self.wordless, self.increments = moves.wordless, moves.increments
+        x, y, z = (moves.axes.index(c) if c in moves.axes else -1 for c in "XYZ")
+        self.spatial = (x, y, z)
+        self.layouts: dict[int, BlockLayout | None] = {}
+        self.position = moves.start[0].copy() if len(moves) else np.zeros(0)
+        self.replaced: int | None = None
+        self.cycle_end: FloatArray | None = None
+        self.levels = LevelBook(moves, pieces)
+        self.written: dict[int, Rendered] = {}
+        self.latest, self.added = list[int](), 0
+        self.in_stretch = np.zeros(len(moves), dtype=bool)
+        self.conflicts, self.replaced_by = dict[int, str](), -1
+        self.end, self.centre, self.start = pieces.end.copy(), pieces.centre.copy(), moves.start.copy()
+
+    def run(self, done: FloatArray | None, row: int) -> Emission:
+        """Walk all motions from `row` on; the control stands at `done` (n_axes,) there, if that is given."""
+        self.position = self.position if done is None else done.copy()
+        while row < len(self.moves):
+            count = self._stretch(row)
+            if count:
+                row += count
+                continue
+            self._resync(row)
+            self.start[row] = self.position
+            if self.pieces.kept[self.first_piece[row]]:
+                self._keep(row)
+            else:
+                self._write(row)
+            if self.kind[row] == Kind.CYCLE:
+                self.cycle_end = self.position
+                self._retract(row)
+            elif self.kind[row] != Kind.DWELL:
+                self.cycle_end = None
+                self.levels.forget()
+            row += 1
+        self._write_centres()
+        splices = Splices.joined([*self.bulk.parts, Splices.of(self._edits())])
+        limit = self.program.dialect.line_limit
+        for block, length in overlong(self.program.source, self.program.blocks, splices, limit).items():
+            self.conflicts.setdefault(block, TOO_LONG.format(length, limit))
+        return Emission(splices, self.end, self.centre, self.start, self.conflicts, self.added + self.bulk.added)
+
+    @cached_property
+    def moved(self) -> NDArray[np.bool_]:
+        """(n, n_axes) axes that a motion takes to its end; found out when a motion is kept."""
+        return self.moves.moved
+
+    @cached_property
+    def turns(self) -> NDArray[np.bool_]:
+        """(n,) motions that turn rotary axes alone."""
+        return turns_alone(self.moves)
+
+    def _stretch(self, row: int) -> int:
+        """Write the stretch of motions that begins here all at once; the number of motions written."""
+        if self.replaced is not None:
+            return 0
+        frame, before = self.reading.frame[row], len(self.bulk.parts)
+        ends = self.bulk.take(row, self.position, self.frames[frame], self.decimals[frame])
+        if ends is None:
+            return 0
+        if self.latest:
+            self.bulk.parts.insert(before, Splices.of(self._edits()))
+        first = self.first_piece[row]
+        stop = int(np.searchsorted(self.first_piece, first + len(ends)))
+        self.end[first : first + len(ends)] = ends
+        self.start[row] = self.position
+        self.start[row + 1 : stop] = ends.take(self.first_piece[row + 1 : stop] - 1 - first, axis=0)
+        self.in_stretch[row:stop], self.cycle_end = True, None
+        self._write_alone(row, stop)
+        self.position = self.end[first + len(ends) - 1].copy()
+        return stop - row
+
+    def _write_alone(self, row: int, stop: int) -> None:
+        """Write the arcs of a stretch that the renderer has to write."""
+        rows = write_alone(self.bulk.alone(row, stop), stop, self.start, self.moves.programmed, self._written)
+        self.in_stretch[rows] = False
+        self.replaced = self.replaced if stop - 1 in rows[-1:] else None
+        self.bulk.take_out(rows)
+
+    def _written(self, row: int) -> FloatArray:
+        """Write a motion by itself from its start on; the command at its end."""
+        self.position, self.replaced = self.start[row], None
+        (self._keep if self.pieces.kept[self.first_piece[row]] else self._write)(row)
+        return np.asarray(self.position)
+
+    def _write_centres(self) -> None:
+        """Write the centres of the arcs in stretches; where these are not clear, the arc by itself."""
+        rows = self.pieces.move[np.flatnonzero(self.pieces.arc)]
+        rows = rows[self.in_stretch[rows]]
+        frames = self.reading.frame[rows]
+        for frame in sorted(set(frames.tolist())):
+            own = rows[frames == frame]
+            at = self.first_piece[own]
+            ends = self.start[own], self.end[at]
+            clear, centre = self.bulk.turn(own, ends, self.frames[frame], self.decimals[frame])
+            self.centre[at[clear]] = centre
+            for row in own[~clear].tolist():
+                self._written(row)
+
+    # -- the control's book -------------------------------------------------------------------------------------------
+
+    def _resync(self, row: int) -> None:
+        """Where the control moved without a motion of ours (its own cycles, reference points), take its word."""
+        jump = self.jumps[row]
+        if jump.any():
+            began = self.reading.start
+            read = self.moves.start[row] if began is None else began[row]
+            still = renamed(self.moves, row, self.position, self.kinematics) if began is None else None
+            self.position = np.where(jump, read, self.position) if still is None else still
+
+    def _retract(self, row: int) -> None:
+        """After a canned cycle the control stands where it started, or at R; an attempt shows if it does not."""
+        if row + 1 == len(self.moves) or self.reading.start is not None:
+            return
+        moves, risen = self.moves, self.levels.returns(row)
+        if self.levels.approach is not None:
+            self.position = np.where(risen, self.levels.approach, self.position)
+        back = (moves.start[row + 1] == moves.start[row]) & (moves.end[row] != moves.start[row])
+        self.position = np.where(back & ~risen, self.start[row], self.position)
+        self.jumps[row + 1] &= ~(back | risen)
+
+    def _keep(self, row: int) -> None:
+        moves = self.moves
+        if self.kind[row] != Kind.DWELL:
+            self.levels.forget()
+        moved, began, ended = self.moved[row], self.reading.start, self.reading.end
+        if began is not None and ended is not None:  # a departure goes on along a line that is now a corrected one
+            moved = moved | (np.abs(ended[row] - began[row]) > 0)
+        passed = passed_through(moves, row, self.position, self.kinematics) if began is None else None
+        self.position = np.where(moved, self._kept_end(row), self.position) if passed is None else passed
+        self.end[self.first_piece[row]] = self.position
+        if self.kind[row] not in (Kind.RAPID, Kind.FEED, Kind.ARC) or moves.rule[row] == Rule.PASS:
+            return
+        self._check_code(row)
+
+    def _kept_end(self, row: int) -> FloatArray:
+        moves = self.moves
+        if self.reading.end is not None:
+            return np.asarray(self.reading.end[row])
+        way = moves.end[row] - moves.start[row]
+        return np.asarray(np.where(self.increments[row], self.position + way, moves.end[row]))
+
+    def _check_code(self, row: int) -> None:
+        """A motion that is kept must not rely on a code that was replaced."""
+        layout = self._layout(int(self.moves.block[row]))
+        lost = self.replaced not in (None, int(self.moves.modal[row])) and (layout is None or layout.motion is None)
+        if lost and self.replaced_by not in self.conflicts:
+            self.conflicts[self.replaced_by] = MODE_LOST
+        self.replaced = None
+
+    def _note_code(self, row: int, code: int) -> None:
+        """Note the motion code in force where it is not the program's own."""
+        own = int(self.moves.modal[row])
+        self.replaced = code if code != own and code in STRAIGHT_AND_ARCS else None
+        self.replaced_by = int(self.moves.block[row])
+
+    # -- writing a motion ---------------------------------------------------------------------------------------------
+
+    def _write(self, row: int) -> None:
+        block = int(self.moves.block[row])
+        layout = self._layout(block)
+        if layout is None:
+            self.conflicts.setdefault(block, FLOW)
+            self._keep(row)
+            return
+        rows = slice(self.first_piece[row], self.first_piece[row + 1])
+        target = self._target(row, rows)
+        if target.turn_by_feed and target.inverse_time and turn_alone(self.moves, row) > 0:
+            target = at_their_pace(target)
+        if math.isinf(target.turn_minutes) and is_dragged(target):
+            self.conflicts.setdefault(block, UNTIMED)
+        rendered = self.language.render(self.program, block, layout, target)
+        if rendered.conflict:
+            self.conflicts.setdefault(block, rendered.conflict)
+        ends, frame = np.array(rendered.ends), self.frames[self.reading.frame[row]]
+        self.end[rows] = frame.command(ends)
+        if rendered.centre is not None:
+            self.centre[rows.start] = frame.command_point(rendered.centre)
+        for piece, centre in rendered.centres.items():
+            self.centre[rows.start + piece] = frame.command_point(centre)
+        self.levels.note(int(self.reading.frame[row]), frame, target, rendered)
+        still = frame.still(ends[-1] == target.start)
+        self.position = np.where(still, self._before(row), self.end[rows.stop - 1])
+        self.end[rows.stop - 1] = self.position
+        self._note_code(row, rendered.code_behind(target))
+        if block not in self.written:
+            self.written[block] = rendered
+            self.latest.append(block)
+        elif self.written[block].text != rendered.text:
+            self.conflicts.setdefault(block, SEVERAL_STATES)
+
+    def _target(self, row: int, rows: slice) -> Target:
+        moves, pieces = self.moves, self.pieces
+        at = int(self.reading.frame[row])
+        frame = self.frames[at]
+        as_programmed = self.nominal_frames[moves.frame[row]]
+        start = frame.program(self._before(row).copy())
+        nominal_start = as_programmed.program(moves.start[row].copy())
+        nominal = as_programmed.program(moves.end[row].copy())
+        arc, modal, kind = bool(pieces.arc[rows.start]), int(moves.modal[row]), self.kind[row]
+        straight = modal if modal in (0, 10) or kind == Kind.CYCLE else 10
+        fractions, ends, wordless = pieces.fraction[rows], frame.program(pieces.end[rows].copy()), self.wordless[row]
+        if wordless.any():
+            ends[:, wordless] = start[wordless]
+        shares = np.diff(fractions, prepend=0.0) if len(fractions) > 1 else fractions
+        arcs = pieces.arc[rows] if len(fractions) > 1 and pieces.arc[rows].any() else None
+        return Target(
+            letters=moves.axes,
+            decimals=self.decimals[self.reading.frame[row]],
+            start=start,
+            nominal=nominal,
+            original=nominal - nominal_start if moves.incremental[row] else nominal,
+            ends=ends,
+            arc=arc,
+            centre=frame.program_point(pieces.centre[rows.start]) if arc else NOWHERE,
+            original_centre=as_programmed.program_point(moves.centre[row]) if kind == Kind.ARC else NOWHERE,
+            origin=as_programmed.point_of(nominal_start),
+            plane=plane_across(frame.frame.rotation.T @ moves.normal[row]) if kind == Kind.ARC else (0, 1, 2),
+            spatial=self.spatial,
+            diameter=frame.frame.diameter,
+            incremental=bool(moves.incremental[row]),
+            centre_absolute=bool(moves.arc_absolute[row]),
+            shares=shares if pieces.share is None else pieces.share[rows],
+            inverse_time=int(moves.feed_mode[row]) == FeedMode.INVERSE_TIME and modal != 0,
+            code=modal if arc else straight,
+            active_code=modal if self.replaced is None else self.replaced,
+            feed=float(moves.feed[row] / moves.frames[moves.frame[row]].unit),
+            turn_minutes=self._turn_minutes(row),
+            turn_by_feed=self.program.dialect.feed_of == "linear",
+            arcs=arcs,
+            centres=None if arcs is None else frame.program_point(pieces.centre[rows]),
+            arc_code=TANGENTIAL.get(modal, modal),
+            increments=frame.frame.increments,
+            rotary=self.rotary,
+            pointing=moves.pointing,
+            rotation=frame.frame.rotation,
+            offset=frame.frame.offset,
+            wordless=tuple(wordless.tolist()),
+            call=moves.call_of(row),
+            measured=() if moves.measured is None else tuple(moves.measured[row].tolist()),
+            spelled=() if moves.spelled is None else tuple(moves.spelled[row].tolist()),
+            level=self.levels.wanted(row, rows.start, at, frame, as_programmed, self.position),
+        )
+
+    def _turn_minutes(self, row: int) -> float:
+        """The time of a turn of rotary axes alone, where the control might give its feed to linear axes."""
+        if self.program.dialect.feed_of == "all" or not self.turns[row]:
+            return float("nan")
+        own = self.program.templates[int(self.program.template[self.moves.block[row]])].slots
+        return minutes(self.moves, row, own_feed="F" in own)
+
+    def _before(self, row: int) -> FloatArray:
+        """Where axes stand that the block does not name; in a canned cycle the depth of the last hole counts."""
+        if self.cycle_end is not None and self.kind[row] == Kind.CYCLE:
+            return self.cycle_end
+        return self.position
+
+    def _layout(self, block: int) -> BlockLayout | None:
+        key = int(self.program.template[block]) if self.language.alike else block
+        if key not in self.layouts:
+            self.layouts[key] = self.language.layout(self.program, block)
+        return self.layouts[key]
+
+    # -- the result ---------------------------------------------------------------------------------------------------
+
+    def _edits(self) -> list[Edit]:
+        """What was written one by one since this was last asked."""
+        edits, end_of_line = list[Edit](), self.program.line_end.decode()
+        for block in sorted(self.latest):
+            rendered = self.written[block]
+            edits.extend(Edit(start, stop, text.encode("latin-1")) for start, stop, text in rendered.edits)
+            if lines := rendered.lines_before(self.written.get(block + 1)):
+                at = int(self.program.blocks[block, 1])
+                edits.append(Edit(at, at, "".join(end_of_line + line for line in lines).encode("latin-1")))
+            self.added += len(lines) + rendered.opens
+        self.latest = []
+        return edits

@@ -1,0 +1,177 @@
+"""What one corrected motion shall become in a block, and what became of it: what goes into a renderer and comes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ncfix.control.moves import CycleCall
+from ncfix.control.pointing import Pointing
+
+FloatArray = NDArray[np.float64]
+
+LINE = 10
+"""The code of straight motions at feed, in tenths."""
+
+TANGENTIAL = {1010: 30, 1011: 20}
+"""Codes of arcs that go on in the direction of the motion before them, to the left and to the right: once that motion
+is corrected they are not the same arcs any more, and are written as those that they were."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """What the level R of a canned cycle shall be, in program numbers.
+
+    across   the column of the axis along which the cycle drills
+    wanted   what R shall be
+    nominal  what it was as programmed
+    before   what is in force before the block, NaN where that is not known
+    least    R must not be lower; NaN: it may
+    """
+
+    across: int
+    wanted: float
+    nominal: float
+    before: float
+    least: float
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What one motion shall become, in program numbers.
+
+    letters      axis letters of the columns
+    decimals     (n_axes,) digits after the point that the least increment needs
+    start        (n_axes,) where the control stands, as emitted so far (NaN unknown)
+    nominal      (n_axes,) where the motion ended as programmed
+    original     (n_axes,) value of each programmed word: target or increment
+    ends         (k, n_axes) where its pieces shall end
+    arc          the first piece is an arc
+    centre       (3,) of that arc, and
+    original_centre (3,) the centre as programmed, absolute
+    origin       (3,) the start of the motion as programmed: what incremental centres were meant from
+    plane        the arc's two axes in its plane and the one across it, as indices of X Y Z
+    spatial      columns of X Y Z (-1: not an axis of the machine)
+    diameter     X is a diameter; centres and radii are not
+    incremental, centre_absolute   how words are meant
+    shares       (k,) fraction of the block's time in each piece, for G93
+    inverse_time the block's F is the time of the block
+    code         motion code the pieces need, tenths
+    active_code  motion code in force before the block, as emitted
+    feed         the number after F that is in force, NaN where there is none
+    turn_minutes the time of a turn of rotary axes alone whose F is degrees per minute; NaN for other motions
+    turn_by_feed that time is kept by F, as the speed of the axes that the control goes by; else by inverse time
+    back_to_inverse_time   the turn was in inverse time, and is again behind it
+    increments   what a number without a decimal point counts, linear and rotary words; 1.0 where the point is nothing
+    rotary       (n_axes,) which axes turn
+    arcs, centres (k,), (k, 3): where an arc becomes several pieces, which of them are arcs, and about what
+    arc_code     motion code of these, tenths
+    pointing     how rotary positions (rad) point the tool, where the program gives its direction
+    rotation     (3, 3) how the frame is turned
+    offset       (n_axes,) of the frame, mm and rad
+    level        of a canned cycle whose R is to be written: what it shall be
+    measured     (n_axes,) axes whose words are computed at run time, and must be; empty: no axis
+    wordless     (n_axes,) axes that have no word and must get none; empty: no axis
+    call         of a canned cycle whose depth stands in a call of its own
+    spelled      (n_axes,) axes that get a word even if they stand where it leads; empty: no axis
+    """
+
+    letters: tuple[str, ...]
+    decimals: NDArray[np.int64]
+    start: FloatArray
+    nominal: FloatArray
+    original: FloatArray
+    ends: FloatArray
+    arc: bool
+    centre: FloatArray
+    original_centre: FloatArray
+    origin: FloatArray
+    plane: tuple[int, int, int]
+    spatial: tuple[int, int, int]
+    diameter: bool
+    incremental: bool
+    centre_absolute: bool
+    shares: FloatArray
+    inverse_time: bool
+    code: int
+    active_code: int
+    feed: float = float("nan")
+    turn_minutes: float = float("nan")
+    turn_by_feed: bool = False
+    back_to_inverse_time: bool = False
+    arcs: NDArray[np.bool_] | None = None
+    centres: FloatArray | None = None
+    arc_code: int = 0
+    increments: tuple[float, float] = (1.0, 1.0)
+    rotary: tuple[bool, ...] = ()
+    pointing: Pointing | None = None
+    rotation: FloatArray | None = None
+    offset: FloatArray | None = None
+    level: Level | None = None
+    wordless: tuple[bool, ...] = ()
+    call: CycleCall | None = None
+    measured: tuple[bool, ...] = ()
+    spelled: tuple[bool, ...] = ()
+
+    def may_name(self, column: int) -> bool:
+        """Whether an axis has a word, or may get one."""
+        return not self.wordless or not self.wordless[column]
+
+    def must_name(self, column: int) -> bool:
+        """Whether an axis gets a word even if it stands where that leads it."""
+        return bool(self.spelled) and self.spelled[column]
+
+    @property
+    def last_code(self) -> int:
+        """The motion code in force after the pieces, in tenths; behind a call in a block of its own as before."""
+        if self.call is not None and not self.call.modal:
+            return self.active_code
+        if self.arcs is None:
+            return TANGENTIAL.get(self.code, self.code)
+        return self.arc_code if self.arcs[-1] else LINE
+
+
+@dataclass(slots=True)
+class Rendered:
+    """The edits (start, stop, text) of the source, the lines to put after the block, and what they amount to.
+
+    centre, centres  of the first piece if it is an arc, and of further ones by their number
+    level            the R that is in force behind the block, if that is known
+    conflict         why the motion cannot be written after all; empty if it is
+    code             the motion code that is in force behind the block, in tenths, if it is another than was asked for
+    opens            what is written begins with a call of a cycle, which replaces the one in force
+    closing          the line behind it with which the call before comes back, unless the next block opens with its own
+    """
+
+    edits: list[tuple[int, int, str]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    ends: list[FloatArray] = field(default_factory=list)
+    centre: FloatArray | None = None
+    centres: dict[int, FloatArray] = field(default_factory=dict)
+    level: float | None = None
+    conflict: str = ""
+    code: int | None = None
+    opens: bool = False
+    closing: str = ""
+
+    def code_behind(self, target: Target) -> int:
+        """The motion code that is in force behind the block, in tenths."""
+        return target.last_code if self.code is None else self.code
+
+    def lines_before(self, next_block: Rendered | None) -> list[str]:
+        """The lines to put after the block, where that is what is written of the next one; None: nothing."""
+        called = next_block is not None and next_block.opens
+        return [*self.lines, self.closing] if self.closing and not called else self.lines
+
+    @property
+    def text(self) -> tuple[object, ...]:
+        """What the control reads; two executions of a block agree when this is equal."""
+        return (tuple(self.edits), tuple(self.lines), self.closing)
+
+
+def plane_across(normal: FloatArray) -> tuple[int, int, int]:
+    """The two columns of an arc's plane and the one across it, from the plane's normal in program axes."""
+    across = int(np.argmax(np.abs(normal)))
+    return ((1, 2, 0), (2, 0, 1), (0, 1, 2))[across]
