@@ -46,6 +46,12 @@ def handed(kind: str, name: str, found: Any, gives: type | tuple[type, ...]) -> 
     raise PluginError.of("NCF508", text, hint=_hint(plugin))
 
 
+def useless(kind: str, name: str, why: str, hint: str) -> PluginError:
+    """The error NCF508 that says why what is registered under this name is of no use, and which plugin brings it."""
+    plugin = load_plugins().owner(kind, name)
+    return PluginError.of("NCF508", why if plugin is None else f"{_said(plugin)}: {why}", hint=hint)
+
+
 @contextmanager
 def working(kind: str, name: str) -> Iterator[None]:
     """While what is registered under this name is at work; raises `PluginError` NCF507, see `called`."""

@@ -22,6 +22,7 @@ from ncfix_fanuc.macro.corners import axes_of_corner, has_corners
 from ncfix_fanuc.macro.following import MacroFollower, runs_straight_on
 from ncfix_fanuc.macro.interpreter import MacroInterpreter
 from ncfix_fanuc.macro.render import render
+from ncfix_fanuc.macro.rules import RULES
 from ncfix_iso.rs274.language import RS274, writable
 
 if TYPE_CHECKING:
@@ -90,4 +91,5 @@ FANUC: Language = replace(
     unroll=unroll,
     follower=MacroFollower,
     straight=runs_straight_on,
+    semantics=frozenset(RULES),
 )

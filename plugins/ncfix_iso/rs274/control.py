@@ -12,7 +12,7 @@ from ncfix.control.modal import Saved
 from ncfix.text.dialect import Dialect
 from ncfix.text.language import Run
 from ncfix_iso.rs274.expressions import Evaluate
-from ncfix_iso.rs274.groups import ISO, LINUXCNC, Rules
+from ncfix_iso.rs274.groups import RULES, Rules
 from ncfix_iso.rs274.parameters import Parameters
 
 RUNTIME_BRANCH = "which blocks are executed here is decided at run time"
@@ -55,7 +55,7 @@ class Control(shared.Control):
 
     def __init__(self, run: Run, dialect: Dialect, rules: Rules | None = None) -> None:
         super().__init__(run, dialect)
-        self.rules: Rules = rules or (LINUXCNC if dialect.semantics == "linuxcnc" else ISO)
+        self.rules: Rules = rules or RULES[dialect.semantics]
         self.needs_feed = self.modal.retract_to_r = self.rules.strict
         self.parameters = Parameters()
         self.saved: list[Saved | None] = [None]

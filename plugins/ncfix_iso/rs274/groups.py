@@ -135,3 +135,5 @@ class Rules:
 
 LINUXCNC = Rules(True, LINUXCNC_G, frozenset(), repeats="L")
 ISO = Rules(False, ISO_G, ISO_HARMLESS_G, takes=frozenset({40}))
+RULES = {"iso": ISO, "linuxcnc": LINUXCNC}
+"""By `Dialect.semantics`."""

@@ -18,6 +18,7 @@ from ncfix.writer.target import Rendered, Target
 from ncfix_iso.rs274.blocks import parse_block
 from ncfix_iso.rs274.control import Control
 from ncfix_iso.rs274.following import RS274Follower
+from ncfix_iso.rs274.groups import RULES
 from ncfix_iso.rs274.interpreter import Interpreter
 
 if TYPE_CHECKING:
@@ -82,4 +83,5 @@ RS274 = Language(
     arc_pieces=True,
     bulk=in_bulk,
     follower=RS274Follower,
+    semantics=frozenset(RULES),
 )

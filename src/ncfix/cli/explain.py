@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ from ncfix.cli import console
 from ncfix.cli.completion import OneOf
 from ncfix.cli.options import json_option
 from ncfix.diagnostics import Code, UsageError
+from ncfix.plugin_faults import called
 from ncfix.plugins import registry
 
 FLOORS = (
@@ -36,8 +38,8 @@ def all_codes() -> dict[str, Code]:
     for module in modules:
         if find_spec(module):
             found |= import_module(module).CODES
-    for codes in registry("codes").values():
-        found |= codes()
+    for name, codes in registry("codes").items():
+        found |= called("codes", name, codes, gives=Mapping)
     return dict(sorted(found.items()))
 
 

@@ -62,8 +62,9 @@ class Dialect:
     passes              what is left as it is, by rule
     refuses             what cannot be corrected, and is named with its line
     language            where its `Language` is: the functions that read, follow and write it, as "module:NAME"
-    semantics           whose rules hold where controls of the RS274 family differ: "linuxcnc" (what its interpreter
-                        refuses is an error) or "iso" (codes that cannot move anything are passed over)
+    semantics           which of its language's rule sets holds; of RS274: "linuxcnc" (what its interpreter refuses
+                        is an error) or "iso" (codes that cannot move anything are passed over); of Fanuc: "fanuc",
+                        "haas" or "mitsubishi". Another name is an error (NCF508) when the language is needed
     """
 
     name: str

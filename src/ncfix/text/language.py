@@ -12,7 +12,8 @@ from functools import lru_cache
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Protocol
 
-from ncfix.plugin_faults import called
+from ncfix.plugin_faults import called, useless
+from ncfix.plugins import nearest
 from ncfix.text.reach import runs_straight_on
 
 if TYPE_CHECKING:
@@ -130,6 +131,7 @@ class Language:
     unroll    the blocks of a program as they are executed, for `flatten`; None if the language cannot
     follower  as `follow`, but for a program that comes in parts, of a dialect
     straight  a program with blocks of this shape may come in parts: they have nothing to do with others elsewhere
+    semantics  the rule sets that the family has, by the names that `Dialect.semantics` may give
     """
 
     split: Callable[[bytes], NDArray[np.int64]]
@@ -148,11 +150,18 @@ class Language:
     unroll: Unroll | None = None
     follower: Callable[[Dialect, Run], Follower] | None = None
     straight: Callable[[Template], bool] = runs_straight_on
+    semantics: frozenset[str] = frozenset({"iso"})
 
 
 @lru_cache(maxsize=32)
 def language_of(dialect: Dialect) -> Language:
-    """The language of a dialect, imported when it is first needed."""
+    """The language of a dialect, imported when it is first needed.
+
+    Raises `PluginError`: NCF507 if the import fails, NCF508 if what it names is no `Language` or has no such semantics.
+    """
     language: Language = called("dialects", dialect.name, resolve_name, dialect.language, gives=Language)
     assert isinstance(language, Language), f"{dialect.language} is no Language"
+    if dialect.semantics not in language.semantics:
+        text = f"the dialect {dialect.name!r} has the semantics {dialect.semantics!r}, which its language does not know"
+        raise useless("dialects", dialect.name, text, nearest(dialect.semantics, language.semantics))
     return language
