@@ -8,10 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ncfix.compensate.along import Along
-from ncfix.compensate.cuts import Cut
+from ncfix.compensate.figures.comparison import Cut, SideBySide
+from ncfix.compensate.figures.simulation import Along
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.side_by_side import SideBySide
 from ncfix.control.moves import Moves
 from ncfix.machine import Machine, State
 

@@ -15,9 +15,9 @@ from scipy.spatial import KDTree
 
 from compensate.side import compared
 from compensate.test_comparison import fixed, moves_of
-from ncfix.compensate.bodies import Bodies
+from ncfix.compensate.figures.backlash import Bodies
+from ncfix.compensate.figures.curve import Stretches
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.stretches import Stretches
 from ncfix.control.moves import Kind, Moves
 from ncfix.machine import Machine, State, load
 from ncfix.machine.effect import Effect

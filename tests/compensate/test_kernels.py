@@ -12,12 +12,12 @@ import pytest
 from compensate.motions import motions
 from compensate.test_stream import OPTIONS, program, whole
 from ncfix import fast
-from ncfix.compensate.curve import Curve, Samples, arc_lengths
 from ncfix.compensate.ends import corrected
+from ncfix.compensate.figures.curve import Curve, Samples, arc_lengths
+from ncfix.compensate.figures.nearest import Search
 from ncfix.compensate.intent import Intent
 from ncfix.compensate.judge import bounds, deviations_seen, uneasy_starts
 from ncfix.compensate.known import Known
-from ncfix.compensate.nearest import Search
 from ncfix.compensate.path import plan
 from ncfix.compensate.segments import Segments
 from ncfix.compensate.split import STRETCH, Grid, fewest

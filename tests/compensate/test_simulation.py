@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from compensate.side import compared
-from ncfix.compensate.along import Along
+from ncfix.compensate.figures.simulation import Along, TipError, tip_errors
 from ncfix.compensate.following import follow
 from ncfix.compensate.intent import Intent
-from ncfix.compensate.simulation import TipError, tip_errors
 from ncfix.control.moves import Moves
 from ncfix.control.setup import Setup
 from ncfix.diagnostics import DifferenceError

@@ -16,7 +16,7 @@ from ncfix.diagnostics import Message, SourceError
 
 if TYPE_CHECKING:
     from ncfix.compensate.coverage import Why
-    from ncfix.compensate.side_by_side import SideBySide
+    from ncfix.compensate.figures.comparison import SideBySide
     from ncfix.text.tree import Program
 
 
@@ -129,7 +129,7 @@ class Pair:
 
     def _in_parts(self) -> tuple[Sequence[SideBySide], Said]:
         """While they are read; raises what that does, `NotInPartsError` and `LostError`."""
-        from ncfix.compensate.cuts import Cuts
+        from ncfix.compensate.figures.comparison import Cuts
 
         found, dialect = self._side_by_side(), dialect_in(self.following, self.original)
         cuts = []
@@ -141,7 +141,7 @@ class Pair:
 
     def _as_wholes(self) -> tuple[Sequence[SideBySide], Said]:
         from ncfix.compensate.block_delete import in_pairs, messages_of
-        from ncfix.compensate.cuts import whole
+        from ncfix.compensate.figures.comparison import whole
         from ncfix.compensate.following import placed
 
         original = self._read(self.original)
@@ -158,8 +158,8 @@ class Pair:
         return found, (messages_of(meant), messages_of(done))
 
     def _side_by_side(self) -> SideBySide:
+        from ncfix.compensate.figures.comparison import SideBySide
         from ncfix.compensate.rounding import rounding
-        from ncfix.compensate.side_by_side import SideBySide
 
         assert self.following.machine is not None
         return SideBySide(self.tolerance_um / 1e3, rounding(self.following.machine))

@@ -10,9 +10,9 @@ from ncfix.cli.options import load_machine, read_program, subprograms
 from ncfix.cli.setup_options import SetupOptions
 
 if TYPE_CHECKING:
-    from ncfix.compensate.along import Along
     from ncfix.compensate.block_delete import Position
     from ncfix.compensate.checking import Checked
+    from ncfix.compensate.figures.simulation import Along
     from ncfix.compensate.following import Followed
     from ncfix.control.moves import Trace
     from ncfix.control.setup import Setup

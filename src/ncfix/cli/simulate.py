@@ -23,8 +23,7 @@ from ncfix.cli.through import dialect_in, task_of, tell_of_stamp, through
 
 if TYPE_CHECKING:
     from ncfix.cli.table import Columns
-    from ncfix.compensate.along import Along
-    from ncfix.compensate.simulation import TipError
+    from ncfix.compensate.figures.simulation import Along, TipError
     from ncfix.diagnostics import Message
     from ncfix.measure.synthetic import Faults
 
@@ -125,7 +124,7 @@ class Errors:
 
         Raises what reading does, and `NotInPartsError`.
         """
-        from ncfix.compensate.simulation import tip_errors_on
+        from ncfix.compensate.figures.simulation import tip_errors_on
 
         task = task_of(self.following, self.source, dialect_in(self.following, self.source))
         said: list[Message] = []
@@ -134,8 +133,8 @@ class Errors:
 
     def whole(self) -> tuple[Iterable[bytes], Along, Sequence[Message]]:
         """The same of a program as a whole."""
+        from ncfix.compensate.figures.simulation import tip_errors
         from ncfix.compensate.intent import Intent
-        from ncfix.compensate.simulation import tip_errors
         from ncfix.machine import State
 
         path = self.source.path
@@ -150,8 +149,7 @@ class Errors:
         self, errors: Iterable[TipError], keep: Callable[[Iterable[bytes]], Iterable[bytes]] | None
     ) -> tuple[Iterable[bytes], Along]:
         from ncfix.cli.table import as_csv
-        from ncfix.compensate.along import Along
-        from ncfix.compensate.simulation import TipError
+        from ncfix.compensate.figures.simulation import Along, TipError
 
         along = Along()
         tables = map(_columns, chain([TipError.none()], along.adding(errors)))

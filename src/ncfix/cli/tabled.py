@@ -46,10 +46,8 @@ def along(
     Raises `RefusedError` for a program that would be corrected twice: NCF493 if it carries a stamp of ncfix, NCF438 if
     its numbers show it.
     """
-    from ncfix.compensate.along import Along
+    from ncfix.compensate.figures.simulation import Along, seems_corrected, tip_errors, tip_with
     from ncfix.compensate.intent import Intent
-    from ncfix.compensate.simulation import tip_errors
-    from ncfix.compensate.tabled import seems_corrected, tip_with
     from ncfix.machine import State
 
     program, followed = _followed(following, path)

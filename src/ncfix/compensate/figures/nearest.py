@@ -3,16 +3,25 @@
 A point of another path is followed down to where it is nearest, from where this path is as long as that one is there.
 Where that is farther away than is of no interest, and the path turns so much near by that it might come back nearer to
 the point, all of it is looked at that could be nearer.
+
+Between the samples of a path more are taken in two cases:
+
+- Where it goes on over a hole of the other one, between two cuts of it, however short that is. A straight cut is looked
+  at where it begins, half-way and where it ends; a hole in between is not seen there.
+- Where it may be too far from the other one between two places at which it is near enough. The distance changes by no
+  more than the way, and has a peak where the nearest point leaps along the other path. The way between two such places
+  is halved until one is found that is too far, or until there can be none.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ncfix import fast
-from ncfix.compensate.curve import Curve, length
+from ncfix.compensate.figures.curve import Curve, Samples, length
 from ncfix.compensate.findings import Array, Index, Mask
 from ncfix.compensate.ragged import batches, owners, places
 from ncfix.compensate.rows import picked
@@ -287,3 +296,112 @@ def _on_chords(curve: Curve, points: Array, piece: Index) -> tuple[Array, Array]
     square = np.einsum("ij,ij->i", chord, chord)
     share = np.clip(np.einsum("ij,ij->i", gap, chord) / np.where(square > 0, square, 1.0), 0.0, 1.0)
     return share, length(gap - share[:, None] * chord) - length(picked(curve.bend, piece)) / 4
+
+
+def over_holes(search: Search, path: Curve, samples: Samples, before: Index, found: Nearest) -> tuple[Samples, Nearest]:
+    """More samples of a path, where it goes over holes of the other one, and what is nearest to them.
+
+    samples, found  (n,) those that there are
+    before  (n,) the parabola of the other one that is nearest to the place before each sample
+    """
+    rows, middles = _crossed(search, samples, before, found.piece)
+    piece, share = samples.piece[rows], _shares_beside(path, samples, rows, middles)
+    points = path.point(piece, share)
+    back = (samples.share[rows] - share) * path.ways[piece]
+    more = search.around(points, search.curve.way(found.piece, found.share)[rows] - back)
+    return Samples(piece, share, points, np.zeros(len(rows))), more
+
+
+def _crossed(search: Search, samples: Samples, before: Index, behind: Index) -> tuple[Index, Array]:
+    """Samples (k,) before which holes are gone over, from parabolas (n,) to others (n,), and the middles (k, 3)."""
+    curve = search.curve
+    holes = np.flatnonzero(curve.gaps > search.near)
+    passed = np.searchsorted(holes, np.stack([before, behind]), side="right")
+    low = passed.min(axis=0)
+    counts = np.where(samples.share > 0, passed.max(axis=0) - low, 0)
+    rows = owners(counts)
+    hole = holes[low[rows] + places(counts)]
+    return rows, (curve.end[hole - 1] + curve.begin[hole]) / 2
+
+
+def _shares_beside(path: Curve, samples: Samples, rows: Index, points: Array) -> Array:
+    """The shares of the parabolas that are beside points (k, 3), in the half of each before a sample (k,)."""
+    piece, share = samples.piece[rows], samples.share[rows]
+    begin = path.point(piece, share - 0.5)
+    chord = samples.points[rows] - begin
+    square = np.einsum("ij,ij->i", chord, chord)
+    along = np.einsum("ij,ij->i", points - begin, chord) / np.where(square > 0, square, 1.0)
+    found: Array = share - 0.5 + np.clip(along, 0.0, 1.0) / 2
+    return found
+
+
+HALVINGS = 24
+"""How often a way is halved at most: to some nanometres of the longest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Between:
+    """Ways (n,) along parabolas, and what is nearest to where they begin and end.
+
+    piece             (n,) the parabola
+    low, high         (n,) the shares of it from which to which they go
+    before, behind    what is nearest to both ends
+    """
+
+    piece: Index
+    low: Array
+    high: Array
+    before: Nearest
+    behind: Nearest
+
+    def taken(self, which: Index) -> Between:
+        """Some of them."""
+        ends = (each.taken(which) for each in (self.before, self.behind))
+        return Between(self.piece[which], self.low[which], self.high[which], *ends)
+
+    def leaping(self, search: Search, path: Curve) -> Between:
+        """Those on which there may be a peak beyond what is near enough."""
+        way, near = path.ways[self.piece] * (self.high - self.low), search.near
+        begin, end = (search.curve.way(each.piece, each.share) for each in (self.before, self.behind))
+        within = (self.before.gap <= near) & (self.behind.gap <= near)
+        peaks = within & (self.before.gap + self.behind.gap + way > 2 * near)
+        return self.taken(np.flatnonzero(peaks & (np.abs(end - begin - way) > near)))
+
+    def middle(self, search: Search, path: Curve) -> Nearest:
+        """What is nearest to the middle of each: seen from the begin or from the end, whichever is nearer."""
+        points = path.point(self.piece, (self.low + self.high) / 2)
+        half = path.ways[self.piece] * (self.high - self.low) / 2
+        found, other = (
+            search.around(points, search.curve.way(each.piece, each.share) + way)
+            for each, way in ((self.before, half), (self.behind, -half))
+        )
+        nearer = np.flatnonzero(other.gap < found.gap)
+        found.put(nearer, other.taken(nearer))
+        return found
+
+    def halves(self, middle: Nearest) -> Between:
+        """Both halves of each, by what is nearest to its middle."""
+        piece, half = np.tile(self.piece, 2), (self.low + self.high) / 2
+        low, high = np.append(self.low, half), np.append(half, self.high)
+        return Between(piece, low, high, self.before.and_more(middle), middle.and_more(self.behind))
+
+
+def over_peaks(
+    search: Search, path: Curve, samples: Samples, before: Nearest, found: Nearest
+) -> Iterator[tuple[Samples, Nearest]]:
+    """More samples of a path, where there are peaks between those that there are, and what is nearest to them.
+
+    samples, found  (n,) those that there are
+    before          (n,) what is nearest to the place before each sample
+    """
+    joined = np.flatnonzero((samples.share > 0) & (path.ways[samples.piece] > 0))
+    share = samples.share[joined]
+    left = Between(samples.piece[joined], share - 0.5, share, before.taken(joined), found.taken(joined))
+    for _ in range(HALVINGS):
+        left = left.leaping(search, path)
+        if not len(left.piece):
+            return
+        half = (left.low + left.high) / 2
+        middle = left.middle(search, path)
+        yield Samples(left.piece, half, path.point(left.piece, half), np.zeros(len(half))), middle
+        left = left.halves(middle)
